@@ -1,0 +1,37 @@
+"""The four loggers of SMACH: plain prints until somebody hands in better ones.
+
+Code that logs says ``smach.loginfo(...)`` at the moment of logging, so that :func:`set_loggers` reaches every module.
+"""
+import sys
+from typing import Callable
+
+import smach
+
+__all__ = ['set_loggers', 'loginfo', 'logwarn', 'logerr', 'logdebug']
+
+Logger = Callable[[str], object]
+
+
+def loginfo(msg: object) -> None:
+    """Default info logger: standard output."""
+    sys.stdout.write('[  INFO ] : %s\n' % (msg,))
+
+
+def logwarn(msg: object) -> None:
+    """Default warning logger: standard output."""
+    sys.stdout.write('[  WARN ] : %s\n' % (msg,))
+
+
+def logdebug(msg: object) -> None:
+    """Default debug logger: standard output."""
+    sys.stdout.write('[ DEBUG ] : %s\n' % (msg,))
+
+
+def logerr(msg: object) -> None:
+    """Default error logger: standard output."""
+    sys.stdout.write('[ ERROR ] : %s\n' % (msg,))
+
+
+def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
+    """Replace all four loggers; each is called with one finished text per message."""
+    vars(smach).update(loginfo=info, logwarn=warn, logdebug=debug, logerr=error)

@@ -1,0 +1,110 @@
+"""Read-only views of the objects a state may look at but not change.
+
+A state that declares a key as input only gets a :class:`Const` around an object with attributes. Plain values,
+containers, functions, classes and modules come as they are: they are either immutable or not the object's own state.
+"""
+import collections
+import copy
+import enum
+import types
+from typing import Any, Iterator, NoReturn, Tuple
+
+import smach
+
+# Checked by identity before anything else, as nearly every value that passes through userdata is one of these.
+PLAIN_TYPES = frozenset((int, float, str, bool, type(None), bytes, list, tuple, dict, set, frozenset, complex))
+
+_COME_AS_THEY_ARE: Tuple[type, ...] = (
+    int, float, complex, str, bytes, bytearray, list, tuple, dict, set, frozenset, collections.deque, enum.Enum,
+    type, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.ModuleType)
+
+
+class Const(object):
+    """A view of an object that refuses to set or delete attributes, and so do the objects reached through it."""
+
+    __slots__ = ('_obj',)
+
+    def __init__(self, obj: Any) -> None:
+        object.__setattr__(self, '_obj', obj)
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        """The class of the object behind the view, so that isinstance() answers as it would for the object."""
+        return type(self._obj)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == '_obj':
+            raise AttributeError(name)
+        return get_const(getattr(self._obj, name))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._refuse('set', name)
+
+    def __delattr__(self, name: str) -> None:
+        self._refuse('delete', name)
+
+    def _refuse(self, verb: str, name: str) -> NoReturn:
+        text = "Cannot %s attribute '%s': objects of input keys are read-only." % (verb, name)
+        smach.logerr(text)
+        raise TypeError(text)
+
+    def __getitem__(self, key: Any) -> Any:
+        return get_const(self._obj[key])
+
+    def __iter__(self) -> Iterator[Any]:
+        return (get_const(item) for item in self._obj)
+
+    def __contains__(self, item: Any) -> bool:
+        return item in self._obj
+
+    def __len__(self) -> int:
+        return len(self._obj)
+
+    def __bool__(self) -> bool:
+        return bool(self._obj)
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self._obj == _behind(other))
+
+    def __ne__(self, other: object) -> bool:
+        return bool(self._obj != _behind(other))
+
+    def __hash__(self) -> int:
+        return hash(self._obj)
+
+    def __str__(self) -> str:
+        return str(self._obj)
+
+    def __repr__(self) -> str:
+        return repr(self._obj)
+
+    def __copy__(self) -> Any:
+        return copy.copy(self._obj)
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        return copy.deepcopy(self._obj, memo)
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        return self._obj.__reduce_ex__(protocol)
+
+
+class CallableConst(Const):
+    """A view of an object that can be called; apart, so that callable() is right about the others."""
+
+    __slots__ = ()
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self._obj(*args, **kwargs)
+
+
+def _behind(obj: Any) -> Any:
+    return obj._obj if issubclass(type(obj), Const) else obj
+
+
+def get_const(obj: Any) -> Any:
+    """A read-only view of ``obj``, or ``obj`` itself where it has no attributes of its own."""
+    if type(obj) in PLAIN_TYPES or issubclass(type(obj), Const) or isinstance(obj, _COME_AS_THEY_ARE):
+        return obj
+    if not hasattr(obj, '__dict__'):
+        return obj
+    return CallableConst(obj) if callable(obj) else Const(obj)

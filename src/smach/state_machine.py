@@ -1,0 +1,394 @@
+"""The machine: one state at a time, its outcome deciding which comes next."""
+import threading
+import traceback
+from typing import Any, Dict, List, Mapping, Optional, Sequence
+
+import smach
+from smach.container import Container, Edge
+from smach.state import State
+from smach.user_data import Remapper
+from smach.visit import Visit
+
+__all__ = ['StateMachine']
+
+
+class StateMachine(Container):
+    """A container that executes its states one after the other.
+
+    ``outcomes`` are those of the machine itself. Its states are added inside a ``with`` block, and the first one added
+    is where it begins unless :meth:`set_initial_state` says otherwise.
+    """
+
+    # Made anew rather than copied or pickled.
+    _UNPICKLED = ('_state_transitioning_lock', '_visits')
+
+    _is_preempt_passed_on = False  # whether a state was asked since the latest request
+
+    _is_hooked = True  # until execute() has looked: whether a method of _HOOKS was overridden or patched
+
+    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = ()) -> None:
+        Container.__init__(self, outcomes, input_keys, output_keys)
+        self._states: Dict[str, State] = {}
+        self._transitions: Dict[str, Dict[str, Optional[str]]] = {}
+        self._remappings: Dict[str, Mapping[str, str]] = {}
+        self._constants: Dict[str, Mapping[str, Any]] = {}
+        self._initial_state_label: Optional[str] = None
+
+        self._is_running = False
+        # Held while the machine moves from one state to the next; re-entrant so that callbacks may request a preempt.
+        self._state_transitioning_lock = threading.RLock()
+        self._current_label: Optional[str] = None
+        self._current_state: Optional[State] = None
+        self._current_transitions: Optional[Dict[str, Optional[str]]] = None
+        self._current_outcome: Optional[str] = None
+        self._preempted_label: Optional[str] = None
+        self._preempted_state: Optional[State] = None
+        self._visits: Dict[str, Visit] = {}
+
+        # What add_auto() left to be connected to the next state added.
+        self._last_added_label: Optional[str] = None
+        self._connector_outcomes: Sequence[str] = ()
+
+    # -- construction
+
+    @staticmethod
+    def add(label: str, state: State, transitions: Optional[Mapping[str, Optional[str]]] = None,
+            remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str, Any]] = None) -> State:
+        """Add a state to the innermost open machine and return it.
+
+        ``transitions`` maps outcomes of the state to labels or to outcomes of the machine; outcomes left out, or mapped
+        to None, end the machine with its outcome of the same name. ``remapping`` maps the state's userdata keys to the
+        machine's; ``constants`` gives some of its input keys fixed values. Raises InvalidStateError for a label
+        already used, InvalidTransitionError for a transition from an outcome the state does not have.
+        """
+        machine = StateMachine._currently_opened_container()
+        if transitions is not None and not isinstance(transitions, Mapping):
+            raise smach.InvalidTransitionError("The transitions of state '%s' must map outcomes to labels, not be %r."
+                                               % (label, transitions))
+        transitions = {} if transitions is None else dict(transitions)
+        machine.check_state_spec(label, state, transitions)
+        missing: Dict[str, Optional[str]] = {
+            outcome: None for outcome in state.get_registered_outcomes() if outcome not in transitions}
+        transitions.update(missing)
+        smach.logdebug("State '%s' (%r) leaves by %s" % (label, state, transitions))
+        machine._enter_in_tables(label, state, transitions, remapping, constants)
+        return state
+
+    def _enter_in_tables(self, label: str, state: State, transitions: Dict[str, Optional[str]],
+                         remapping: Optional[Mapping[str, str]], constants: Optional[Mapping[str, Any]]) -> None:
+        if self._initial_state_label is None:
+            self._initial_state_label = label
+        self._states[label] = state
+        self._transitions[label] = transitions
+        self._remappings[label] = {} if remapping is None else remapping
+        self._constants[label] = {} if constants is None else dict(constants)
+        if self._connector_outcomes and self._last_added_label is not None:
+            for outcome in self._connector_outcomes:
+                self._transitions[self._last_added_label][outcome] = label
+        self._connector_outcomes = ()
+        self._last_added_label = None
+
+    @staticmethod
+    def add_auto(label: str, state: State, connector_outcomes: Sequence[str],
+                 transitions: Optional[Mapping[str, Optional[str]]] = None,
+                 remapping: Optional[Mapping[str, str]] = None) -> State:
+        """Add a state whose ``connector_outcomes`` lead to the state that is added next."""
+        machine = StateMachine._currently_opened_container()
+        StateMachine.add(label, state, transitions, remapping)
+        registered = state.get_registered_outcomes()
+        if not all(outcome in registered for outcome in connector_outcomes):
+            raise smach.InvalidStateError(
+                "State '%s' cannot lead on by the outcomes %s: it has registered only %s"
+                % (label, connector_outcomes, registered))
+        machine._last_added_label = label
+        machine._connector_outcomes = connector_outcomes
+        return state
+
+    def check_state_spec(self, label: str, state: State, transitions: Mapping[str, Optional[str]]) -> None:
+        """Raise InvalidStateError for a used label, InvalidTransitionError for an outcome the state does not have."""
+        if label in self._states:
+            raise smach.InvalidStateError("This state machine has a state '%s' already." % label)
+        registered = state.get_registered_outcomes()
+        for outcome in transitions:
+            if outcome not in registered:
+                raise smach.InvalidTransitionError(
+                    "There is a transition from outcome '%s' of state '%s', which has registered only %s"
+                    % (outcome, label, registered))
+
+    def check_consistency(self) -> None:
+        """Raise InvalidTransitionError if there is no initial state or a transition leads nowhere."""
+        known = set(self._states).union(self.get_registered_outcomes())
+        errors = []
+        if self._initial_state_label is None:
+            errors.append('It has no initial state.')
+        elif self._initial_state_label not in self._states:
+            errors.append("Its initial state '%s' is not among its states." % self._initial_state_label)
+        for label, transitions in self._transitions.items():
+            unknown = [to for to in transitions.values() if to and to not in known]
+            if unknown:
+                errors.append("State '%s' leads to %s, which are neither states nor outcomes of the machine."
+                              % (label, unknown))
+            unregistered = [outcome for outcome, to in transitions.items() if not to and outcome not in known]
+            if unregistered:
+                errors.append("State '%s' has the outcomes %s, which lead to no state and are no outcomes of the "
+                              'machine.'
+                              % (label, unregistered))
+        if errors:
+            raise smach.InvalidTransitionError('This state machine is inconsistent:\n\t%s\nIts states and outcomes: %s'
+                                               % ('\n\t'.join(errors), sorted(known, key=str)))
+
+    # -- execution
+
+    def execute(self, parent_ud: Any = None) -> Optional[str]:
+        """Run to the end and return the outcome; None if the machine is inconsistent or everything is shut down.
+
+        Raises InvalidUserCodeError if a state raised, InvalidTransitionError if one ended with an outcome it has not
+        registered or that leads nowhere.
+        """
+        self._is_running = True
+        self._is_hooked = any(getattr(getattr(self, name), '__func__', None) is not method
+                              for name, method in _HOOKS.items())
+        try:
+            if not self._is_consistent():
+                return None
+            with self._state_transitioning_lock:
+                self._start(parent_ud)
+                outcome = None
+                while outcome is None and self._is_running and not smach.is_shutdown():
+                    if self._pause_requested:
+                        self._wait_while_paused()
+                    outcome = self._update_once()
+            self._copy_output_keys(self.userdata, parent_ud)
+            return outcome
+        finally:
+            self._is_running = False
+
+    def _start(self, parent_ud: Any) -> None:
+        """Put the machine to its initial state, take over the input keys and call the start callbacks."""
+        if self._preempted_state is not None and not self._preempt_requested:
+            self._preempted_state.recall_preempt()  # it ignored a request of the last run, since settled elsewhere
+        self._preempted_label = None
+        self._preempted_state = None
+        self._set_current_state(self._initial_state_label)
+        self._copy_input_keys(parent_ud, self.userdata)
+        smach.loginfo("State machine starting in initial state '%s' with userdata: \n\t%s"
+                      % (self._current_label, list(self.userdata.keys())))
+        self.call_start_cbs()
+
+    def _set_current_state(self, state_label: Optional[str]) -> None:
+        """Make this state the one that is executed next; None after the last."""
+        self._current_label = state_label
+        self._current_outcome = None
+        if state_label is None:
+            self._current_state = None
+            self._current_transitions = None
+        else:
+            self._current_state = self._states[state_label]
+            self._current_transitions = self._transitions[state_label]
+
+    def _update_once(self) -> Optional[str]:
+        """Execute the current state and make the transition: None to go on, or the outcome of the machine.
+
+        Called with the transitioning lock held; lets go of it while the state executes. Every transition takes this
+        path, so it is one flat piece; what is rare is in methods of its own.
+        """
+        if self._preempt_requested or (self._is_hooked and self.preempt_requested()):
+            self._pass_preempt_on()
+        label: Any = self._current_label
+        state: Any = self._current_state
+        try:
+            visit = self._visits[label]
+        except KeyError:
+            visit = None
+        if (visit is None or visit.state is not state or visit.userdata is not self.userdata
+                or visit.input_keys is not state._input_keys or visit.output_keys is not state._output_keys
+                or visit.remapping is not self._remappings[label]):
+            visit = self._prepare_visit(label, state)
+        lock = self._state_transitioning_lock
+        lock.release()
+        try:
+            outcome = state.execute(visit.remapper)
+        except smach.InvalidUserCodeError:
+            smach.logerr("State '%s' ended in an error." % label)
+            raise
+        except Exception as err:
+            raise smach.InvalidUserCodeError("Could not execute state '%s' of type '%s': %s"
+                                             % (label, state, traceback.format_exc())) from err
+        finally:
+            lock.acquire()
+        try:
+            target = self._current_transitions[outcome] if outcome in state._outcomes else _SEARCH  # type: ignore
+        except (AttributeError, KeyError, TypeError):
+            target = _SEARCH
+        if target is _SEARCH:
+            target = self._search_target(label, state, outcome)
+        self._current_outcome = outcome
+        if target in self._states:
+            self._set_current_state(target)
+            try:
+                said_of, text = visit.texts[outcome]
+            except KeyError:
+                said_of = text = None
+            smach.loginfo(text if said_of is target else visit.text_of(label, outcome, target))
+            if self._transition_cbs or self._is_hooked:
+                self.call_transition_cbs()
+            return None
+        return self._terminate(label, outcome, target)
+
+    def _wait_while_paused(self) -> None:
+        self._state_transitioning_lock.release()
+        try:
+            Container._wait_while_paused(self)
+        finally:
+            self._state_transitioning_lock.acquire()
+
+    def _prepare_visit(self, label: str, state: Any) -> Visit:
+        """What the state is given to read and write, kept for its next visit where that is safe."""
+        if label not in self._states:
+            raise smach.InvalidStateError("The current state '%s' is not in the state machine. Available states: %s"
+                                          % (label, list(self._states)))
+        visit = Visit(state, self.userdata, self._remappings[label], self._constants.get(label))
+        if visit.may_be_kept:
+            self._visits[label] = visit
+        return visit
+
+    def _remapper_of(self, label: str) -> Remapper:
+        """What the state of this label is given to read and write, for subclasses that execute states themselves."""
+        visit = self._visits.get(label)
+        state = self._states[label]
+        if visit is None or not visit.is_up_to_date(state, self.userdata, self._remappings[label]):
+            visit = self._prepare_visit(label, state)
+        return visit.remapper
+
+    def _search_target(self, label: str, state: Any, outcome: Any) -> Optional[str]:
+        """Where an outcome leads that was not found the quick way; InvalidTransitionError if nowhere."""
+        registered = state.get_registered_outcomes()
+        if outcome not in registered:
+            raise smach.InvalidTransitionError(
+                "State '%s' (%r) returned '%s', but has registered only the outcomes %s"
+                % (label, state, outcome, registered))
+        transitions: Any = self._current_transitions
+        if outcome not in transitions:
+            raise smach.InvalidTransitionError(
+                "State '%s' has no transition for its outcome '%s', only %s" % (label, outcome, transitions))
+        target: Optional[str] = transitions[outcome]
+        return target
+
+    def _terminate(self, label: str, outcome: str, target: Optional[str]) -> str:
+        """End the machine with the container outcome of the target's name, else of the outcome's own."""
+        registered = self.get_registered_outcomes()
+        container_outcome = target if target in registered else outcome
+        if container_outcome not in registered:
+            raise smach.InvalidTransitionError(
+                "Outcome '%s' of state '%s' leads to '%s', and neither that nor the outcome itself is a state or an "
+                'outcome of the machine.' % (outcome, label, target))
+        preempted = self._preempted_state
+        if self._preempt_requested and preempted is not None and not preempted.preempt_requested():
+            self._preempt_requested = False
+        self._set_current_state(None)
+        smach.loginfo("State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome))
+        self.call_termination_cbs([label], container_outcome)
+        return container_outcome
+
+    # -- preemption
+
+    def request_preempt(self) -> None:
+        """Ask the active state to stop; if it ends without servicing this, the next one is asked before it runs."""
+        self._is_preempt_passed_on = False
+        State.request_preempt(self)  # before the lock: a machine that moves fast may hold it nearly all the time
+        with self._state_transitioning_lock:
+            # The machine may have seen the request meanwhile and passed it on: asking twice would stop two states. Or
+            # it took it for that of an earlier request just serviced, and has dropped it.
+            if not self._is_preempt_passed_on and self._current_state is not None:
+                self._preempt_requested = True
+                self._preempt_current_state()
+
+    def _preempt_current_state(self) -> None:
+        self._is_preempt_passed_on = True
+        state: Any = self._current_state
+        if self._preempted_state is state and state.preempt_requested():
+            return
+        if self._preempted_state is not None:
+            self._preempted_state.recall_preempt()
+        self._preempted_label = self._current_label
+        self._preempted_state = state
+        try:
+            state.request_preempt()
+        except Exception:
+            smach.logerr("Preempting state '%s' raised:\n%s" % (self._current_label, traceback.format_exc()))
+
+    def _pass_preempt_on(self) -> None:
+        """Called with a preempt pending, before a state runs: preempt it, unless the last one serviced the request."""
+        smach.loginfo('The state machine is to be preempted before its next state runs.')
+        preempted = self._preempted_state
+        if preempted is None:
+            self._preempt_current_state()
+        elif preempted.preempt_requested():
+            smach.loginfo("State '%s' has not serviced the preempt; it goes on to state '%s'."
+                          % (self._preempted_label, self._current_label))
+            if preempted is self._current_state:  # or it would look as if it had been asked already
+                preempted.recall_preempt()
+            self._preempt_current_state()
+        else:
+            self._preempt_requested = False
+            self._preempted_state = None
+
+    # -- what outsiders may ask
+
+    def is_running(self) -> bool:
+        """Whether execute() is under way."""
+        return self._is_running
+
+    def __getitem__(self, key: str) -> State:
+        if key not in self._states:
+            text = ("This state machine has no state '%s', only %s"
+                    % (key, list(self._states)))
+            smach.logerr(text)
+            raise KeyError(text)
+        return self._states[key]
+
+    def get_children(self) -> Dict[str, State]:
+        """The states by label."""
+        return self._states
+
+    def get_initial_states(self) -> List[str]:
+        """The label at which execution begins, in a list."""
+        return [str(self._initial_state_label)]
+
+    def set_initial_state(self, initial_states: Sequence[str], userdata: Optional[smach.UserData] = None) -> None:
+        """Begin at this label (one, in a list) from now on, with the keys of ``userdata`` added to the machine's."""
+        smach.logdebug('Setting initial states to %s' % (initial_states,))
+        labels = [initial_states] if isinstance(initial_states, str) else list(initial_states)
+        if len(labels) > 1:
+            smach.logwarn('A state machine begins in one state; of the initial states %s the first is taken.' % labels)
+        if labels:
+            self._initial_state_label = labels[0]
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_active_states(self) -> List[str]:
+        """The label of the current state, in a list; 'None' while there is none."""
+        return [str(self._current_label)]
+
+    def get_internal_edges(self) -> List[Edge]:
+        """All transitions as (outcome, from, to); to is None where the outcome falls through."""
+        return [(outcome, label, to) for label, transitions in self._transitions.items()
+                for outcome, to in transitions.items()]
+
+    # -- copies
+
+    def __getstate__(self) -> Dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key not in StateMachine._UNPICKLED}
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        state = dict(state, _state_transitioning_lock=threading.RLock(), _visits={}, _is_running=False)
+        for name, value in state.items():  # by setattr, as an instance whose __dict__ was never asked for is faster
+            setattr(self, name, value)
+
+
+# The public methods that are called at every step only if somebody put another in their place.
+_HOOKS = {'preempt_requested': State.preempt_requested, 'call_transition_cbs': Container.call_transition_cbs}
+
+# Stands for a target that has to be looked for, where None means one that falls through.
+_SEARCH: Any = object()

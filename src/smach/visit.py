@@ -1,0 +1,36 @@
+"""What a machine keeps of its last visit to a state, so that the next one costs little."""
+from typing import Any, Dict, Mapping, Optional
+
+from smach.state import State
+from smach.user_data import ConstantsRemapper, Remapper
+
+
+class Visit(object):
+    """The view on userdata a state is given, with everything it was made of, to be compared by identity later."""
+
+    __slots__ = ('state', 'userdata', 'input_keys', 'output_keys', 'remapping', 'remapper', 'may_be_kept', 'texts')
+
+    def __init__(self, state: Any, userdata: Any, remapping: Mapping[str, str],
+                 constants: Optional[Mapping[str, Any]]) -> None:
+        # A state that computes its keys is asked for them at every visit.
+        self.may_be_kept = (type(state).get_registered_input_keys is State.get_registered_input_keys
+                            and type(state).get_registered_output_keys is State.get_registered_output_keys)
+        self.state = state
+        self.userdata = userdata
+        self.input_keys = state._input_keys if self.may_be_kept else state.get_registered_input_keys()
+        self.output_keys = state._output_keys if self.may_be_kept else state.get_registered_output_keys()
+        self.remapping = remapping
+        parts = (userdata, self.input_keys, self.output_keys, remapping)
+        self.texts: Dict[Any, Any] = {}  # (target, log line of the transition to it) by outcome
+        self.remapper = ConstantsRemapper(*parts, constants) if constants else Remapper(*parts)
+
+    def is_up_to_date(self, state: Any, userdata: Any, remapping: Mapping[str, str]) -> bool:
+        """Whether nothing the view was made of has been exchanged."""
+        return (self.state is state and self.userdata is userdata and self.remapping is remapping
+                and self.input_keys is state._input_keys and self.output_keys is state._output_keys)
+
+    def text_of(self, label: str, outcome: str, target: Optional[str]) -> str:
+        """The log line of a transition, made once and kept."""
+        text = "State machine transitioning '%s':'%s'-->'%s'" % (label, outcome, target)
+        self.texts[outcome] = (target, text)
+        return text

@@ -1,0 +1,132 @@
+"""Seeing what the containers of a machine do, without slowing or changing them."""
+import threading
+import weakref
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+
+import smach
+
+Report = Callable[['ContainerWatch', str, List[str], Any], None]
+"""``report(watch, info, active_states, userdata)``: a container starts, makes a transition or has ended."""
+
+
+class _Hook(object):
+    """The callback a container holds. Pickled or copied with its machine it becomes one that does nothing."""
+
+    def __init__(self, watch: Optional['ContainerWatch'], info: str) -> None:
+        self._watch = weakref.ref(watch) if watch is not None else None
+        self._info = info
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _Hook, (None, self._info)
+
+    def __call__(self, userdata: Any, states: Sequence[str], *args: Any) -> None:
+        watch = self._watch() if self._watch is not None else None
+        if watch is not None and (watch.jump_to is not None or watch.is_heard()):
+            watch.happened(self._info, userdata, states, args)
+
+
+class ContainerWatch(object):
+    """One container of the tree, at one or more paths."""
+
+    def __init__(self, container: Any, report: Report, is_heard: Callable[[], bool]) -> None:
+        self.is_heard = is_heard
+        self.container = container
+        self.paths: List[str] = []
+        self.jump_to: Optional[str] = None
+        self._report: Optional[Report] = report
+        container.register_start_cb(_Hook(self, 'START'), [])
+        container.register_transition_cb(_Hook(self, 'TRANSITION'), [])
+        container.register_termination_cb(_Hook(self, 'TERMINATION'), [])
+
+    def detach(self) -> None:
+        """Report nothing any more."""
+        self._report = None
+
+    def attach(self, report: Report) -> None:
+        """Report again after ``detach``."""
+        self._report = report
+
+    def happened(self, info: str, userdata: Any, states: Sequence[str], args: Sequence[Any]) -> None:
+        """Called in the executing thread."""
+        if info == 'TERMINATION':
+            self.jump_to = None
+            info = 'TERMINATION %s' % (args[0] if args else '')
+            states = ['None']
+        elif info == 'TRANSITION' and self.jump_to is not None:
+            states = self._jump(states)
+        report = self._report
+        if report is not None:
+            report(self, info, [str(state) for state in states], userdata)
+
+    def _jump(self, states: Sequence[str]) -> Sequence[str]:
+        label, self.jump_to = self.jump_to, None
+        if label not in self.container.get_children():
+            return states
+        smach.logwarn("Going to '%s' instead of %s, as asked through introspection" % (label, list(states)))
+        self.container._set_current_state(label)
+        return [str(label)]
+
+
+def _children(container: Any) -> Dict[str, Any]:
+    # A machine that is being built in another thread may grow while we look.
+    for _ in range(10):
+        try:
+            return dict(container.get_children())
+        except RuntimeError:
+            continue
+    return {}
+
+
+class ContainerTree(object):
+    """All containers below a root, found again at each ``refresh``: machines grow, and get wrapped.
+
+    Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at runs at its speed.
+    """
+
+    def __init__(self, report: Report, is_heard: Callable[[], bool] = lambda: True) -> None:
+        self._report = report
+        self._is_heard = is_heard
+        self._roots: List[Tuple[str, Any]] = []
+        self._known: Dict[int, ContainerWatch] = {}
+        self._lock = threading.RLock()
+        self.by_path: Dict[str, ContainerWatch] = {}
+
+    def add_root(self, path: str, state: Any) -> None:
+        """Watch ``state`` as ``path``, with all containers in it."""
+        with self._lock:
+            if (path, id(state)) not in [(known, id(root)) for known, root in self._roots]:
+                self._roots.append((path, state))
+        self.refresh()
+
+    def clear(self) -> None:
+        """Forget all roots."""
+        with self._lock:
+            self._roots = []
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Look for containers that came or went."""
+        with self._lock:
+            found: Dict[str, Any] = {}
+            for path, root in self._roots:
+                self._collect(path, root, found, ())
+            for watch in self._known.values():
+                watch.paths = []
+            self.by_path = {path: self._watch(path, container) for path, container in found.items()}
+            for key in [key for key, watch in self._known.items() if not watch.paths]:
+                self._known[key].detach()
+
+    def _collect(self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int, ...]) -> None:
+        if not isinstance(state, smach.Container) or id(state) in above:
+            return
+        found[path] = state
+        for label, child in _children(state).items():
+            self._collect(path.rstrip('/') + '/' + label, child, found, above + (id(state),))
+
+    def _watch(self, path: str, container: Any) -> ContainerWatch:
+        watch = self._known.get(id(container))
+        if watch is None:
+            watch = self._known[id(container)] = ContainerWatch(container, self._report, self._is_heard)
+        watch.attach(self._report)
+        watch.paths = watch.paths + [path]
+        return watch

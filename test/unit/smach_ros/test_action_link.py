@@ -1,0 +1,72 @@
+"""When a link to an action server counts as ready; no master."""
+import time
+
+import pytest
+
+pytest.importorskip('rospy')
+pytest.importorskip('smach_ros')
+from smach_ros import action_link  # noqa: E402
+from smach_ros.action_link import ActionLink  # noqa: E402
+
+
+class FakeTopic:
+    """A topic of the client's with connections to the servers named."""
+
+    def __init__(self, *servers):
+        self.impl = self
+        self.connections = [FakeConnection(server) for server in servers]
+
+    def has_connection(self, server):
+        return any(connection.callerid_pub == server for connection in self.connections)
+
+
+class FakeConnection:
+    def __init__(self, server):
+        self.callerid_pub = server
+
+
+class FakeClient:
+    def __init__(self):
+        self.pub_goal, self.pub_cancel = FakeTopic('/server'), FakeTopic('/server')
+        self.result_sub, self.feedback_sub = FakeTopic('/server'), FakeTopic('/server')
+
+
+class FakeWatch:
+    server_id = '/server'
+
+    def connections(self):
+        return [FakeConnection('/server')]
+
+
+@pytest.fixture
+def link(monkeypatch):
+    monkeypatch.setattr(ActionLink, '_connect', lambda self: None)
+    monkeypatch.setattr(action_link, 'SETTLE_S', 0.2)
+    link = ActionLink('work', None)
+    link.client, link.watch = FakeClient(), FakeWatch()
+    return link
+
+
+def becomes_ready_s(link):
+    begin = time.monotonic()
+    while not link.ready() and time.monotonic() - begin < 5.0:
+        time.sleep(0.005)
+    return time.monotonic() - begin
+
+
+def test_a_new_connection_is_given_time_to_be_known_to_the_server(link):
+    assert 0.2 <= becomes_ready_s(link) < 5.0
+    assert becomes_ready_s(link) < 0.2
+
+
+def test_a_connection_made_anew_is_given_that_time_again(link):
+    becomes_ready_s(link)
+    link.client.result_sub = FakeTopic('/server')
+    assert 0.2 <= becomes_ready_s(link) < 5.0
+
+
+@pytest.mark.parametrize('topic', ['pub_goal', 'pub_cancel', 'result_sub', 'feedback_sub'])
+def test_a_topic_without_the_server_is_waited_for(link, topic):
+    setattr(link.client, topic, FakeTopic('/another'))
+    time.sleep(0.3)
+    assert not link.ready() and not link.ready()

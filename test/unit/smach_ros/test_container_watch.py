@@ -1,0 +1,145 @@
+"""Which containers are seen, under which paths, and what is reported of them."""
+import pickle
+
+import pytest
+import smach
+
+pytest.importorskip('rospy')
+pytest.importorskip('smach_ros')
+from smach_ros.container_watch import ContainerTree  # noqa: E402
+from smach_ros.user_callback import UserCallback, checked_slots  # noqa: E402
+
+
+class Step(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['next'])
+
+    def execute(self, ud):
+        return 'next'
+
+
+def chain(*labels):
+    machine = smach.StateMachine(outcomes=['next'])
+    with machine:
+        for label, follower in zip(labels, labels[1:] + ('next',)):
+            smach.StateMachine.add(label, Step(), {'next': follower})
+    return machine
+
+
+def holding(label, state):
+    machine = smach.StateMachine(outcomes=['next'])
+    with machine:
+        smach.StateMachine.add(label, state)
+    return machine
+
+
+@pytest.fixture
+def seen():
+    return []
+
+
+@pytest.fixture
+def tree(seen):
+    return ContainerTree(lambda watch, info, states, ud: seen.append((watch.paths[0], info, states)))
+
+
+def test_start_transitions_and_end_are_reported_in_order(tree, seen):
+    machine = chain('A', 'B')
+    tree.add_root('/R', machine)
+    machine.execute()
+    assert seen == [('/R', 'START', ['A']), ('/R', 'TRANSITION', ['B']), ('/R', 'TERMINATION next', ['None'])]
+
+
+def test_nothing_is_reported_while_nobody_listens(seen):
+    listeners = []
+    tree = ContainerTree(lambda watch, info, states, ud: seen.append(info), lambda: bool(listeners))
+    machine = chain('A')
+    tree.add_root('/R', machine)
+    machine.execute()
+    assert seen == []
+    listeners.append(1)
+    machine.execute()
+    assert seen == ['START', 'TERMINATION next']
+
+
+def test_containers_of_every_kind_are_found_at_any_depth(tree):
+    iterator = smach.Iterator(outcomes=['next'], input_keys=[], output_keys=[], it=[1], exhausted_outcome='next')
+    with iterator:
+        smach.Iterator.set_contained_state('BODY', chain('X'), loop_outcomes=['next'])
+    concurrence = smach.Concurrence(outcomes=['next'], default_outcome='next')
+    with concurrence:
+        smach.Concurrence.add('LEFT', iterator)
+        smach.Concurrence.add('RIGHT', Step())
+    tree.add_root('/R', holding('SIDE', concurrence))
+    assert sorted(tree.by_path) == ['/R', '/R/SIDE', '/R/SIDE/LEFT', '/R/SIDE/LEFT/BODY']
+
+
+def test_one_container_under_two_labels_has_two_paths_and_reports_once(tree, seen):
+    inner, machine = chain('X'), smach.StateMachine(outcomes=['next'])
+    with machine:
+        smach.StateMachine.add('ONE', inner, {'next': 'TWO'})
+        smach.StateMachine.add('TWO', inner)
+    tree.add_root('/', machine)
+    assert tree.by_path['/ONE'].paths == ['/ONE', '/TWO']
+    inner.execute()
+    assert len(seen) == 2
+
+
+def test_what_is_added_later_is_found_and_what_is_cleared_falls_silent(tree, seen):
+    machine = chain('A')
+    tree.add_root('/R', machine)
+    with machine:
+        smach.StateMachine.add('LATE', chain('X'), {'next': 'next'})
+    tree.refresh()
+    assert '/R/LATE' in tree.by_path
+    tree.clear()
+    machine.execute()
+    assert (tree.by_path, seen) == ({}, [])
+    tree.add_root('/AGAIN', machine)
+    machine.execute()
+    assert [path for path, _, _ in seen] == ['/AGAIN', '/AGAIN']
+
+
+def test_watched_machine_can_be_pickled_and_its_copy_reports_nothing(tree, seen):
+    machine = chain('A')
+    tree.add_root('/R', machine)
+    assert pickle.loads(pickle.dumps(machine)).execute() == 'next'
+    assert seen == []
+
+
+def test_jump_is_taken_once_and_forgotten_at_the_end(tree, seen):
+    machine = chain('A', 'B', 'C')
+    tree.add_root('/R', machine)
+    tree.by_path['/R'].jump_to = 'C'
+    machine.execute()
+    assert [states for _, _, states in seen] == [['A'], ['C'], ['None']]
+    del seen[:]
+    machine.execute()
+    assert [states for _, _, states in seen] == [['A'], ['B'], ['C'], ['None']]
+
+
+def test_callback_sees_the_states_keys_or_its_own():
+    data = smach.UserData()
+    data.a, data.b = 1, 2
+    plain = UserCallback('cb', lambda ud, value, more: ud.a + value + more, [10], None, ['a'], [])
+    assert plain(data, 100) == 111
+    own = UserCallback('cb', smach.cb_interface(input_keys=['b'])(lambda ud: ud.b), [], None, ['a'], [])
+    assert own(data) == 2
+    with pytest.raises(smach.InvalidUserCodeError):
+        UserCallback('cb', lambda ud: ud.b, [], None, ['a'], [])(data)
+
+
+@pytest.mark.parametrize('decides, outcomes', [(True, ('far',)), (False, ())])
+def test_a_callback_brings_its_keys_and_its_outcomes_only_where_it_decides_the_end(decides, outcomes):
+    state = smach.State()
+    cb = smach.cb_interface(outcomes=['far'], input_keys=['i'], output_keys=['o'])(lambda ud: 'far')
+    UserCallback('cb', cb, [], None, [], []).register_with(state, decides=decides)
+    assert (state.get_registered_outcomes(), state.get_registered_input_keys(),
+            state.get_registered_output_keys()) == (outcomes, ('i',), ('o',))
+
+
+def test_unknown_slot_is_named_with_those_there_are():
+    from std_msgs.msg import Header
+    assert checked_slots('goal_slots', ['stamp'], Header()) == ('stamp',)
+    with pytest.raises(smach.InvalidStateError, match=r"goal_slots \['time'\].*std_msgs/Header.*stamp"):
+        checked_slots('goal_slots', ['stamp', 'time'], Header())
