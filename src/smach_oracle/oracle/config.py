@@ -1,0 +1,186 @@
+"""The settings of the executive, validated. Pure; no smach.
+
+`Settings.from_dict` reads nested plain dictionaries, as YAML and rosparam give them. Every error is a ConfigError that
+names the dotted key, the value and what is allowed.
+"""
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+
+from . import config_values as values
+from .errors import ConfigError
+from .failure_rate import ESTIMATORS
+from .naming import DEFAULT_FAILING_OUTCOMES
+from .policy import POLICIES
+from .precondition_spec import PreconditionSpec, Resolver, parse_preconditions
+from .question import InterfaceOffer
+
+_MAX_HISTORY = 1000000  # visits; each question carries them all
+_RATE = values.number(0, 1, 'a failure rate from 0 to 1')
+
+
+@dataclass(frozen=True)
+class StateSettings:
+    """Settings of one state: the machine's defaults, unless set for the state."""
+
+    memory: int = 10  # results
+    prior: float = 0.1  # failure rate, 0 to 1
+    moderate_from: float = 0.4  # failure rate from which a state is MODERATE
+    high_from: float = 0.75  # and HIGH
+    estimator: str = 'window'
+    max_recoveries: int = 5  # per trial; beyond it the oracle asks
+    failure_outcomes: Tuple[str, ...] = ()  # outcomes that are failures whatever they lead to
+    author_recoveries: str = 'keep'
+    time_limit_s: Optional[float] = None  # of each execution; None: no limit
+    grace_period_s: float = 2.0  # between the preempt after an overrun and abandonment
+    preconditions: Tuple[PreconditionSpec, ...] = ()
+
+
+_STATE_CHECKS: Dict[str, values.Check] = {
+    'memory': values.whole(1, 'a whole number of results from 1'),
+    'prior': _RATE,
+    'moderate_from': _RATE,
+    'high_from': _RATE,
+    'estimator': values.choice(sorted(ESTIMATORS)),
+    'max_recoveries': values.whole(0, 'a whole number from 0'),
+    'failure_outcomes': values.words,
+    'author_recoveries': values.choice(('keep', 'override')),
+    'time_limit_s': values.time_limit,
+    'grace_period_s': values.number(0, math.inf, 'seconds from 0'),
+}
+_MACHINE_CHECKS: Dict[str, values.Check] = {
+    'policy': values.choice(sorted(POLICIES)),
+    'failing_outcomes': values.words,
+    'userdata': values.choice(('restore', 'keep')),
+    'deep_copy_keys': values.words,
+    'deadline_s': values.deadline,
+    'on_no_answer': values.on_no_answer,
+    'escalate': values.flag,
+    'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY),
+    'rates_file': values.text,
+    'oracle_label': values.label,
+    'nested': values.flag,
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a wrapped machine; `states` holds what is set for single states, by LABEL or PATH/LABEL."""
+
+    defaults: StateSettings = StateSettings()
+    policy: str = 'prose'
+    failing_outcomes: Tuple[str, ...] = DEFAULT_FAILING_OUTCOMES
+    userdata: str = 'restore'
+    deep_copy_keys: Tuple[str, ...] = ()
+    deadline_s: float = 300.0  # 0: waits without end
+    on_no_answer: Tuple[str, str] = ('stop', '')
+    escalate: bool = True
+    history_length: int = 50  # visits
+    rates_file: str = ''
+    oracle_label: str = 'ORACLE'
+    nested: bool = True
+    interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()  # offer, states it serves ((): all)
+    states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, given: Optional[Mapping[str, Any]], resolver: Optional[Resolver] = None) -> 'Settings':
+        """Check a dictionary of settings.
+
+        `resolver` turns 'python:module:attribute' of a precondition into that object. Raises ConfigError.
+        """
+        given = values.mapping('settings', given)
+        allowed = sorted(list(_STATE_CHECKS) + list(_MACHINE_CHECKS) + ['states', 'interfaces'])
+        _refuse_unknown('', given, allowed)
+        defaults = _checked_defaults(given)
+        machine = {key: check(key, given[key]) for key, check in _MACHINE_CHECKS.items() if key in given}
+        states = {name: _checked_state(name, overrides, defaults, resolver)
+                  for name, overrides in values.mapping('states', given.get('states')).items()}
+        return cls(defaults=defaults, interfaces=_checked_interfaces(given.get('interfaces')), states=states, **machine)
+
+    def for_state(self, path: str, label: str) -> StateSettings:
+        """Return the settings of state `label` in the container at `path` (relative to the top machine, '' itself)."""
+        merged: Dict[str, Any] = dict(self.states.get(label, {}))
+        if path:
+            merged.update(self.states.get('{}/{}'.format(path, label), {}))
+        return replace(self.defaults, **merged) if merged else self.defaults
+
+    def with_states(self, states: Mapping[str, Mapping[str, Any]],
+                    resolver: Optional[Resolver] = None) -> 'Settings':
+        """Return these settings with further settings of single states, which win. Raises ConfigError."""
+        merged = {name: dict(overrides) for name, overrides in self.states.items()}
+        for name, overrides in states.items():
+            merged.setdefault(name, {}).update(_checked_state(name, overrides, self.defaults, resolver))
+        return replace(self, states=merged)
+
+    def offers_for(self, path: str, label: str) -> Tuple[InterfaceOffer, ...]:
+        """Return the shared-autonomy interfaces on offer for a state."""
+        names = (label, '{}/{}'.format(path, label) if path else label)
+        return tuple(offer for offer, states in self.interfaces
+                     if not states or any(name in states for name in names))
+
+
+def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
+    for key in given:
+        if key not in allowed:
+            raise ConfigError(prefix + key, given[key], 'one of the keys ' + ', '.join(allowed))
+
+
+def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:
+    defaults = StateSettings(**{key: check(key, given[key]) for key, check in _STATE_CHECKS.items() if key in given})
+    _check_thresholds('', defaults, given)
+    return defaults
+
+
+def _checked_state(name: str, overrides: Any, defaults: StateSettings,
+                   resolver: Optional[Resolver]) -> Dict[str, Any]:
+    prefix = 'states.{}.'.format(name)
+    overrides = values.mapping(prefix[:-1], overrides)
+    _refuse_unknown(prefix, overrides, sorted(list(_STATE_CHECKS) + ['preconditions']))
+    checked = {key: check(prefix + key, overrides[key]) for key, check in _STATE_CHECKS.items() if key in overrides}
+    if 'preconditions' in overrides:
+        checked['preconditions'] = parse_preconditions(prefix + 'preconditions', overrides['preconditions'], resolver)
+    _check_thresholds(prefix, replace(defaults, **checked), checked)
+    return checked
+
+
+def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, Any]) -> None:
+    """Blame the threshold that was given, not the default of the other."""
+    if settings.moderate_from > settings.high_from:
+        if 'moderate_from' not in given:
+            raise ConfigError(prefix + 'high_from', settings.high_from,
+                              'at least moderate_from, which is {}'.format(settings.moderate_from))
+        raise ConfigError(prefix + 'moderate_from', settings.moderate_from,
+                          'at most high_from, which is {}'.format(settings.high_from))
+
+
+def _checked_interfaces(given: Any) -> Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]:
+    offers = []
+    for name, fields_given in values.mapping('interfaces', given).items():
+        prefix = 'interfaces.{}.'.format(name)
+        fields_given = values.mapping(prefix[:-1], fields_given)
+        _refuse_unknown(prefix, fields_given, ['action', 'description', 'states'])
+        if 'action' not in fields_given:
+            raise ConfigError(prefix + 'action', None, 'the name of a SharedAutonomy action')
+        offer = InterfaceOffer(name, values.label(prefix + 'action', fields_given['action']),
+                               values.text(prefix + 'description', fields_given.get('description', '')))
+        offers.append((offer, values.words(prefix + 'states', fields_given.get('states', ()))))
+    return tuple(offers)
+
+
+def setting_names() -> Tuple[str, ...]:
+    """Return every key that `Settings.from_dict` knows at its top level."""
+    return tuple(sorted([entry.name for entry in fields(Settings) if entry.name != 'defaults'] + list(_STATE_CHECKS)))
+
+
+SettingsLike = Union[Settings, Mapping[str, Any], None]
+PreconditionLists = Optional[Mapping[str, List[Any]]]
+
+
+def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Settings:
+    """Return checked settings, with preconditions added. Raises ConfigError."""
+    checked = settings if isinstance(settings, Settings) else Settings.from_dict(settings)
+    if preconditions is None:
+        return checked
+    if not isinstance(preconditions, Mapping):
+        raise ConfigError('preconditions', preconditions, 'a mapping of state labels to lists')
+    return checked.with_states({label: {'preconditions': given} for label, given in preconditions.items()})

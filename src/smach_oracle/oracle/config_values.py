@@ -1,0 +1,122 @@
+"""Checks of single settings: each takes the dotted key and the value, returns the value or raises ConfigError. Pure."""
+import math
+from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
+
+from .errors import ConfigError
+
+Check = Callable[[str, Any], Any]
+
+
+def is_state(value: object) -> bool:
+    """Whether `value` is a state in smach's sense, told without importing smach."""
+    return callable(getattr(value, 'execute', None)) and callable(getattr(value, 'get_registered_outcomes', None))
+
+
+def number(low: float, high: float, allowed: str) -> Check:
+    """Check for a number from `low` to `high`."""
+    def check(key: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+            raise ConfigError(key, value, allowed)
+        try:
+            taken = float(value)
+        except OverflowError:  # a whole number of hundreds of digits
+            taken = math.inf
+        if not math.isfinite(taken):
+            raise ConfigError(key, value, allowed)
+        return taken
+    return check
+
+
+def whole(low: int, allowed: str, high: float = math.inf) -> Check:
+    """Check for a whole number from `low` to `high`."""
+    def check(key: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ConfigError(key, value, allowed)
+        return value
+    return check
+
+
+def flag(key: str, value: Any) -> bool:
+    """Check for true or false."""
+    if not isinstance(value, bool):
+        raise ConfigError(key, value, 'true or false')
+    return value
+
+
+def choice(options: Sequence[str]) -> Check:
+    """Check for one of some words."""
+    def check(key: str, value: Any) -> str:
+        if not isinstance(value, str) or value not in options:
+            raise ConfigError(key, value, ', '.join(options))
+        return value
+    return check
+
+
+def text(key: str, value: Any) -> str:
+    """Check for a string, empty or not."""
+    if not isinstance(value, str):
+        raise ConfigError(key, value, 'a string')
+    return value
+
+
+def label(key: str, value: Any) -> str:
+    """Check for a string that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ConfigError(key, value, 'a string that is not empty')
+    return value
+
+
+def words(key: str, value: Any) -> Tuple[str, ...]:
+    """Check for a list of strings, none of them empty."""
+    if isinstance(value, str) or not isinstance(value, (list, tuple, set, frozenset)):
+        raise ConfigError(key, value, 'a list of strings')
+    for entry in value:
+        if not isinstance(entry, str) or not entry:
+            raise ConfigError(key, entry, 'a list of strings, none of them empty')
+    return tuple(sorted(value)) if isinstance(value, (set, frozenset)) else tuple(value)
+
+
+def optional(check: Check) -> Check:
+    """Check that admits None (nothing set) beside what `check` admits."""
+    def checked(key: str, value: Any) -> Any:
+        return None if value is None else check(key, value)
+    return checked
+
+
+def mapping(key: str, value: Any) -> Mapping[str, Any]:
+    """Check for a mapping whose keys are strings; None (an empty section of a YAML file) counts as empty."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ConfigError(key, value, 'a mapping')
+    for name in value:
+        if not isinstance(name, str):
+            raise ConfigError(key, name, 'names that are strings')
+    return value
+
+
+def on_no_answer(key: str, value: Any) -> Tuple[str, str]:
+    """Check for a fallback: 'stop', 'goto:LABEL', 'give_up:OUTCOME' or a mapping of one of these words."""
+    if isinstance(value, Mapping) and len(value) == 1:
+        (verb, target), = value.items()
+    elif isinstance(value, str):
+        verb, _, target = value.partition(':')
+    elif isinstance(value, tuple) and len(value) == 2:
+        verb, target = value
+    else:
+        verb, target = None, None
+    named = isinstance(target, str) and bool(target)
+    if (verb == 'stop' and not target) or (verb in ('goto', 'give_up') and named):
+        return str(verb), str(target or '')
+    raise ConfigError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}")
+
+
+def deadline(key: str, value: Any) -> float:
+    """Check for a deadline in seconds; 0 waits without end."""
+    return float(number(0, math.inf, 'seconds from 0; 0 waits without end')(key, value))
+
+
+def time_limit(key: str, value: Any) -> Optional[float]:
+    """Check for a time limit in seconds; 0 and None are no limit."""
+    limit_s = optional(number(0, math.inf, 'seconds from 0; 0 is no limit'))(key, value)
+    return limit_s or None

@@ -1,0 +1,124 @@
+"""What observers (recorder, publisher, checkpoint, viewer) are told, and how.
+
+An observer is a callable that takes one `Event`. It is called in the thread in which the step happened, in the order
+of the sequence numbers, before the machine goes on: an observer that blocks holds the machine back, which is how a
+recorder loses nothing. An observer that raises is logged and does not stop the machine.
+"""
+import threading
+import time
+from enum import IntEnum
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
+
+NAN = float('nan')
+# Text of the TRIAL_END and CONTAINER_END of an execute() that returned None.
+NO_OUTCOME = 'ended without an outcome: inconsistent, or shut down'
+
+
+class EventKind(IntEnum):
+    """Kinds of step; the numbers are those of OracleEvent.msg."""
+
+    TRIAL_START = 1
+    TRIAL_END = 2
+    CONTAINER_START = 3
+    CONTAINER_END = 4
+    STATE_START = 5
+    TRANSITION = 6
+    FAILURE = 7
+    PRECONDITION_START = 8
+    PRECONDITION_END = 9
+    DECISION = 10
+    JUMP = 11
+    QUERY_OPENED = 12
+    QUERY_CLAIMED = 13
+    QUERY_RELEASED = 14
+    QUERY_ANSWERED = 15
+    QUERY_EXPIRED = 16
+    QUERY_CANCELLED = 17
+    INTERFACE_START = 18
+    INTERFACE_END = 19
+    SUPERSEDE = 20
+    GIVE_UP = 21
+    PREEMPT = 22
+    WARNING = 23
+
+
+class FailureKind(IntEnum):
+    """How a state failed; the numbers are those of OracleEvent.msg."""
+
+    NOT_A_FAILURE = 0
+    FAILING_OUTCOME = 1
+    FELL_THROUGH = 2
+    EXCEPTION = 3
+    UNREGISTERED_OUTCOME = 4
+    TIME_LIMIT = 5
+
+
+class Event(NamedTuple):
+    """One step of a trial; the fields are those of OracleEvent.msg."""
+
+    kind: EventKind
+    trial_id: str
+    seq: int
+    wall_time: float  # s since the epoch
+    path: str
+    state: str = ''
+    outcome: str = ''
+    target: str = ''
+    failure_kind: int = 0
+    failure_class: int = 0
+    rate: float = NAN
+    continuous: bool = False
+    query_id: str = ''
+    by: str = ''
+    text: str = ''
+    data: Optional[Mapping[str, Any]] = None  # plain data
+
+
+Observer = Callable[[Event], None]
+
+
+class EventSource:
+    """Numbers the events of one trial after another and hands them to the observers.
+
+    One source serves all containers of a wrapped tree. Emitting is serialised by a lock, so that the order in which
+    observers see events is that of their numbers, also from the children of a Concurrence.
+    """
+
+    def __init__(self, log_error: Callable[[str], None]) -> None:
+        self._log_error = log_error
+        self._lock = threading.RLock()
+        self._seq = 0
+        self.observers: List[Observer] = []
+        self.trial_id = ''
+
+    def begin_trial(self, trial_id: str) -> None:
+        """Number from 0 again under a new trial id."""
+        with self._lock:
+            self.trial_id = trial_id
+            self._seq = 0
+
+    def emit(self, kind: EventKind, path: str, **fields: Any) -> None:
+        """Tell every observer; costs nothing to speak of where there is none."""
+        if not self.observers:
+            return
+        with self._lock:
+            event = Event(kind, self.trial_id, self._seq, time.time(), path, **fields)
+            self._seq += 1
+            for observer in tuple(self.observers):
+                self._tell(observer, event)
+
+    def _tell(self, observer: Observer, event: Event) -> None:
+        try:
+            observer(event)
+        except Exception as err:  # an observer's fault must not stop the robot
+            self._log_error('Observer {!r} failed on event {} ({}): {!r}'.format(
+                observer, event.seq, event.kind.name, err))
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Without the lock and the observers: neither can travel with a pickled machine."""
+        return {'trial_id': self.trial_id, '_seq': self._seq, '_log_error': self._log_error}
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.RLock()
+        self.observers = []

@@ -1,0 +1,129 @@
+"""What the end of a state means: where it leads, whether it is a failure, and how it would have ended the container."""
+import traceback
+from typing import Any, Callable, NamedTuple, Optional, Tuple
+
+import smach
+
+from .events import FailureKind
+from .naming import FailingNames, is_preempted
+from .question import VisitResult, names
+
+
+class Route(NamedTuple):
+    """Where an outcome leads, as the machine's author drew it."""
+
+    target: str  # a state, a container outcome, or '' where it leads nowhere
+    is_state: bool
+
+
+class Failure(NamedTuple):
+    """One failure of a state."""
+
+    state: str
+    kind: FailureKind
+    outcome: str  # '' where there is none
+    text: str  # exception text, reasons
+    route: Optional[Route]  # where the outcome would have led; None where it raises
+    error: Optional[Callable[[], Exception]] = None  # makes what the machine raises if the oracle gives up
+    details: str = ''  # the traceback
+
+
+class Ending(NamedTuple):
+    """How a container would end, or go on, without an oracle: exactly one is set."""
+
+    state: Optional[str] = None
+    outcome: Optional[str] = None
+    error: Optional[Exception] = None
+
+
+def route_of(machine: Any, label: str, outcome: str) -> Route:
+    """Follow an outcome of a state: to a state, to a container outcome by its target's or its own name, or nowhere."""
+    transitions = machine._transitions.get(label) or {}
+    if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
+        return Route('', False)
+    target = transitions[outcome]
+    if target is not None and target in machine._states:
+        return Route(target, True)
+    container_outcomes = machine.get_registered_outcomes()
+    for name in (target, outcome):
+        if name is not None and name in container_outcomes:
+            return Route(name, False)
+    return Route('', False)
+
+
+def failure_kind(outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames) -> FailureKind:
+    """Classify a registered outcome, without regard to who recovers from it."""
+    if outcome in listed:
+        return FailureKind.FAILING_OUTCOME
+    if route.is_state:
+        return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
+    if not route.target:
+        return FailureKind.UNREGISTERED_OUTCOME
+    if route.target in failing:
+        return FailureKind.FELL_THROUGH
+    return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
+
+
+def author_recovers(outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...],
+                    author_recoveries: str) -> bool:
+    """Whether the author's own transition from this failing outcome stays.
+
+    It does where it leads to another state, or, for an outcome that only sounds like a failure, to a container outcome
+    that does not.
+    """
+    if author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
+        return False
+    return route.is_state or outcome not in listed
+
+
+def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult:
+    """How a visit counts that ended with `outcome`; `stopping`: a preempt or a shutdown is under way."""
+    if stopping or (is_preempted(outcome) and kind is FailureKind.NOT_A_FAILURE):
+        return VisitResult.PREEMPTED
+    return VisitResult.SUCCESS if kind is FailureKind.NOT_A_FAILURE else VisitResult.FAILURE
+
+
+def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...], failing: FailingNames) -> Ending:
+    """Return how the failure would have ended the container without an oracle.
+
+    An overrun has no such ending, since the state would still run: the container's own failing outcome, else an error.
+    """
+    if failure.route is not None and failure.route.target:
+        route = failure.route
+        return Ending(state=route.target) if route.is_state else Ending(outcome=route.target)
+    if failure.error is not None:
+        return Ending(error=failure.error())
+    for word in failing.words:
+        if word in container_outcomes:
+            return Ending(outcome=word)
+    for outcome in sorted(container_outcomes, key=str):
+        if outcome in failing:
+            return Ending(outcome=outcome)
+    return Ending(error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
+
+
+def raised_error(label: str, state: Any, err: Exception) -> Exception:
+    """Return the error with which a machine passes on what a state raised, its traceback in the text."""
+    if isinstance(err, smach.InvalidUserCodeError):
+        return err
+    wrapped: Exception = smach.InvalidUserCodeError('Could not execute state {!r} of type {!r}: {}'.format(
+        label, state, traceback_of(err)))
+    wrapped.__cause__ = err
+    return wrapped
+
+
+def traceback_of(err: Exception) -> str:
+    """Return the traceback as Python prints it."""
+    return ''.join(traceback.format_exception(type(err), err, err.__traceback__))
+
+
+def unregistered_text(label: str, state: Any, outcome: Any) -> str:
+    """Say that the state has not registered the outcome."""
+    return 'State {!r} of type {!r} returned {!r}; its registered outcomes are {}'.format(
+        label, state, outcome, names(state.get_registered_outcomes()))
+
+
+def unbound_text(label: str, outcome: str, container_outcomes: Tuple[str, ...]) -> str:
+    """Say that the outcome leads nowhere."""
+    return ('Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
+            'the container has {}'.format(outcome, label, names(container_outcomes)))

@@ -1,0 +1,189 @@
+"""How often a state fails, learned with a limited memory (paper, section IV-A and IV-C). Pure; no smach.
+
+The estimate starts as the designer's prior; every result pushes one share of the prior out, and once the memory is full
+only the latest results count. Two estimators share one face: a window and an exponentially weighted mean.
+"""
+from collections import deque
+from enum import IntEnum
+from typing import Any, Callable, Deque, Dict, Mapping, Tuple, Union
+
+from .errors import ConfigError
+
+_ROUNDING = 1e-9  # a rate that equals a threshold but for binary rounding has reached it
+
+
+class FailureClass(IntEnum):
+    """Class of a state by its failure rate; the numbers are those of OracleEvent.msg."""
+
+    NO_CLASS = 0
+    LOW = 1
+    MODERATE = 2
+    HIGH = 3
+
+
+def classify(rate: float, moderate_from: float, high_from: float) -> FailureClass:
+    """Return the class of a failure rate (0 to 1): LOW below `moderate_from`, HIGH from `high_from` on."""
+    if rate + _ROUNDING >= high_from:
+        return FailureClass.HIGH
+    if rate + _ROUNDING >= moderate_from:
+        return FailureClass.MODERATE
+    return FailureClass.LOW
+
+
+def _checked(memory: int, prior: float) -> None:
+    if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
+        raise ConfigError('memory', memory, 'a whole number of results from 1')
+    if isinstance(prior, bool) or not isinstance(prior, (int, float)) or not 0 <= prior <= 1:
+        raise ConfigError('prior', prior, 'a failure rate from 0 to 1')
+
+
+class FailureRate:
+    """Window of the last `memory` results, filled with `prior` to start with.
+
+    rate = (failures in the window + prior * (memory - n)) / memory, with n results seen and n < memory.
+    `successes` and `failures` count all results ever added.
+    """
+
+    kind = 'window'
+
+    def __init__(self, memory: int, prior: float) -> None:
+        """`memory`: results; `prior`: failure rate, 0 to 1. Raises ConfigError."""
+        _checked(memory, prior)
+        self.memory = memory
+        self.prior = float(prior)
+        self.successes = 0
+        self.failures = 0
+        self._results = 0  # results seen, not the totals where these were taken over from elsewhere
+        self._failed: Deque[int] = deque()  # which of them were failures, of the last memory + 1
+
+    def add(self, failed: bool) -> None:
+        """Learn one result; O(1)."""
+        if failed:
+            self._forget(self._results - self.memory)
+            self._failed.append(self._results)
+            self._results += 1
+            self.failures += 1
+        else:
+            self.add_successes(1)
+
+    def add_successes(self, count: int) -> None:
+        """Learn `count` successes in a row; O(1), as each failure is forgotten once."""
+        self._results += count
+        self.successes += count
+        self._forget(self._results - self.memory - 1)
+
+    def take_back_failure(self) -> None:
+        """Unlearn the latest result, which must have been a failure; O(1)."""
+        self._failed.pop()
+        self._results -= 1
+        self.failures -= 1
+
+    def _forget(self, before: int) -> None:
+        """Drop what is too old to count, but for one more result than `memory`, so that one can be taken back."""
+        while self._failed and self._failed[0] < before:
+            self._failed.popleft()
+
+    @property
+    def rate(self) -> float:
+        """Failure rate, 0 to 1."""
+        failures = len(self._failed)
+        if failures and self._failed[0] < self._results - self.memory:
+            failures -= 1
+        missing = max(0, self.memory - self._results)
+        return (failures + self.prior * missing) / self.memory
+
+    def snapshot(self) -> Dict[str, Any]:
+        """Return what was learned as plain data, for `restore` and the rates file; newest result last."""
+        oldest = max(0, self._results - self.memory)
+        window = [0] * (self._results - oldest)
+        for position in self._failed:
+            if position >= oldest:
+                window[position - oldest] = 1
+        return {'estimator': self.kind, 'successes': self.successes, 'failures': self.failures, 'window': window}
+
+    def restore(self, learned: Mapping[str, Any]) -> None:
+        """Take over a `snapshot`, also one made with another memory: its newest results count.
+
+        Raises ValueError where it is no snapshot. One of the other estimator gives the totals alone.
+        """
+        successes, failures = _totals(learned)
+        window = learned.get('window', []) if learned.get('estimator') == self.kind else []
+        if not isinstance(window, list) or any(result not in (0, 1) for result in window):
+            raise ValueError('window: {!r} is not a list of 0 and 1'.format(window))
+        window = window[-self.memory:]
+        self.successes, self.failures = successes, failures
+        self._results = len(window)
+        self._failed = deque(position for position, failed in enumerate(window) if failed)
+
+
+class ExponentialFailureRate:
+    """Exponentially weighted mean: each result replaces a share 1/memory of what was believed, first of the prior.
+
+    It agrees with `FailureRate` on the first result and forgets gradually instead of all at once.
+    """
+
+    kind = 'exponential'
+
+    def __init__(self, memory: int, prior: float) -> None:
+        """`memory`: results; `prior`: failure rate, 0 to 1. Raises ConfigError."""
+        _checked(memory, prior)
+        self.memory = memory
+        self.prior = float(prior)
+        self.successes = 0
+        self.failures = 0
+        self._rate = self._before = self.prior
+
+    def add(self, failed: bool) -> None:
+        """Learn one result; O(1)."""
+        self._before = self._rate
+        self._rate += (float(failed) - self._rate) / self.memory
+        if failed:
+            self.failures += 1
+        else:
+            self.successes += 1
+
+    def add_successes(self, count: int) -> None:
+        """Learn `count` successes in a row; O(1)."""
+        self._rate *= (1.0 - 1.0 / self.memory) ** count
+        self.successes += count
+
+    def take_back_failure(self) -> None:
+        """Unlearn the latest result, which must have been a failure."""
+        self._rate = self._before
+        self.failures -= 1
+
+    @property
+    def rate(self) -> float:
+        """Failure rate, 0 to 1."""
+        return self._rate
+
+    def snapshot(self) -> Dict[str, Any]:
+        """Return what was learned as plain data, for `restore` and the rates file."""
+        return {'estimator': self.kind, 'successes': self.successes, 'failures': self.failures, 'rate': self._rate}
+
+    def restore(self, learned: Mapping[str, Any]) -> None:
+        """Take over a `snapshot`. Raises ValueError where it is none; the other estimator's gives the totals alone."""
+        successes, failures = _totals(learned)
+        rate = learned.get('rate', self.prior) if learned.get('estimator') == self.kind else self.prior
+        if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not 0 <= rate <= 1:
+            raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
+        self.successes, self.failures, self._rate = successes, failures, float(rate)
+
+
+def _totals(learned: Mapping[str, Any]) -> Tuple[int, int]:
+    totals = (learned.get('successes', 0), learned.get('failures', 0))
+    if any(isinstance(total, bool) or not isinstance(total, int) or total < 0 for total in totals):
+        raise ValueError('successes, failures: {!r} are not counts'.format(totals))
+    return totals
+
+
+Estimator = Union[FailureRate, ExponentialFailureRate]
+ESTIMATORS: Dict[str, Callable[[int, float], Estimator]] = {
+    FailureRate.kind: FailureRate, ExponentialFailureRate.kind: ExponentialFailureRate}
+
+
+def make_estimator(kind: str, memory: int, prior: float) -> Estimator:
+    """Return a new estimator named 'window' or 'exponential'. Raises ConfigError."""
+    if kind not in ESTIMATORS:
+        raise ConfigError('estimator', kind, ', '.join(sorted(ESTIMATORS)))
+    return ESTIMATORS[kind](memory, prior)

@@ -1,0 +1,61 @@
+"""The meta state (paper, section IV-A): every state has an edge to it, and it has one to every state and outcome."""
+import threading
+from typing import Any, Dict, Optional, Tuple
+
+import smach
+
+from .errors import TrialError
+from .recovery import Recovery
+from .verdict import Verdict
+
+
+class OracleState(smach.State):
+    """The ORACLE state of one container. Its outcomes are the labels of all states and all container outcomes."""
+
+    def __init__(self) -> None:
+        smach.State.__init__(self, outcomes=[])
+        self._lock = threading.Lock()
+        self._recovery: Optional[Recovery] = None
+        self.verdict: Optional[Verdict] = None
+
+    def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
+        """Have these outcomes and no others; return the transitions, each to what it is named for."""
+        self._outcomes = set(labels)
+        return {label: label for label in labels}
+
+    def begin(self, recovery: Recovery) -> None:
+        """Be ready to recover from a failure; from now on a preempt request reaches the recovery."""
+        with self._lock:
+            self._preempt_requested = False
+            self._recovery = recovery
+            self.verdict = None
+
+    def execute(self, ud: Any) -> str:
+        """Recover from the failure handed to `begin`; return where to go ('' where the machine raises)."""
+        recovery = self._recovery
+        if recovery is None:
+            raise TrialError('the meta state is entered by failures alone')
+        try:
+            self.verdict = recovery.run()
+            return self.verdict.leads_to()
+        finally:
+            with self._lock:
+                self._recovery = None
+
+    def request_preempt(self) -> None:
+        """End the recovery: a precondition that runs is preempted, an open question taken back."""
+        smach.State.request_preempt(self)
+        with self._lock:
+            recovery = self._recovery
+        if recovery is not None:
+            recovery.cancel()
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Without the lock and a recovery under way: neither travels with a pickled machine."""
+        state = dict(self.__dict__)
+        state.update(_lock=None, _recovery=None, verdict=None)
+        return state
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.Lock()

@@ -1,0 +1,126 @@
+"""What the oracle asks an expert and what may come back (paper, section V). Plain data: no ROS, no smach."""
+import threading
+from enum import IntEnum
+from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
+
+from .events import FailureKind
+
+
+class AnswerKind(IntEnum):
+    """What an expert may decide; the numbers are those of ExpertDecision.msg."""
+
+    GOTO = 1
+    SUPERSEDE = 2
+    GIVE_UP = 3
+    INTERFACE = 4
+
+
+class VisitResult(IntEnum):
+    """How a visit counts; the numbers are those of VisitedState.msg."""
+
+    SUCCESS = 1
+    FAILURE = 2
+    SUPERSEDED = 3
+    PREEMPTED = 4
+
+
+class Visit(NamedTuple):
+    """One visit of a state that has ended."""
+
+    state: str
+    outcome: str  # '' where it raised or ran over its time limit
+    result: VisitResult
+
+
+class StateChoice(NamedTuple):
+    """A state that the expert may send the machine to."""
+
+    state: str
+    predicted_success: float  # 1 - learned failure rate
+    failure_class: int
+    visits: int  # in this trial
+    missing_keys: Tuple[str, ...]  # input keys that would be missing after the jump
+    preconditions: Tuple[str, ...]  # names, in the order in which they run
+    blocked: str = ''  # why it cannot be entered now, '' where it can
+
+
+class OutcomeChoice(NamedTuple):
+    """An outcome with which the failed state may be superseded, and where it leads."""
+
+    outcome: str
+    target: str
+
+
+class InterfaceOffer(NamedTuple):
+    """A shared-autonomy interface on offer for the failed state (paper, section V-A)."""
+
+    name: str
+    action: str
+    description: str = ''
+
+
+class Question(NamedTuple):
+    """Everything an expert is told; the fields are those of the ExpertQuery goal."""
+
+    query_id: str
+    trial_id: str
+    container_path: str
+    failed_state: str
+    failure_kind: FailureKind
+    outcome: str
+    text: str
+    failure_class: int
+    rate: float
+    continuous: bool
+    recoveries: int
+    reason: str
+    tried: Tuple[str, ...]
+    history: Tuple[Visit, ...]  # oldest first, bounded
+    choices: Tuple[StateChoice, ...]
+    supersede_outcomes: Tuple[OutcomeChoice, ...]
+    output_keys: Tuple[str, ...]  # of the failed state, its own names
+    give_up_outcomes: Tuple[str, ...]
+    interfaces: Tuple[InterfaceOffer, ...]
+    userdata: Mapping[str, Any]  # the container's, values as they are
+    input_userdata: Mapping[str, Any]  # the failed state's inputs, by its own key names, where present
+    deadline_s: float  # 0: waits without end
+    fallback: str  # what happens at the deadline, in words
+
+
+class Answer(NamedTuple):
+    """What an expert decided."""
+
+    kind: AnswerKind
+    state: str = ''  # GOTO
+    outcome: str = ''  # SUPERSEDE, GIVE_UP ('' there: as the failure would have ended the container)
+    interface: str = ''  # INTERFACE
+    outputs: Optional[Mapping[str, Any]] = None  # by the failed state's own key names
+    by: str = ''
+    why: str = ''
+
+
+# Told while a question is open: ('claimed', by, text), ('released', by, text), ('interface_start', interface, text),
+# ('interface_end', interface, outcome).
+Progress = Callable[[str, str, str], None]
+
+
+class Expert:
+    """Where questions go. ros/ implements it with the ExpertQuery action; tests implement it in a few lines."""
+
+    def ask(self, question: Question, cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
+        """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
+
+        Must return soon (tens of milliseconds) after `cancelled` is set. An INTERFACE answer is handed back as it is;
+        `run_interface` is then called. Deadlines are monotonic wall time.
+        """
+        raise NotImplementedError
+
+    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
+                      progress: Progress) -> Optional[Answer]:
+        """Run a shared-autonomy interface; return a SUPERSEDE answer, or None where it failed or was cancelled."""
+        return None
+
+
+def names(items: Iterable[object]) -> str:
+    """A list for an error text; outcomes and labels need not be strings."""
+    return ', '.join(sorted(map(str, items))) or '(none)'

@@ -1,0 +1,104 @@
+"""Learned rates kept across runs in a JSON file, written so that a crash at any moment leaves the old file or the new.
+
+Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STATE: estimator snapshot}}}, with PATH
+relative to the top machine ('' itself), so that renaming the machine loses nothing.
+"""
+import json
+import os
+import tempfile
+from typing import Any, Dict, Iterable
+
+import smach
+
+FORMAT = 'smach_oracle rates'
+VERSION = 1
+DAMAGED = '.damaged'
+
+
+def write_rates(path: str, ledgers: Iterable[Any]) -> None:
+    """Write what was learned to `path`, atomically and durably. Raises OSError; the old file is then untouched."""
+    containers = {ledger.relative_path: ledger.learned_rates() for ledger in ledgers}
+    text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1, sort_keys=True)
+    folder = os.path.dirname(os.path.abspath(path))
+    descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp', dir=folder)
+    try:
+        with os.fdopen(descriptor, 'w', encoding='utf-8') as stream:
+            stream.write(text + '\n')
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        _remove(temporary)
+        raise
+    _sync_folder(folder)
+
+
+def _remove(path: str) -> None:
+    try:
+        os.remove(path)
+    except OSError:
+        pass
+
+
+def _sync_folder(folder: str) -> None:
+    """Make the renaming durable, where the file system lets folders be synced."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError:
+        pass
+    finally:
+        os.close(descriptor)
+
+
+def read_rates(path: str, ledgers: Iterable[Any]) -> None:
+    """Take over the rates in `path`.
+
+    A file that is not there is no matter; one that cannot be read is warned of; a damaged one is set aside as
+    PATH.damaged and warned of, and the states start from their priors.
+    """
+    try:
+        with open(path, encoding='utf-8') as stream:
+            containers = _checked(json.load(stream))
+    except FileNotFoundError:
+        return
+    except OSError as err:
+        smach.logwarn('Rates file {} cannot be read, starting from the priors: {}'.format(path, err))
+        return
+    except (ValueError, RecursionError) as err:
+        smach.logwarn('Rates file {} is damaged ({}), {}; starting from the priors'.format(
+            path, err, _set_aside(path)))
+        return
+    for ledger in ledgers:
+        _hand_over(path, ledger, containers.get(ledger.relative_path, {}))
+
+
+def _checked(content: Any) -> Dict[str, Dict[str, Any]]:
+    if not isinstance(content, dict) or content.get('format') != FORMAT:
+        raise ValueError('it is no file of {}'.format(FORMAT))
+    if content.get('version') != VERSION:
+        raise ValueError('it has version {!r}, known is {}'.format(content.get('version'), VERSION))
+    containers = content.get('containers')
+    if not isinstance(containers, dict) or not all(isinstance(states, dict) for states in containers.values()):
+        raise ValueError('it has no states')
+    return containers
+
+
+def _set_aside(path: str) -> str:
+    try:
+        os.replace(path, path + DAMAGED)
+    except OSError as err:
+        return 'it could not be set aside ({})'.format(err)
+    return 'it is kept as {}'.format(path + DAMAGED)
+
+
+def _hand_over(path: str, ledger: Any, states: Dict[str, Any]) -> None:
+    for label, learned in states.items():
+        try:
+            ledger.learn(label, learned)
+        except (ValueError, TypeError, AttributeError) as err:
+            smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(path, label, ledger.path, err))

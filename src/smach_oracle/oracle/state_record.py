@@ -1,0 +1,155 @@
+"""What the oracle remembers of one state of a container. Pure; no smach."""
+import threading
+from typing import Any, Dict, Mapping, Optional, Tuple
+
+from .config import StateSettings
+from .failure_rate import Estimator, FailureClass, classify, make_estimator
+from .question import Visit
+
+
+class Edge:
+    """A transition that leads to another state without any failure: all that its next use needs, made once."""
+
+    __slots__ = ('target', 'count', 'message', 'visit')
+
+    def __init__(self, target: str, message: str, visit: Visit) -> None:
+        self.target = target
+        self.count = 0
+        self.message = message
+        self.visit = visit
+
+
+class StateRecord:
+    """Learned rate, counts and latest snapshot of one state.
+
+    Successes by way of an `Edge` are counted there and reach the estimator when somebody asks for it: their order among
+    each other does not matter, and a failure is always learned after them.
+    """
+
+    __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks', 'has_preconditions', 'special',
+                 'view', '_estimator', '_lock', '_learned', '_retired', '_edges', '_visits', '_visits_before')
+
+    def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
+        self.label = label
+        self.fast: Dict[Any, Edge] = {}
+        self.snapshot: Optional[Dict[str, Any]] = None
+        self.view: Any = None  # what the state reads and writes, kept from its last visit
+        self.recoveries = 0  # of this trial
+        self.fallbacks = 0  # of this trial: times that nobody answered and `on_no_answer` led to a state
+        self._learned = 0  # successes by way of edges that the estimator knows
+        self._retired = 0  # successes by way of edges that are no more
+        self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an Edge
+        self._visits = 0  # not counted by an Edge
+        self._visits_before = 0  # visits of earlier trials
+        self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
+        self._lock = threading.RLock()  # rates are read from other threads
+        self.configure(settings, special)
+
+    def configure(self, settings: StateSettings, special: bool) -> None:
+        """Go on under other settings with what was learned; `special`: more is to be done than to execute the state."""
+        self.settings = settings
+        self.has_preconditions = bool(settings.preconditions)
+        self.special = special or settings.time_limit_s is not None
+        with self._lock:
+            learned = self._up_to_date().snapshot()
+            self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
+            self._estimator.restore(learned)
+        self._retire_edges()
+
+    def _up_to_date(self) -> Estimator:
+        """The estimator, told of the successes by way of edges; to be called with the lock held."""
+        by_edges = self._by_edges()
+        if by_edges != self._learned:
+            self._estimator.add_successes(by_edges - self._learned)
+            self._learned = by_edges
+        return self._estimator
+
+    def learn(self, failed: bool) -> None:
+        """Learn the result of a visit that took no Edge."""
+        with self._lock:
+            self._up_to_date().add(failed)
+
+    def take_back_failure(self) -> None:
+        """Unlearn the latest result, a failure."""
+        with self._lock:
+            self._up_to_date().take_back_failure()
+
+    def learned(self) -> Dict[str, Any]:
+        """Return what was learned as plain data."""
+        with self._lock:
+            return self._up_to_date().snapshot()
+
+    @property
+    def rate(self) -> float:
+        """Learned failure rate, 0 to 1."""
+        with self._lock:
+            return self._up_to_date().rate
+
+    @property
+    def failure_class(self) -> FailureClass:
+        """Class by the learned rate."""
+        return classify(self.rate, self.settings.moderate_from, self.settings.high_from)
+
+    @property
+    def totals(self) -> Tuple[int, int]:
+        """Successes and failures in all."""
+        with self._lock:
+            estimator = self._up_to_date()
+            return estimator.successes, estimator.failures
+
+    @property
+    def visits(self) -> int:
+        """Visits of this trial that have ended."""
+        return self._visits + self._by_edges() - self._visits_before
+
+    def begin_trial(self) -> None:
+        """Count the visits and recoveries of a new trial."""
+        self.recoveries = self.fallbacks = 0
+        self._visits_before = self._visits + self._by_edges()
+
+    def left_by(self, outcome: str, target: str) -> None:
+        """Count a transition that took no Edge."""
+        self._edges[outcome, target] = self._edges.get((outcome, target), 0) + 1
+
+    def visit_ended(self) -> None:
+        """Count a visit that ended without an Edge."""
+        self._visits += 1
+
+    def transitions(self) -> Dict[Tuple[str, str], int]:
+        """Return how often each (outcome, target) was taken."""
+        counts = dict(self._edges)
+        for outcome, edge in list(self.fast.items()):
+            counts[outcome, edge.target] = counts.get((outcome, edge.target), 0) + edge.count
+        return counts
+
+    def restore(self, learned: Mapping[str, Any]) -> None:
+        """Take over a snapshot of an estimator. Raises ValueError."""
+        with self._lock:
+            self._up_to_date().restore(learned)
+
+    def _by_edges(self) -> int:
+        return self._retired + sum([edge.count for edge in list(self.fast.values())])
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Without what belongs to an execution under way."""
+        state = {name: getattr(self, name) for name in self.__slots__}
+        state.update(snapshot=None, view=None)
+        del state['_lock']
+        return state
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)
+        self._lock = threading.RLock()
+
+    def _retire_edges(self) -> None:
+        for outcome in list(self.fast):
+            self.retire_edge(outcome)
+
+    def retire_edge(self, outcome: str) -> None:
+        """Forget an edge whose transition has changed; its counts stay."""
+        with self._lock:
+            edge = self.fast.pop(outcome)
+            self._retired += edge.count
+        if edge.count:
+            self._edges[outcome, edge.target] = self._edges.get((outcome, edge.target), 0) + edge.count

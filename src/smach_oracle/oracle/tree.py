@@ -1,0 +1,66 @@
+"""What all containers of one wrapped machine share: the trial, its events, the expert, the threads left behind."""
+import threading
+import uuid
+from typing import Any, Callable, Dict, Optional
+
+import smach
+
+from .events import EventSource
+from .question import Expert
+from .worker import Workers
+
+
+def log_error(text: str) -> None:
+    """Log to whatever SMACH logs to now."""
+    smach.logerr(text)
+
+
+def no_description(state: Any) -> str:
+    """States say nothing of a failure by outcome, unless somebody knows how to ask them."""
+    return ''
+
+
+def new_id() -> str:
+    """Return an id that nobody else uses."""
+    return uuid.uuid4().hex[:12]
+
+
+class Tree:
+    """Shared by the top machine and all wrapped containers below it."""
+
+    def __init__(self, recover: bool = True, expert: Optional[Expert] = None) -> None:
+        self.recover = recover
+        self.expert = expert
+        self.events = EventSource(log_error)
+        self.workers = Workers()
+        self.trial_id = ''
+        self.rates_lock = threading.Lock()
+        self.rates_loaded = ''  # the rates file read last
+        self.describe_failure: Callable[[Any], str] = no_description  # what a state that failed by outcome says of it
+        self._questions = 0
+        self._lock = threading.Lock()
+
+    def begin_trial(self, trial_id: str) -> None:
+        """Number events and questions anew."""
+        self.trial_id = trial_id
+        self._questions = 0
+        self.events.begin_trial(trial_id)
+
+    def next_query_id(self) -> str:
+        """Return the id of the next question: each one is new, also when it is asked about the same failure."""
+        with self._lock:
+            self._questions += 1
+            return '{}-{}'.format(self.trial_id or new_id(), self._questions)
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Without what cannot travel with a pickled or copied machine: the expert, its connection, and locks."""
+        state = dict(self.__dict__)
+        del state['_lock'], state['rates_lock']
+        state['expert'] = None
+        state['describe_failure'] = no_description
+        return state
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.Lock()
+        self.rates_lock = threading.Lock()

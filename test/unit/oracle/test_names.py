@@ -1,0 +1,70 @@
+"""A script's own classes and objects may use any name for their own ends, those of an OracleContainer among them."""
+import smach
+from machines import FakeExpert, Scripted, chain_of, supersede
+
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.events import EventKind
+
+NAMES = ('name', 'path', 'settings', 'events', 'trial_id', 'is_top', 'recovers', 'rates', 'transition_counts',
+         'save_rates', 'load_rates')
+
+
+class SetsThem(smach.StateMachine):
+    """A machine that keeps things of its own under these names."""
+
+    def __init__(self, *args, **kwargs):
+        smach.StateMachine.__init__(self, *args, **kwargs)
+        for name in NAMES:
+            setattr(self, name, ['own ' + name])
+
+    def execute(self, *args, **kwargs):
+        self.name = 'set while it runs'
+        return smach.StateMachine.execute(self, *args, **kwargs)
+
+
+class DefinesThem(smach.StateMachine):
+    """A machine whose class uses some of them."""
+
+    @property
+    def name(self):
+        return 'own name'
+
+    def events(self):
+        return 'own events'
+
+    def rates(self, currency):
+        return 'own rates in ' + currency
+
+
+def recovered(machine, **settings):
+    """Run it under an oracle; the kinds of its events."""
+    wrapped = OracleContainer.wrap(machine, expert=FakeExpert(supersede('ok')), settings=settings)
+    events = []
+    wrapped._oracle.face.events.observers.append(events.append)
+    assert wrapped.execute() == 'done'
+    return [event.kind for event in events]
+
+
+def test_what_a_script_keeps_on_its_machine_stays_its_own(tmp_path):
+    machine = chain_of(Scripted('aborted'), machine_class=SetsThem)
+    kinds = recovered(machine, rates_file=str(tmp_path / 'rates.json'))
+    assert EventKind.JUMP in kinds and kinds[-1] is EventKind.TRIAL_END
+    assert machine.name == 'set while it runs'
+    assert [getattr(machine, name) for name in NAMES[1:]] == [['own ' + name] for name in NAMES[1:]]
+    assert (tmp_path / 'rates.json').exists()
+
+
+def test_what_a_scripts_class_defines_stays_its_own():
+    machine = chain_of(Scripted('aborted'), machine_class=DefinesThem)
+    assert EventKind.JUMP in recovered(machine)
+    assert (machine.name, machine.events(), machine.rates('euros')) == ('own name', 'own events', 'own rates in euros')
+
+
+def test_adapters_read_the_containers_face_whatever_the_class_is_like():
+    machine = chain_of(Scripted('aborted'), machine_class=SetsThem)
+    recovered(machine)
+    face = machine._oracle.face
+    assert (face.name, face.path, face.is_top, face.recovers) == ('SM_ROOT', 'SM_ROOT', True, True)
+    assert face.trial_id and face.settings.policy == 'prose'
+    assert [(row.state, row.failures) for row in face.rates()] == [('A', 1)]
+    assert {row.to for row in face.transition_counts()} == {'A', 'ORACLE', 'done'}

@@ -1,0 +1,194 @@
+"""The policies against the tables of doc/policies.md, and what continuous and stepping back mean in a machine."""
+import itertools
+import os
+import subprocess
+import sys
+
+import pytest
+from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
+
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.events import EventKind
+from smach_oracle.oracle.failure_rate import FailureClass
+from smach_oracle.oracle.policy import POLICIES, Chain, Preconditions, Situation, policy_named
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
+CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
+
+
+def table_of_the_page():
+    """{(policy, class, preconditions, continuous): action} as doc/policies.md has it."""
+    with open(os.path.join(ROOT, 'doc', 'policies.md'), encoding='utf-8') as page:
+        rows = [[cell.strip() for cell in line.strip().strip('|').split('|')] for line in page if line.startswith('|')]
+    begin = next(index for index, row in enumerate(rows) if row[:3] == ['class', 'preconditions', 'continuous'])
+    names = rows[begin][3:]
+    table = {}
+    for row in itertools.takewhile(lambda row: len(row) == len(rows[begin]), rows[begin + 2:]):
+        for name, action in zip(names, row[3:]):
+            table[name, row[0], row[1], row[2]] = action
+    return table
+
+
+TABLE = table_of_the_page()
+
+
+def test_the_page_covers_every_cell_of_every_policy():
+    cells = set(itertools.product(POLICIES, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'), ('no', 'yes')))
+    assert set(TABLE) == cells
+
+
+@pytest.mark.parametrize('cell', sorted(TABLE), ids=' '.join)
+def test_the_policy_decides_as_the_page_says(cell):
+    name, failure_class, preconditions, continuous = cell
+    situation = Situation(FailureClass[failure_class], Preconditions(preconditions), continuous == 'yes')
+    assert POLICIES[name].decide(situation).value.replace('_', ' ') == TABLE[cell]
+
+
+def machine_in(cell):
+    """A machine whose state B has just failed in the situation of a cell; the expert supersedes whatever is asked."""
+    name, failure_class, preconditions, continuous = cell
+    prior = {'LOW': 0.1, 'MODERATE': 0.5, 'HIGH': 0.95}[failure_class]
+    lists = {'none': [], 'met': [lambda ud: True], 'not met': [lambda ud: False]}
+    state = Scripted('aborted')
+    machine = watched(Scripted(), state, Scripted(), expert=FakeExpert(supersede('ok'), supersede('ok')), settings={
+        'policy': name, 'memory': 100, 'states': {'B': {'prior': prior, 'preconditions': lists[preconditions]}}})
+    if continuous == 'yes':  # a failure of B before, in the same trial
+        ledger = machine.machine._oracle
+        real = ledger.chain
+
+        def chain(record):
+            ledger.history.failed(record.label, record.totals[0])
+            return real(record)
+        ledger.chain = chain
+    return machine
+
+
+@pytest.mark.parametrize('cell', sorted(cell for cell in TABLE if cell[1] != 'HIGH' or cell[2] == 'none'), ids=' '.join)
+def test_a_machine_does_what_the_page_says(cell):
+    machine = machine_in(cell)
+    machine.run()
+    action = TABLE[cell].replace(' ', '_')
+    target = {'revisit': 'B', 'step_back': 'A', 'ask': ''}[action]
+    assert machine.decisions()[0] == (action, target)
+    assert machine.of(EventKind.DECISION)[0].continuous is (cell[3] == 'yes')
+    assert [event.target for event in machine.of(EventKind.JUMP)][0] == (target or 'C')
+
+
+@pytest.mark.parametrize('name', sorted(POLICIES))
+def test_nothing_is_run_for_a_state_that_fails_mostly(name):
+    machine = machine_in((name, 'HIGH', 'met', 'no'))
+    assert machine.run() == 'done'
+    assert not machine.of(EventKind.PRECONDITION_START)
+    assert machine.decisions() == [('ask', '')]
+
+
+def failing(policy, *states, **settings):
+    return watched(*states, settings=dict(settings, policy=policy, max_recoveries=50, memory=1000))
+
+
+def test_algorithm1_steps_back_to_the_latest_visit_without_preconditions():
+    machine = Watched(chain_of(Scripted(), Scripted(), Scripted('aborted')), settings={
+        'policy': 'algorithm1', 'states': {'B': {'preconditions': [bool]}}})
+    machine.run()
+    assert machine.decisions() == [('step_back', 'A')]
+
+
+def test_algorithm1_counts_earlier_visits_of_the_failed_state_itself():
+    machine = failing('algorithm1', Scripted('aborted', 'aborted'), Scripted())
+    machine.run()
+    assert machine.decisions() == [('step_back', 'A'), ('step_back', 'A')]
+    machine = failing('algorithm1', Scripted(), Scripted('aborted'), Scripted('aborted'))
+    machine.run()
+    assert machine.decisions() == [('step_back', 'A'), ('step_back', 'B')]
+
+
+def test_algorithm1_steps_back_to_the_initial_state_where_no_visit_was_without_preconditions():
+    machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings={
+        'policy': 'algorithm1', 'states': {'A': {'preconditions': [bool]}, 'B': {'preconditions': [lambda ud: True]}}})
+    machine.run()
+    assert machine.decisions() == [('step_back', 'A')]
+
+
+def test_algorithm1_calls_a_failure_continuous_though_the_state_succeeded_in_between():
+    def run(policy):
+        a, b = Scripted('aborted', 'ok', 'aborted'), Scripted('back', outcomes=('ok', 'back'))
+        machine = Watched(loop_of(a, b), settings={'policy': policy, 'states': {'A': {'prior': 0.1}}})
+        machine.run()
+        return [event.continuous for event in machine.of(EventKind.FAILURE)]
+    assert run('algorithm1') == [False, True]
+    assert run('prose') == [False, False]
+
+
+def loop_of(a, b):
+    import smach
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', a, {'ok': 'B'})
+        smach.StateMachine.add('B', b, {'ok': 'done', 'back': 'A'})
+    return machine
+
+
+def test_a_failure_of_another_state_in_between_ends_continuity():
+    machine = failing('prose', Scripted(), Scripted('aborted', 'ok', 'aborted'), Scripted('aborted', 'ok', 'ok'))
+    machine.run()
+    assert [event.continuous for event in machine.of(EventKind.FAILURE)][:2] == [False, False]
+
+
+def test_prose_steps_back_to_the_state_that_succeeded_last_before_the_failing_began():
+    machine = failing('prose', Scripted(), Scripted(), Scripted('aborted', 'aborted', 'aborted'))
+    machine.run()
+    assert machine.decisions() == [('revisit', 'C'), ('step_back', 'B'), ('step_back', 'B')]
+    assert machine.visits() == ['A', 'B', 'C', 'C', 'B', 'C', 'B', 'C']
+
+
+def test_prose_keeps_its_goal_while_the_state_keeps_failing():
+    """From the goal another way may lead back: what succeeds on it is no goal."""
+    import smach
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')), {'ok': 'S', 'way': 'X'})
+        smach.StateMachine.add('X', Scripted(outcomes=('ok',)), {'ok': 'S'})
+        smach.StateMachine.add('S', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'})
+    machine = Watched(machine, settings={'policy': 'prose', 'memory': 1000})
+    machine.run()
+    assert machine.decisions() == [('revisit', 'S'), ('step_back', 'A'), ('step_back', 'A')]
+
+
+def test_prose_steps_back_to_the_initial_state_where_nothing_succeeded_before():
+    machine = failing('prose', Scripted('aborted', 'aborted'), Scripted())
+    machine.run()
+    assert machine.decisions() == [('revisit', 'A'), ('step_back', 'A')]
+
+
+def test_a_preempted_or_failed_visit_is_no_goal_of_a_step_back():
+    chain = Chain('S', 'INIT', True, True, None, None)
+    assert POLICIES['prose'].step_back_target(chain) == 'INIT'
+    assert POLICIES['algorithm1'].step_back_target(chain) == 'INIT'
+
+
+def test_continuity_ends_with_the_trial():
+    machine = failing('prose', Scripted('aborted', 'ok', 'aborted'), Scripted())
+    machine.run()
+    machine.run()
+    assert [event.continuous for event in machine.of(EventKind.FAILURE)] == [False, False]
+
+
+def test_the_class_is_that_after_the_failure_and_the_failure_event_tells_that_before():
+    machine = watched(Scripted('aborted'), settings={'memory': 1, 'prior': 0.0, 'on_no_answer': 'give_up:done'})
+    machine.run()
+    failure, decision = machine.of(EventKind.FAILURE, EventKind.DECISION)
+    assert (failure.failure_class, failure.rate) == (FailureClass.LOW, 0.0)
+    assert (decision.failure_class, decision.rate) == (FailureClass.HIGH, 1.0)
+
+
+def test_an_unknown_policy_is_refused_by_name():
+    with pytest.raises(ConfigError, match='policy.*guess.*algorithm1, prose'):
+        policy_named('guess')
+
+
+@pytest.mark.parametrize('module', ['policy', 'failure_rate', 'history', 'events', 'question', 'config', 'errors',
+                                    'naming', 'precondition_spec', 'state_record'])
+def test_the_pure_parts_need_no_smach(module):
+    code = 'import sys, smach_oracle.oracle.{}; sys.exit("smach" in sys.modules)'.format(module)
+    environment = dict(os.environ, PYTHONPATH=os.path.join(ROOT, 'src'))
+    assert subprocess.call([sys.executable, '-c', code], env=environment) == 0

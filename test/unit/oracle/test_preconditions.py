@@ -1,0 +1,205 @@
+"""The four kinds of precondition, and that they run on failure alone."""
+import pytest
+import smach
+from machines import Gate, Scripted, Watched, chain_of, in_thread
+
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.events import EventKind
+
+
+def machine_with(*preconditions, b=None, extra=(), **settings):
+    """A, B, C, where B fails once (unless given) and has the preconditions; `extra`: (label, state) never visited."""
+    machine = chain_of(Scripted(), b or Scripted('aborted'), Scripted())
+    with machine:
+        for label, state in extra:
+            smach.StateMachine.add(label, state, {'ok': 'A'} if 'ok' in state.get_registered_outcomes() else {})
+    return Watched(machine, preconditions={'B': list(preconditions)}, settings=settings)
+
+
+def ends(machine):
+    return [(event.target, event.outcome) for event in machine.of(EventKind.PRECONDITION_END)]
+
+
+def test_preconditions_do_not_run_while_nothing_fails():
+    state = Scripted()
+    machine = machine_with(state, b=Scripted())
+    assert machine.run() == 'done'
+    assert state.runs == 0
+
+
+def test_a_state_is_a_precondition():
+    state = Scripted()
+    machine = machine_with(state)
+    assert machine.run() == 'done'
+    assert state.runs == 1
+    assert ends(machine) == [('Scripted', 'met')]
+    assert [event.target for event in machine.of(EventKind.PRECONDITION_START)] == ['Scripted']
+
+
+@pytest.mark.parametrize('end', ['aborted', 'preempted', ValueError('x'), None, 'unregistered'])
+def test_a_state_that_does_not_end_well_leaves_the_precondition_unmet(end):
+    machine = machine_with(Scripted(end))
+    machine.run()
+    assert ends(machine) == [('Scripted', 'not met')]
+    assert machine.decisions() == [('step_back', 'A')]
+
+
+def test_the_label_of_another_state_is_a_precondition_and_its_run_is_no_visit():
+    clear = Scripted(outcomes=('ok', 'aborted'))
+    machine = machine_with('CLEAR', extra=[('CLEAR', clear)])
+    assert machine.run() == 'done'
+    assert clear.runs == 1
+    assert machine.visits() == ['A', 'B', 'B', 'C']
+    assert (machine.rate('CLEAR').successes, machine.rate('CLEAR').failures) == (0, 0)
+    assert ends(machine) == [('CLEAR', 'met')]
+
+
+def test_a_labelled_state_whose_outcome_would_end_the_machine_badly_is_not_met():
+    lost = Scripted('lost', outcomes=('ok', 'lost'))
+    machine = chain_of(Scripted(), Scripted('aborted'), Scripted())
+    with machine:
+        smach.StateMachine.add('CLEAR', lost, {'ok': 'A', 'lost': 'aborted'})
+    machine = Watched(machine, preconditions={'B': ['CLEAR']})
+    machine.run()
+    assert ends(machine) == [('CLEAR', 'not met')]
+
+
+def test_a_labelled_state_is_run_with_its_remapping():
+    seen = []
+    state = Scripted(lambda self, ud: seen.append(ud.mine) or 'ok', input_keys=['mine'])
+    machine = chain_of(Scripted(), Scripted('aborted'), Scripted())
+    machine.userdata.yours = 5
+    with machine:
+        smach.StateMachine.add('CLEAR', state, {'ok': 'A'}, remapping={'mine': 'yours'})
+    Watched(machine, preconditions={'B': ['CLEAR']}).run()
+    assert seen == [5]
+
+
+def test_a_callable_is_a_precondition_and_sees_the_userdata():
+    machine = machine_with(lambda ud: ud.clear)
+    machine.machine.userdata.clear = True
+    assert machine.run() == 'done'
+    assert ends(machine)[0][1] == 'met'
+
+
+@pytest.mark.parametrize('result', [False, None, 0, ''])
+def test_a_callable_that_does_not_say_true_is_not_met(result):
+    machine = machine_with(lambda ud: result)
+    machine.run()
+    assert ends(machine)[0][1] == 'not met'
+
+
+def test_a_callable_that_raises_is_not_met_and_the_machine_goes_on():
+    def broken(ud):
+        raise OSError('no camera')
+    machine = machine_with(broken)
+    assert machine.run() == 'done'
+    end = machine.of(EventKind.PRECONDITION_END)[0]
+    assert (end.target, end.outcome) == ('broken', 'not met')
+    assert 'no camera' in end.text
+
+
+@pytest.mark.parametrize('holds, achieved, met, runs', [(True, 'ok', 'met', 0), (False, 'ok', 'met', 1),
+                                                        (False, 'aborted', 'not met', 1)])
+def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(holds, achieved, met, runs):
+    achieve, checks = Scripted(achieved), []
+    machine = machine_with((lambda ud: checks.append(1) or holds, achieve))
+    machine.run()
+    assert ends(machine)[0][1] == met
+    assert achieve.runs == runs
+    assert len(checks) == 1, 'the check is not run again'
+
+
+def test_preconditions_run_in_order_and_stop_at_the_first_that_is_not_met():
+    ran = []
+    machine = machine_with(lambda ud: ran.append(1) or True, lambda ud: ran.append(2) or False,
+                           lambda ud: ran.append(3) or True)
+    machine.run()
+    assert ran == [1, 2]
+
+
+def test_a_precondition_that_never_ends_is_ended_by_a_preempt():
+    gate = Gate()
+    machine = machine_with(Scripted(gate))
+    run = in_thread(machine.run)
+    assert gate.entered.wait(10)
+    machine.machine.request_preempt()
+    assert run.result() == 'preempted'
+    assert not machine.of(EventKind.DECISION)
+    assert machine.machine.preempt_requested() is False
+
+
+def test_a_preempt_between_two_preconditions_lets_no_more_begin():
+    second = Scripted()
+    holder = []
+    machine = machine_with(lambda ud: holder[0].request_preempt() or True, second)
+    holder.append(machine.machine)
+    assert machine.run() == 'preempted'
+    assert second.runs == 0
+
+
+def test_a_labelled_state_keeps_its_time_limit():
+    gate = Gate()
+    machine = chain_of(Scripted(), Scripted('aborted'), Scripted())
+    with machine:
+        smach.StateMachine.add('CLEAR', Scripted(gate), {'ok': 'A'})
+    machine = Watched(machine, preconditions={'B': ['CLEAR']},
+                      settings={'states': {'CLEAR': {'time_limit_s': 0.05, 'grace_period_s': 5}}})
+    assert machine.run() == 'done'
+    assert ends(machine) == [('CLEAR', 'not met')]
+    assert 'time limit' in machine.of(EventKind.PRECONDITION_END)[0].text
+
+
+def test_a_state_added_with_preconditions_has_them():
+    ran = []
+    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        OracleContainer.add('A', Scripted('aborted'), {'ok': 'done'}, preconditions=[lambda ud: ran.append(1) or True])
+    assert machine.execute() == 'done'
+    assert ran == [1]
+    assert machine.rates()[0].has_preconditions
+
+
+def test_a_precondition_naming_no_state_is_refused_with_the_labels_there_are():
+    with pytest.raises(ConfigError, match=r"states.B.preconditions: 'NOWHERE' is not allowed.*A, C"):
+        machine_with('NOWHERE')
+
+
+def test_a_state_cannot_be_its_own_precondition():
+    with pytest.raises(ConfigError, match='states.B.preconditions'):
+        machine_with('B')
+
+
+def test_where_not_strict_an_unknown_label_is_warned_of_and_never_met(log):
+    machine = Watched(chain_of(Scripted(), Scripted('aborted')), preconditions={'B': ['NOWHERE'], 'GHOST': [bool]},
+                      strict=False)
+    machine.run()
+    assert ends(machine) == [('NOWHERE', 'not met')]
+    warnings = [text for level, text in log if level == 'warn']
+    assert any('NOWHERE' in text for text in warnings) and any('GHOST' in text for text in warnings)
+
+
+@pytest.mark.parametrize('wrong, position', [(5, '[0]'), ({'check': 'A'}, '[0]'), ('', '[0]'), (('A',), '[0]'),
+                                             ('python:a:b', '[0]'), (Scripted, '[0]'), ((('A', 'C'), 'C'), '[0]')])
+def test_what_is_no_precondition_is_refused_with_its_place(wrong, position):
+    with pytest.raises(ConfigError) as raised:
+        Watched(chain_of(Scripted(), Scripted(), Scripted()), preconditions={'B': [wrong]})
+    assert raised.value.key.startswith('states.B.preconditions' + position)
+
+
+def test_a_list_is_asked_for():
+    with pytest.raises(ConfigError, match='a list of preconditions'):
+        Watched(chain_of(Scripted(), Scripted()), preconditions={'B': 'A'})
+
+
+def test_python_names_are_resolved_by_what_is_handed_in():
+    from smach_oracle.oracle.config import Settings
+    found = {'python:robot:is_clear': lambda ud: True}
+    settings = Settings.from_dict({'states': {'B': {'preconditions': [
+        {'check': 'python:robot:is_clear', 'achieve': 'A'}]}}}, resolver=found.__getitem__)
+    machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings=settings)
+    assert machine.run() == 'done'
+    assert ends(machine) == [('is_clear or A', 'met')]
+    with pytest.raises(ConfigError, match='python:robot:lost'):
+        Settings.from_dict({'states': {'B': {'preconditions': ['python:robot:lost']}}}, resolver=found.__getitem__)

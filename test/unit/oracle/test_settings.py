@@ -1,0 +1,111 @@
+"""Settings: what is allowed, and errors that name the key, the value and what is allowed."""
+import pytest
+
+from smach_oracle.oracle.config import Settings, setting_names
+from smach_oracle.oracle.errors import ConfigError, OracleError
+from smach_oracle.oracle.question import InterfaceOffer
+
+
+def test_the_defaults_are_those_of_the_design():
+    settings = Settings.from_dict({})
+    state = settings.for_state('', 'ANY')
+    assert (state.memory, state.prior, state.moderate_from, state.high_from, state.max_recoveries) == (
+        10, 0.1, 0.4, 0.75, 5)
+    assert (settings.policy, settings.userdata, settings.on_no_answer) == ('prose', 'restore', ('stop', ''))
+    assert settings.failing_outcomes == ('aborted', 'failed', 'failure', 'error')
+    assert settings.deadline_s > 0, 'never an endless wait unless asked for'
+    assert Settings.from_dict(None) == settings
+
+
+@pytest.mark.parametrize('given, key, value, allowed', [
+    ({'polisy': 'prose'}, 'polisy', 'prose', 'policy'),
+    ({'policy': 'guess'}, 'policy', 'guess', 'algorithm1, prose'),
+    ({'memory': 0}, 'memory', 0, 'whole number'),
+    ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
+    ({'memory': True}, 'memory', True, 'whole number'),
+    ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
+    ({'prior': float('nan')}, 'prior', None, '0 to 1'),
+    ({'moderate_from': 0.9}, 'moderate_from', 0.9, 'high_from'),
+    ({'estimator': 'mean'}, 'estimator', 'mean', 'exponential, window'),
+    ({'max_recoveries': -1}, 'max_recoveries', -1, 'from 0'),
+    ({'failing_outcomes': 'aborted'}, 'failing_outcomes', 'aborted', 'list of strings'),
+    ({'failure_outcomes': ['']}, 'failure_outcomes', '', 'none of them empty'),
+    ({'author_recoveries': 'drop'}, 'author_recoveries', 'drop', 'keep, override'),
+    ({'userdata': 'forget'}, 'userdata', 'forget', 'restore, keep'),
+    ({'time_limit_s': -1}, 'time_limit_s', -1, 'seconds'),
+    ({'time_limit_s': '1'}, 'time_limit_s', '1', 'seconds'),
+    ({'grace_period_s': None}, 'grace_period_s', None, 'seconds'),
+    ({'deadline_s': -1}, 'deadline_s', -1, '0 waits without end'),
+    ({'on_no_answer': 'panic'}, 'on_no_answer', 'panic', 'stop'),
+    ({'on_no_answer': {'goto': ''}}, 'on_no_answer', {'goto': ''}, 'goto'),
+    ({'escalate': 'yes'}, 'escalate', 'yes', 'true or false'),
+    ({'history_length': 0}, 'history_length', 0, 'from 1'),
+    ({'oracle_label': ''}, 'oracle_label', '', 'not empty'),
+    ({'rates_file': 5}, 'rates_file', 5, 'string'),
+    ({'states': ['A']}, 'states', ['A'], 'mapping'),
+    ({'states': {5: {}}}, 'states', 5, 'strings'),
+    ({'states': {'PICK': {'memory': 'ten'}}}, 'states.PICK.memory', 'ten', 'whole number'),
+    ({'states': {'PICK': {'memroy': 1}}}, 'states.PICK.memroy', 1, 'memory'),
+    ({'states': {'PICK': {'policy': 'prose'}}}, 'states.PICK.policy', 'prose', 'prior'),
+    ({'states': {'PICK': {'high_from': 0.2}}}, 'states.PICK.high_from', 0.2, 'moderate_from, which is 0.4'),
+    ({'states': {'PICK': {'moderate_from': 0.8}}}, 'states.PICK.moderate_from', 0.8, 'high_from, which is 0.75'),
+    ({'deadline_s': 10 ** 400}, 'deadline_s', 10 ** 400, 'seconds'),
+    ({'grace_period_s': float('inf')}, 'grace_period_s', float('inf'), 'seconds'),
+    ({'history_length': 10 ** 30}, 'history_length', 10 ** 30, 'to 1000000'),
+    ({'states': {'PICK': {'preconditions': 'A'}}}, 'states.PICK.preconditions', 'A', 'list'),
+    ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
+    ({'interfaces': {'hand': {'action': 'a', 'state': []}}}, 'interfaces.hand.state', [], 'states'),
+    ({'interfaces': {'hand': {'action': 'a', 'states': 'A'}}}, 'interfaces.hand.states', 'A', 'list'),
+    ('prose', 'settings', 'prose', 'mapping')])
+def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value, allowed):
+    with pytest.raises(ConfigError) as raised:
+        Settings.from_dict(given)
+    assert raised.value.key == key
+    if value is not None:
+        assert raised.value.value == value
+    assert allowed in raised.value.allowed
+    assert key in str(raised.value) and allowed in str(raised.value)
+    assert isinstance(raised.value, (OracleError, ValueError))
+
+
+def test_settings_of_a_state_win_over_the_machines_and_a_path_over_a_label():
+    settings = Settings.from_dict({'prior': 0.2, 'memory': 5, 'states': {
+        'PICK': {'prior': 0.3}, 'LEFT/PICK': {'memory': 7}}})
+    assert (settings.for_state('', 'PLACE').prior, settings.for_state('', 'PICK').prior) == (0.2, 0.3)
+    assert settings.for_state('LEFT', 'PICK').memory == 7
+    assert settings.for_state('LEFT', 'PICK').prior == 0.3
+    assert settings.for_state('RIGHT', 'PICK').memory == 5
+
+
+@pytest.mark.parametrize('given, taken', [('stop', ('stop', '')), ({'goto': 'SAFE'}, ('goto', 'SAFE')),
+                                          ('goto:SAFE', ('goto', 'SAFE')), ('give_up:aborted', ('give_up', 'aborted')),
+                                          ({'give_up': 'aborted'}, ('give_up', 'aborted'))])
+def test_fallbacks(given, taken):
+    assert Settings.from_dict({'on_no_answer': given}).on_no_answer == taken
+
+
+@pytest.mark.parametrize('given, limit_s', [(0, None), (None, None), (2, 2.0), (0.5, 0.5)])
+def test_no_time_limit_is_said_by_0_or_nothing(given, limit_s):
+    assert Settings.from_dict({'time_limit_s': given}).defaults.time_limit_s == limit_s
+
+
+def test_interfaces_are_offered_for_the_states_they_name_or_for_all():
+    settings = Settings.from_dict({'interfaces': {
+        'all': {'action': 'a'}, 'pick': {'action': 'b', 'description': 'd', 'states': ['PICK']},
+        'left': {'action': 'c', 'states': ['LEFT/PICK']}}})
+    assert [offer.name for offer in settings.offers_for('', 'PLACE')] == ['all']
+    assert settings.offers_for('', 'PICK')[1] == InterfaceOffer('pick', 'b', 'd')
+    assert [offer.name for offer in settings.offers_for('LEFT', 'PICK')] == ['all', 'pick', 'left']
+
+
+def test_empty_sections_of_a_file_are_empty():
+    settings = Settings.from_dict({'states': None, 'interfaces': None})
+    assert settings == Settings.from_dict({})
+
+
+def test_every_documented_key_is_known():
+    assert set(setting_names()) == {
+        'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries', 'failing_outcomes',
+        'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys', 'time_limit_s', 'grace_period_s',
+        'deadline_s', 'on_no_answer', 'escalate', 'history_length', 'rates_file', 'oracle_label', 'nested',
+        'interfaces', 'states'}
