@@ -1,0 +1,202 @@
+"""Writes rosbag 2.0 files so that a crash or a full disk costs at most the chunk in memory.
+
+rosbag.Bag opens a chunk on disk and patches its length in afterwards, keeps an index entry of every message in memory
+until it is closed, and is left undefined by a failing write. A recorder beside a robot wants the opposite: here a chunk
+is put together in memory and appended whole, with its index, at a known end; a failing write is cut off again, so that
+what was written stays a valid bag; memory holds one chunk, and some ten bytes for each chunk before it.
+"""
+import errno
+import fcntl
+import os
+from typing import Dict, List, NamedTuple, Optional, Tuple
+
+from . import bag_format
+from .bag_format import ChunkInfo, Stamp
+
+MAX_CHUNK_BYTES = 768 * 1024  # rosbag's own figure
+
+# some network and FUSE file systems: better a bag that no other recorder can mend than none
+_NO_LOCKS_HERE = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+
+
+class MessageType(NamedTuple):
+    """What a connection record says of its messages."""
+
+    name: str  # e.g. smach_oracle/OracleEvent
+    md5sum: str
+    definition: str  # full text, with the types it depends on
+
+
+class _Connection(NamedTuple):
+    number: int
+    record: bytes
+
+
+def _lock(fd: int) -> None:
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as err:
+        if err.errno not in _NO_LOCKS_HERE:
+            raise
+
+
+class BagWriter:
+    """One bag file being written. Not thread-safe: one thread writes.
+
+    The file is locked (flock) while it is open, which is how a recorder that starts tells a file that is being written
+    from one whose writer died. On a file system without locks it is written unlocked.
+    """
+
+    def __init__(self, path: str) -> None:
+        """Create the file and write its header; raises OSError (FileExistsError where it is there already)."""
+        self.path = path
+        self._connections: Dict[Tuple[str, str, str], _Connection] = {}
+        self._chunks: List[ChunkInfo] = []
+        self._end = bag_format.BAG_HEADER_END
+        self._reset_chunk()
+        self._fd = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_CLOEXEC, 0o644)
+        try:
+            _lock(self._fd)
+            _write_at(self._fd, bag_format.MAGIC + bag_format.pack_bag_header(0, 0, 0), 0)
+        except OSError:
+            os.close(self._fd)
+            os.unlink(path)  # holds nothing
+            raise
+
+    @property
+    def has_chunks(self) -> bool:
+        """Whether anything but the header has reached the file."""
+        return bool(self._chunks)
+
+    @property
+    def buffered_bytes(self) -> int:
+        """Size of the chunk in memory."""
+        return len(self._buffer)
+
+    def add(self, topic: str, message_type: MessageType, stamp: Stamp, data: bytes,
+            details: Optional[Dict[str, str]] = None) -> None:
+        """Put a message, serialised to `data`, into the chunk in memory. Touches no disk.
+
+        `details` are further fields of the connection header (latching, callerid).
+        """
+        connection = self._connection(topic, message_type, details or {})
+        offset = len(self._buffer)
+        header = self._message_headers.get(connection.number)
+        if header is None:
+            header = _message_header(connection.number)
+            self._message_headers[connection.number] = header
+        self._buffer += header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(len(data)) + data
+        self._index.setdefault(connection.number, []).append((stamp[0], stamp[1], offset))
+
+    def _connection(self, topic: str, message_type: MessageType, details: Dict[str, str]) -> _Connection:
+        key = (topic, message_type.md5sum, details.get('callerid', ''))
+        connection = self._connections.get(key)
+        if connection is None:
+            number = len(self._connections)
+            fields = {'type': message_type.name, 'md5sum': message_type.md5sum,
+                      'message_definition': message_type.definition, **details}
+            connection = _Connection(number, bag_format.pack_connection(number, topic, fields))
+            self._connections[key] = connection
+            self._buffer += connection.record
+        return connection
+
+    def flush(self) -> None:
+        """Hand the chunk in memory to the operating system; raises OSError, the file then ends where it did before.
+
+        From here on the messages survive the death of this process (not that of the machine: see `sync`).
+        """
+        if not self._index:
+            return
+        position = self._end
+        chunk = bytes(self._buffer)
+        indexes, info = self._pack_indexes(position)
+        self._append(bag_format.pack_chunk_header(len(chunk)) + chunk + indexes)
+        self._chunks.append(info)
+        self._reset_chunk()
+
+    def sync(self) -> None:
+        """Make the disk hold what was flushed; raises OSError."""
+        os.fsync(self._fd)
+
+    def close(self, sync: bool = True) -> None:
+        """Flush, write the index and close; raises OSError, the file is then closed, unindexed, and can be repaired.
+
+        `sync`: return only when the disk holds it.
+        """
+        try:
+            self.flush()
+            write_bag_index(self._fd, self._end, [item.record for item in self._connections.values()], self._chunks)
+            if sync:
+                self.sync()
+        finally:
+            self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file as it is, without an index. The chunk in memory is lost."""
+        if self._fd >= 0:
+            fd, self._fd = self._fd, -1
+            os.close(fd)
+
+    def _reset_chunk(self) -> None:
+        self._buffer = bytearray()
+        self._index: Dict[int, List[Tuple[int, int, int]]] = {}
+        self._message_headers: Dict[int, bytes] = {}
+
+    def _pack_indexes(self, position: int) -> Tuple[bytes, ChunkInfo]:
+        records = []
+        for number, entries in self._index.items():
+            entries.sort(key=_stamp_of)  # ROS time may jump back
+            packed = b''.join(bag_format.INDEX_ENTRY.pack(*entry) for entry in entries)
+            records.append(bag_format.pack_index(number, len(entries), packed))
+        start = min(entries[0][:2] for entries in self._index.values())
+        end = max(entries[-1][:2] for entries in self._index.values())
+        counts = {number: len(entries) for number, entries in self._index.items()}
+        return b''.join(records), ChunkInfo(position, start, end, counts)
+
+    def _append(self, data: bytes) -> None:
+        try:
+            _write_at(self._fd, data, self._end)
+        except OSError:
+            _cut_off(self._fd, self._end)
+            raise
+        self._end += len(data)
+
+
+def write_bag_index(fd: int, end: int, connections: List[bytes], chunks: List[ChunkInfo]) -> None:
+    """Write the bag's index at `end` and point the bag header to it.
+
+    Raises OSError; the file is then cut off at `end`. A power cut in here can leave a header that points to nothing:
+    repairing therefore never trusts an index, it makes a new one.
+    """
+    try:
+        _write_at(fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)), end)
+    except OSError:
+        _cut_off(fd, end)
+        raise
+    _write_at(fd, bag_format.pack_bag_header(end, len(connections), len(chunks)), len(bag_format.MAGIC))
+
+
+def _message_header(connection: int) -> bytes:
+    """A message record's header up to the value of its last field, which is the time."""
+    whole = bag_format.pack_header({'op': bytes((bag_format.OP_MESSAGE,)),
+                                    'conn': bag_format.UINT32.pack(connection), 'time': bytes(8)})
+    return whole[:-8]
+
+
+def _stamp_of(entry: Tuple[int, int, int]) -> Stamp:
+    return entry[:2]
+
+
+def _write_at(fd: int, data: bytes, position: int) -> None:
+    rest = memoryview(data)
+    while rest:
+        written = os.pwrite(fd, rest, position)
+        position += written
+        rest = rest[written:]
+
+
+def _cut_off(fd: int, end: int) -> None:
+    try:
+        os.ftruncate(fd, end)
+    except OSError:
+        pass  # a torn tail costs nothing: `rosbag reindex` and bag_repair cut it off

@@ -1,0 +1,234 @@
+"""The executive's way to its experts: questions as goals to an ExpertQuery server, own or shared."""
+import math
+import threading
+import time
+from typing import Dict, Optional
+
+import rospy
+from actionlib_msgs.msg import GoalStatus
+
+from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQueryGoal, ExpertQueryResult,
+                              SharedAutonomyAction, SharedAutonomyResult)
+
+from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progress, Question, names
+from .expert_server import ExpertQueryServer
+from .goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
+from .question_messages import to_answer, to_goal, to_interface_goal
+from .userdata_codec import UserdataCodecError, decode_all
+
+OWN_SERVER = '~expert_query'
+SERVER_WAIT_S = 5.0
+_EXPIRY_GRACE_S = 1.0  # the server's word that nobody answered is better than our own clock's, where it comes soon
+_RETRY_S = 0.3
+
+
+class ExpertQueryClient(Expert):
+    """Asks the experts behind an ExpertQuery server; may be used from several threads at once.
+
+    A server that dies while a question waits is waited for, and asked again under the same query id, until the
+    deadline.
+    """
+
+    def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S) -> None:
+        """`server`: name of a shared server; '' hosts one of this node's own, `~expert_query`, and asks that.
+
+        `robot`: who asks, the node's name where ''. `server_wait_s`: how long a shared-autonomy interface that an
+        expert chose is waited for.
+        """
+        self.robot = robot or rospy.get_name()
+        self.server: Optional[ExpertQueryServer] = None if server else ExpertQueryServer(OWN_SERVER)
+        self._link = GoalLink(rospy.resolve_name(server or OWN_SERVER), ExpertQueryAction)
+        self._server_wait_s = server_wait_s
+        self._interfaces: Dict[str, GoalLink] = {}
+        self._interfaces_lock = threading.Lock()
+
+    def ask(self, question: Question, cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
+        """The answer, or None where nobody gave one by the deadline or `cancelled` was set.
+
+        :raises AnswerError: if the answer cannot be used here, such as outputs of a message type that is not
+            installed.
+        """
+        return _Asking(self._link, to_goal(question, self.robot), progress).run(cancelled)
+
+    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
+                      progress: Progress) -> Optional[Answer]:
+        """Run a shared-autonomy interface; None where it is not there, fails or is cancelled, with the log saying why.
+        """
+        progress('interface_start', offer.name, '')
+        announcement = self._announce(offer, question)
+        answer = None
+        try:
+            result = self._run(offer, question, cancelled)
+            answer = _to_supersede(offer, question, result) if result is not None else None
+        finally:
+            if announcement is not None:
+                announcement.cancel()
+            progress('interface_end', offer.name, answer.outcome if answer else '')
+        return answer
+
+    def close(self) -> None:
+        """Take down the connections, and the own server where there is one."""
+        for link in [self._link] + list(self._interfaces.values()):
+            link.stop()
+        if self.server is not None:
+            self.server.stop()
+
+    def _announce(self, offer: InterfaceOffer, question: Question) -> Optional[SentGoal]:
+        """Let the front ends see, for as long as this goal lives, that an interface runs for the question."""
+        if not self._link.ready():
+            return None
+        goal = to_goal(question, self.robot)
+        goal.interface = offer.name
+        goal.deadline = 0.0
+        return self._link.send(goal, time.monotonic())
+
+    def _run(self, offer: InterfaceOffer, question: Question,
+             cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
+        link = self._interface(offer.action)
+        if not _wait_until_ready(link, self._server_wait_s, cancelled):
+            rospy.logwarn('Interface %s: no action server at %s within %g s', offer.name, link.name,
+                          self._server_wait_s)
+            return None
+        sent = link.send(to_interface_goal(offer, question), time.monotonic())
+        while not (cancelled.is_set() or rospy.is_shutdown()):
+            event = sent.poll()
+            if event is not None and event.status:
+                return _interface_result(offer, event)
+            if event is None and (not link.alive() or sent.unheard(time.monotonic())):
+                rospy.logwarn('Interface %s: its action server %s is gone', offer.name, link.name)
+                return None
+        sent.cancel()
+        return None
+
+    def _interface(self, action: str) -> GoalLink:
+        name = rospy.resolve_name(action)
+        with self._interfaces_lock:
+            if name not in self._interfaces:
+                self._interfaces[name] = GoalLink(name, SharedAutonomyAction)
+            return self._interfaces[name]
+
+
+class _Asking:
+    """One question on its way: sent, sent again after a loss, until it is settled."""
+
+    def __init__(self, link: GoalLink, goal: ExpertQueryGoal, progress: Progress) -> None:
+        self._link = link
+        self._goal = goal
+        self._progress = progress
+        self._deadline_s = time.monotonic() + goal.deadline if goal.deadline > 0 else math.inf
+        self._sent: Optional[SentGoal] = None
+        self._retry_s = -math.inf
+        self._times_sent = 0
+        self._holder = ''
+
+    def run(self, cancelled: threading.Event) -> Optional[Answer]:
+        """Block until the question is settled, taken back or too old."""
+        while not (cancelled.is_set() or rospy.is_shutdown()):
+            now_s = time.monotonic()
+            if now_s >= self._deadline_s + (_EXPIRY_GRACE_S if self._sent else 0.0):
+                break
+            event = self._next_event(now_s, cancelled)
+            if event is None:
+                continue
+            if event.feedback is not None:
+                self._tell(event.feedback)
+            elif self._settled(event):
+                return _answer_of(event)
+        if self._sent is not None:
+            self._sent.cancel()
+        return None
+
+    def _next_event(self, now_s: float, cancelled: threading.Event) -> Optional[GoalEvent]:
+        if self._sent is None:
+            if now_s >= self._retry_s and self._link.ready():
+                self._send(now_s)
+            else:
+                cancelled.wait(POLL_S)
+            return None
+        event = self._sent.poll()
+        if event is None and (not self._link.alive() or self._sent.unheard(now_s)):
+            self._lose('is gone')
+        return event
+
+    def _send(self, now_s: float) -> None:
+        """Send the question; the deadline does not begin anew."""
+        if self._deadline_s < math.inf:
+            self._goal.deadline = max(self._deadline_s - now_s, 1e-3)
+        self._sent = self._link.send(self._goal, now_s)
+        self._times_sent += 1
+        if self._times_sent > 1:
+            rospy.loginfo('Question %s is asked again at %s', self._goal.query_id, self._link.name)
+
+    def _lose(self, what: str) -> None:
+        rospy.logwarn('The expert query server %s %s; question %s waits for it to come back', self._link.name, what,
+                      self._goal.query_id)
+        self._sent = None
+        self._retry_s = time.monotonic() + _RETRY_S
+        self._released('the expert query server {}'.format(what))
+
+    def _settled(self, event: GoalEvent) -> bool:
+        """Whether the end of the goal is the end of the question."""
+        if lost(event):
+            self._lose('was restarted')
+            return False
+        if event.status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED):  # not by us: we would not be here
+            self._lose('dropped the question')
+            return False
+        return True
+
+    def _tell(self, feedback: ExpertQueryFeedback) -> None:
+        if feedback.status == ExpertQueryFeedback.CLAIMED and feedback.by != self._holder:
+            self._holder = feedback.by
+            self._progress('claimed', feedback.by, feedback.text)
+        elif feedback.status == ExpertQueryFeedback.PENDING:
+            self._released(feedback.text)
+
+    def _released(self, text: str) -> None:
+        if self._holder:
+            holder, self._holder = self._holder, ''
+            self._progress('released', holder, text)
+
+
+def _answer_of(event: GoalEvent) -> Optional[Answer]:
+    result: Optional[ExpertQueryResult] = event.result
+    if event.status == GoalStatus.SUCCEEDED and result is not None and result.status == ExpertQueryResult.ANSWERED:
+        return to_answer(result.decision)
+    if event.status == GoalStatus.REJECTED:
+        rospy.logerr('The expert query server refused a question; nobody was asked')
+    return None
+
+
+def _wait_until_ready(link: GoalLink, timeout_s: float, cancelled: threading.Event) -> bool:
+    until_s = time.monotonic() + timeout_s
+    while not link.ready():
+        if time.monotonic() >= until_s or rospy.is_shutdown() or cancelled.wait(POLL_S):
+            return False
+    return True
+
+
+def _interface_result(offer: InterfaceOffer, event: GoalEvent) -> Optional[SharedAutonomyResult]:
+    if event.status == GoalStatus.SUCCEEDED and event.result is not None:
+        return event.result
+    rospy.logwarn('Interface %s ended as %s%s', offer.name, GoalStatus.to_string(event.status),
+                  ': ' + event.result.text if event.result is not None and event.result.text else '')
+    return None
+
+
+def _to_supersede(offer: InterfaceOffer, question: Question, result: SharedAutonomyResult) -> Optional[Answer]:
+    """The interface's result as an answer, where it fits the question."""
+    outcomes = [choice.outcome for choice in question.supersede_outcomes]
+    if result.outcome not in outcomes:
+        rospy.logwarn('Interface %s returned outcome %r; allowed: %s', offer.name, result.outcome, names(outcomes))
+        return None
+    try:
+        outputs = decode_all(result.outputs)
+    except UserdataCodecError as err:
+        rospy.logwarn('Interface %s: %s', offer.name, err)
+        return None
+    unknown = sorted(set(outputs) - set(question.output_keys))
+    if unknown:
+        rospy.logwarn('Interface %s returned outputs %s; allowed: %s', offer.name, names(unknown),
+                      names(question.output_keys))
+        return None
+    # no `by`: the decision was that of the expert who started the interface
+    return Answer(AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None, why=result.text)

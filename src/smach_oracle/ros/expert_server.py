@@ -1,0 +1,224 @@
+"""The ExpertQuery action server: questions wait here, side by side, until an expert settles them.
+
+It hosts, under its name: the action, `open` (latched list of open questions), `claim` and `answer` (services). It runs
+in the node of the robot that asks, or as a node of its own that many robots share.
+"""
+import math
+import threading
+import time
+from typing import Any, Dict, List, Optional
+
+import actionlib
+import rospy
+
+from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQueryResult, OpenQueries,
+                              OpenQuery)
+from smach_oracle.srv import (AnswerQuery, AnswerQueryRequest, AnswerQueryResponse, ClaimQuery, ClaimQueryRequest,
+                              ClaimQueryResponse)
+
+from .command_line import parameters_only
+from .master_watch import start_master_watch
+from .query_book import LEASE_S, BadQuestion, Notice, QueryBook, Settled
+
+ASKER_GONE_S = 3.0
+_LIST_PERIOD_S = 1.0
+_WATCH_PERIOD_S = 0.25
+
+
+class _Asker:
+    """A goal that waits for the end of its question, and the connection by which its node listens."""
+
+    def __init__(self, handle: actionlib.ServerGoalHandle) -> None:
+        self.handle = handle
+        self._node = handle.status_tracker.goal._connection_header['callerid']
+        self._connection: Any = None
+        self._seen_s = time.monotonic()
+
+    def missing_s(self, connections: List[Any], now_s: float) -> float:
+        """For how long its own connection has been gone; another one of the same name is another process."""
+        if self._connection is None:
+            self._connection = next((each for each in connections if each.endpoint_id == self._node), None)
+        if any(each is self._connection for each in connections):
+            self._seen_s = now_s
+        return now_s - self._seen_s
+
+
+class ExpertQueryServer:
+    """Hosts the questions of one robot or many.
+
+    Every access is serialised by the action server's own lock, under which its callbacks come anyway.
+    """
+
+    def __init__(self, name: str = '~expert_query', lease_s: float = LEASE_S,
+                 asker_gone_s: float = ASKER_GONE_S) -> None:
+        """`name` is resolved relative to the node; a claim holds `lease_s` unless it asks for another lease.
+
+        A question whose asker's connection has been gone for `asker_gone_s` is closed.
+        """
+        self.name = rospy.resolve_name(name)
+        self._book = QueryBook(lease_s)
+        self._asker_gone_s = asker_gone_s
+        self._askers: Dict[str, List[_Asker]] = {}
+        self._listed_s = -math.inf
+        self._wake = threading.Event()
+        self._stopped = False
+        self._open_publisher = rospy.Publisher(self.name + '/open', OpenQueries, latch=True, queue_size=2)
+        self._action = actionlib.ActionServer(self.name, ExpertQueryAction, self._on_goal, self._on_cancel,
+                                              auto_start=False)
+        self._lock = self._action.lock
+        self._services = [rospy.Service(self.name + '/claim', ClaimQuery, self._on_claim),
+                          rospy.Service(self.name + '/answer', AnswerQuery, self._on_answer)]
+        self._start()
+
+    def stop(self) -> None:
+        """Take the server down; whoever still asks sees it gone and waits for another."""
+        self._stopped = True
+        self._wake.set()
+        if rospy.is_shutdown():
+            return
+        for service in self._services:
+            service.shutdown('the expert query server stops')
+        self._action.stop()
+        self._open_publisher.unregister()
+
+    def _start(self) -> None:
+        self._action.start()
+        with self._lock:
+            self._publish_list()
+        threading.Thread(target=self._watch, name='expert query watch', daemon=True).start()
+        rospy.on_shutdown(self.stop)
+
+    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
+        goal = handle.get_goal()
+        try:
+            settled = self._book.open(goal)
+        except BadQuestion as err:
+            rospy.logerr('Question refused: %s', err)
+            handle.set_rejected(ExpertQueryResult(), str(err))
+            return
+        handle.set_accepted()
+        if settled is not None:
+            _end(handle, settled)
+            return
+        if not goal.interface:
+            rospy.loginfo('Question %s of %s: %s in %s failed', goal.query_id, goal.robot, goal.failed_state,
+                          goal.container_path)
+        self._askers.setdefault(goal.query_id, []).append(_Asker(handle))
+        self._tell_standing(goal.query_id, handle)
+        self._changed()
+
+    def _tell_standing(self, query_id: str, handle: actionlib.ServerGoalHandle) -> None:
+        """A goal that joins a question learns at once who works on it."""
+        for entry in self._book.listing():
+            if entry.query.query_id == query_id and entry.status == OpenQuery.CLAIMED:
+                handle.publish_feedback(ExpertQueryFeedback(entry.status, entry.claimed_by, ''))
+
+    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        goal = handle.get_goal()
+        self._book.close(goal.query_id, 'interface {} ended'.format(goal.interface) if goal.interface
+                         else 'taken back by the asker')
+        self._changed()
+
+    def _on_claim(self, request: ClaimQueryRequest) -> ClaimQueryResponse:
+        with self._lock:
+            reply = self._book.claim(request.action, request.query_id, request.expert, request.lease)
+            self._changed()
+        return ClaimQueryResponse(*reply)
+
+    def _on_answer(self, request: AnswerQueryRequest) -> AnswerQueryResponse:
+        with self._lock:
+            reply = self._book.answer(request.query_id, request.decision)
+            self._changed()
+        if not reply.ok:
+            rospy.logwarn('Answer of %s refused: %s', request.decision.by or 'nobody', reply.message)
+        return AnswerQueryResponse(*reply)
+
+    def _changed(self) -> None:
+        """Tell the askers first, they wait for it; then the front ends."""
+        self._dispatch()
+        self._publish_list()
+        self._wake.set()
+
+    def _dispatch(self) -> bool:
+        """Send out what the book has to tell; whether there was anything."""
+        notices = self._book.drain()
+        for notice in notices:
+            if notice.text:  # a new question has been told of already
+                rospy.loginfo('Question %s: %s', notice.query_id, _sentence(notice))
+            if notice.settled is not None:
+                for asker in self._askers.pop(notice.query_id, ()):
+                    _end(asker.handle, notice.settled)
+                continue
+            for asker in self._askers.get(notice.query_id, ()):
+                asker.handle.publish_feedback(ExpertQueryFeedback(notice.status, notice.by, notice.text))
+        return bool(notices)
+
+    def _publish_list(self) -> None:
+        message = OpenQueries(queries=self._book.listing())
+        message.header.stamp = rospy.Time.now()
+        self._listed_s = time.monotonic()
+        if not rospy.is_shutdown():
+            self._open_publisher.publish(message)
+
+    def _watch(self) -> None:
+        """Let time pass: deadlines, leases, askers that vanish. Sleeps as long as nothing is open."""
+        while not self._stopped and not rospy.is_shutdown():
+            self._wake.wait(self._pause_s())
+            self._wake.clear()
+            if self._stopped or rospy.is_shutdown():
+                return
+            with self._lock:
+                self._look_around(time.monotonic())
+
+    def _pause_s(self) -> Optional[float]:
+        with self._lock:
+            if not len(self._book):
+                return None
+            return min(_WATCH_PERIOD_S, max(0.0, self._book.next_due_s() - time.monotonic()))
+
+    def _look_around(self, now_s: float) -> None:
+        self._book.tick()
+        self._look_for_askers(now_s)
+        changed = self._dispatch()
+        if len(self._book):
+            self._action.publish_status()  # actionlib's own timer stops with a paused simulation; also finds the dead
+        if changed or (len(self._book) and now_s - self._listed_s >= _LIST_PERIOD_S):
+            self._publish_list()
+
+    def _look_for_askers(self, now_s: float) -> None:
+        connections = self._action.status_pub.impl.connections
+        for query_id, askers in list(self._askers.items()):
+            if all([asker.missing_s(connections, now_s) >= self._asker_gone_s for asker in askers]):
+                self._book.close(query_id, 'the asker is gone')
+
+
+def _end(handle: actionlib.ServerGoalHandle, settled: Settled) -> None:
+    result = ExpertQueryResult(settled.status, settled.decision)
+    if settled.status == ExpertQueryResult.ANSWERED:
+        handle.set_succeeded(result, settled.text)
+    elif settled.status == ExpertQueryResult.EXPIRED:
+        handle.set_aborted(result, settled.text)
+    else:
+        handle.set_canceled(result, settled.text)
+
+
+def _sentence(notice: Notice) -> str:
+    if notice.settled is not None:
+        return '{} ({})'.format(notice.text, notice.by) if notice.by else notice.text
+    if notice.status == ExpertQueryFeedback.PENDING:
+        return 'pending; {}'.format(notice.text)
+    if notice.status == ExpertQueryFeedback.CLAIMED:
+        return '{} by {}'.format(notice.text, notice.by)
+    return 'interface {} runs'.format(notice.text)
+
+
+def main() -> None:
+    """Entry point of the node `expert_query_server`: one server for many robots."""
+    parameters_only('Node: one query server for many robots. Parameters: ~server_name, ~lease_s, ~asker_gone_s; '
+                    'see doc/expert.md.')
+    rospy.init_node('expert_query_server')
+    start_master_watch()
+    server = ExpertQueryServer(rospy.get_param('~server_name', '~expert_query'), rospy.get_param('~lease_s', LEASE_S),
+                               rospy.get_param('~asker_gone_s', ASKER_GONE_S))
+    rospy.loginfo('Experts are asked at %s', server.name)
+    rospy.spin()

@@ -1,0 +1,129 @@
+"""Goals to an action server as streams of events that one thread can wait for; the loss of the server is seen at once.
+
+actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and says nothing about a server
+that has died; this goes by the connections themselves.
+"""
+import queue
+import threading
+import time
+from typing import Any, List, NamedTuple, Optional
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+
+POLL_S = 0.02  # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
+_ACK_S = 1.5  # a goal that nobody acknowledged by then was lost on its way
+_RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
+
+
+class GoalEvent(NamedTuple):
+    """Feedback (`feedback` set), or the end of the goal (`status` set; `result` may be None)."""
+
+    feedback: Any = None
+    status: int = 0
+    result: Any = None
+
+
+class SentGoal:
+    """One goal on its way; `poll` waits for its next event."""
+
+    def __init__(self, sent_s: float) -> None:
+        # not a SimpleQueue: its timed get waits for ever where a signal handler takes longer than the timeout
+        self._events: 'queue.Queue[GoalEvent]' = queue.Queue()
+        self._sent_s = sent_s
+        self._acknowledged = False
+        self._ended_s: Optional[float] = None
+        self._handle: Optional[actionlib.ClientGoalHandle] = None
+
+    def attach(self, handle: actionlib.ClientGoalHandle) -> None:
+        """Keep the handle: actionlib follows a goal only as long as somebody holds its handle."""
+        self._handle = handle
+
+    def poll(self, timeout_s: float = POLL_S) -> Optional[GoalEvent]:
+        """The next event, or None where there is none within the time."""
+        try:
+            return self._events.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+
+    def unheard(self, now_s: float) -> bool:
+        """Whether the server's acknowledgement, or the result of a goal that has ended, should be here and is not."""
+        if self._ended_s is not None:
+            return now_s - self._ended_s > _RESULT_S
+        return not self._acknowledged and now_s - self._sent_s > _ACK_S
+
+    def cancel(self) -> None:
+        """Take it back; returns at once."""
+        if self._handle is not None:
+            try:
+                self._handle.cancel()
+            except rospy.ROSException:  # the topic is closed: the node is going down, and the server will notice
+                rospy.logdebug('A goal could not be cancelled while the node goes down.')
+
+    def on_transition(self, handle: actionlib.ClientGoalHandle) -> None:
+        """actionlib's callback."""
+        state = handle.get_comm_state()
+        self._acknowledged = self._acknowledged or state != actionlib.CommState.WAITING_FOR_GOAL_ACK
+        if state == actionlib.CommState.WAITING_FOR_RESULT:
+            self._ended_s = time.monotonic()
+        elif state == actionlib.CommState.DONE:
+            self._events.put(GoalEvent(status=handle.get_terminal_state(), result=handle.get_result()))
+
+    def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: Any) -> None:
+        """actionlib's callback."""
+        self._events.put(GoalEvent(feedback=feedback))
+
+
+class GoalLink:
+    """An action client that knows whether its server is there."""
+
+    _sending = threading.Lock()  # actionlib's goal ids are not made safely from several threads
+
+    def __init__(self, name: str, action_spec: Any) -> None:
+        """`name` is resolved; connections are made in the background."""
+        self.name = name
+        # Small messages that must not wait for a full packet; the first subscriber of a topic decides.
+        self._fast = [rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
+                      for end, kind in (('/result', type(action_spec().action_result)),
+                                        ('/feedback', type(action_spec().action_feedback)))]
+        self._client = actionlib.ActionClient(name, action_spec)
+
+    def ready(self) -> bool:
+        """Whether one live server is connected to all five topics of the action."""
+        client = self._client
+        return any(client.pub_goal.impl.has_connection(server) and client.pub_cancel.impl.has_connection(server)
+                   and server in _live(client.result_sub) and server in _live(client.feedback_sub)
+                   for server in _live(client.status_sub))
+
+    def alive(self) -> bool:
+        """Whether any server is connected; false within milliseconds of its death."""
+        return bool(_live(self._client.status_sub))
+
+    def send(self, goal: Any, now_s: float) -> SentGoal:
+        """Send a goal; the caller has seen `ready`."""
+        sent = SentGoal(now_s)
+        with self._sending:
+            sent.attach(self._client.send_goal(goal, sent.on_transition, sent.on_feedback))
+        return sent
+
+    def stop(self) -> None:
+        """Take the five topics down."""
+        if rospy.is_shutdown():
+            return  # they are down
+        for subscriber in self._fast:
+            subscriber.unregister()
+        self._client.stop()
+
+
+def lost(event: GoalEvent) -> bool:
+    """Whether the goal ended because the server no longer knows it (it was restarted)."""
+    return event.status == GoalStatus.LOST
+
+
+def _live(subscriber: rospy.Subscriber) -> List[str]:
+    """Names of the publishing nodes; a connection whose socket is gone only waits to be made again."""
+    if subscriber.impl is None:
+        return []
+    return [connection.callerid_pub for connection in subscriber.impl.connections
+            if getattr(connection, 'socket', None) is not None]

@@ -1,0 +1,111 @@
+"""Put every top-level machine of a program under an oracle, without a word in the program.
+
+`execute` of smach.StateMachine and of every subclass that overrides it, present and future, first asks whether the
+machine is to be wrapped. What is called is always the outermost `execute`, so that an author's override runs once.
+"""
+import functools
+import threading
+import weakref
+from typing import Any, Callable, Iterator, MutableSet, Tuple, Type
+
+import smach
+
+from smach_oracle.oracle import OracleContainer
+
+WrapFunction = Callable[[smach.StateMachine], None]
+MARK = '_asks_for_an_oracle'
+
+
+class Interception:
+    """Calls `wrap(machine)` before the first execute of every top-level machine.
+
+    Machines inside a wrapped one are its `wrap`'s business: what it leaves bare stays bare. A machine that a state
+    runs inside its own `execute`, or that a Concurrence or an Iterator at the top contains, is a top-level one.
+
+    :param wrap: swaps the machine's class; an error it raises surfaces from the machine's `execute`.
+    """
+
+    def __init__(self, wrap: WrapFunction) -> None:
+        self._wrap = wrap
+        self._left_bare: MutableSet[smach.StateMachine] = weakref.WeakSet()
+        self._lock = threading.RLock()  # machines may start in several threads at once
+
+    def install(self) -> None:
+        """From now on; cannot be taken back."""
+        for cls in _family(smach.StateMachine):
+            self._patch(cls)
+        self._patch_future_subclasses()
+
+    def before_execute(self, machine: smach.StateMachine) -> bool:
+        """Wrap the machine where that is due.
+
+        :returns: whether it was wrapped just now.
+        """
+        if isinstance(machine, OracleContainer):
+            return False
+        with self._lock:
+            if machine in self._left_bare:
+                return False
+            self._wrap(machine)
+            self._left_bare.update(child for child in machines_inside(machine)
+                                   if not isinstance(child, OracleContainer))
+        return isinstance(machine, OracleContainer)
+
+    def _patch(self, cls: Type[smach.StateMachine]) -> None:
+        original = cls.execute  # its own, or one that a mix-in brings
+        if hasattr(original, MARK) or issubclass(cls, OracleContainer):
+            return
+        before_execute = self.before_execute
+
+        @functools.wraps(original)
+        def execute(machine: smach.StateMachine, *args: Any, **kwargs: Any) -> Any:
+            if before_execute(machine):
+                return machine.execute(*args, **kwargs)  # its class is another one now
+            return original(machine, *args, **kwargs)
+
+        setattr(execute, MARK, True)
+        setattr(cls, 'execute', execute)
+
+    def _patch_future_subclasses(self) -> None:
+        inherited = smach.StateMachine.__dict__.get('__init_subclass__')
+        patch = self._patch
+
+        def __init_subclass__(cls: Type[smach.StateMachine], **kwargs: Any) -> None:
+            if inherited is not None:
+                inherited.__get__(None, cls)(**kwargs)
+            else:
+                super(smach.StateMachine, cls).__init_subclass__(**kwargs)
+            patch(cls)
+
+        setattr(smach.StateMachine, '__init_subclass__', classmethod(__init_subclass__))
+
+
+def _family(cls: type) -> Iterator[type]:
+    """A class and all that is derived from it so far."""
+    yield cls
+    for child in cls.__subclasses__():
+        yield from _family(child)
+
+
+def machines_inside(container: Any) -> Iterator[smach.StateMachine]:
+    """Every StateMachine below a container, at any depth, through Concurrences and Iterators."""
+    seen = {id(container)}
+    open_containers = [container]
+    while open_containers:
+        for child in _children(open_containers.pop()):
+            if id(child) in seen:
+                continue
+            seen.add(id(child))
+            open_containers.append(child)
+            if isinstance(child, smach.StateMachine):
+                yield child
+
+
+def _children(state: Any) -> Tuple[Any, ...]:
+    """Of a container; nothing of any other state or of an Iterator that has no contained state yet."""
+    if not isinstance(state, smach.Container):
+        return ()
+    try:
+        return tuple(state.get_children().values())
+    except (AttributeError, TypeError):
+        return ()

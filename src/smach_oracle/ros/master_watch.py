@@ -1,0 +1,170 @@
+"""Survive a restart of the ROS master.
+
+A node registers its topics and services once. A master that is restarted knows nothing of them: existing connections
+go on, but nobody new can find the node. `MasterWatch` notices and registers everything again.
+"""
+import threading
+import xmlrpc.client
+from http.client import HTTPConnection
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+
+import rosgraph
+import rospy
+from rospy.impl.registration import (RegManager, get_registration_listeners, get_service_manager, get_topic_manager)
+
+POLL_S = 1.0
+CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch for ever
+
+
+class MasterCallError(Exception):
+    """The master answered with an error; the text says which call and why."""
+
+
+class Registrations(NamedTuple):
+    """Everything a node has at its master, by resolved names."""
+
+    publications: Sequence[Sequence[str]]  # (topic, type)
+    subscriptions: Sequence[Sequence[str]]  # (topic, type)
+    services: Sequence[Tuple[str, str]]  # (service, uri)
+
+
+class TimedTransport(xmlrpc.client.Transport):
+    """XML-RPC over a connection with a time limit."""
+
+    def make_connection(self, host: Any) -> HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = CALL_LIMIT_S
+        return connection
+
+
+class MasterLink:
+    """The calls of the master's API that the watch needs, made in the node's own name.
+
+    Every method raises OSError, xmlrpc.client.Error or http.client.HTTPException where the master gives no answer.
+    """
+
+    def __init__(self, master_uri: str, caller_id: str, node_uri: str) -> None:
+        self._master_uri = master_uri
+        self._caller_id = caller_id
+        self._node_uri = node_uri
+
+    def identity(self) -> Tuple[int, bool]:
+        """The master's process id, and whether it knows this node."""
+        with self._proxy() as master:
+            pid = master.getPid(self._caller_id)[2]
+            # a node of the same name elsewhere counts as known: it has replaced this one, which is being shut down
+            return pid, master.lookupNode(self._caller_id, self._caller_id)[0] == 1
+
+    def register(self, items: Registrations) -> List[Tuple[str, List[str]]]:
+        """Register everything; harmless for what the master knows already.
+
+        :returns: for each subscription its topic and the URIs of the publishers that the master knows.
+        :raises MasterCallError: naming what the master refused.
+        """
+        with self._proxy() as master:
+            for topic, kind in items.publications:
+                self._call(master.registerPublisher, topic, kind, self._node_uri)
+            found = [(topic, self._call(master.registerSubscriber, topic, kind, self._node_uri))
+                     for topic, kind in items.subscriptions]
+            for service, uri in items.services:
+                self._call(master.registerService, service, uri, self._node_uri)
+            return found
+
+    def _call(self, method: Callable[..., Any], name: str, *args: str) -> Any:
+        code, message, value = method(self._caller_id, name, *args)
+        if code != 1:
+            raise MasterCallError('{}: {}'.format(name, message))
+        return value
+
+    def _proxy(self) -> Any:
+        # a new one each time: a kept connection does not outlive the master that it leads to
+        return xmlrpc.client.ServerProxy(self._master_uri, transport=TimedTransport())
+
+
+class MasterWatch:
+    """Polls the master about once a second and registers this node again where the master has forgotten it.
+
+    Three signs tell a new master: another process id, that it does not know this node, and an outage before. The poll
+    is two local calls of about a millisecond.
+    """
+
+    def __init__(self, link: MasterLink, registrations: Callable[[], Registrations],
+                 found_publishers: Callable[[str, List[str]], None], poll_s: float = POLL_S) -> None:
+        self._link = link
+        self._registrations = registrations
+        self._found_publishers = found_publishers
+        self._poll_s = poll_s
+        self._known_pid: Optional[int] = None
+        self._lost = False
+        self._stop = threading.Event()
+        self.restarts_seen = 0
+        self._thread = threading.Thread(target=self._run, name='master_watch', daemon=True)
+
+    def start(self) -> None:
+        """Begin to watch; the thread ends with the process."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Watch no longer."""
+        self._stop.set()
+
+    def check(self) -> None:
+        """Look once, and register again where needed."""
+        try:
+            pid, known = self._link.identity()
+            if self._known_pid is None and known:
+                self._known_pid = pid
+            if self._lost or not known or pid != self._known_pid:
+                self._register(pid)
+        except Exception as err:  # refused, timed out, or any half answer of a master that is just dying
+            self._note_loss(err)
+
+    def _register(self, pid: int) -> None:
+        items = self._registrations()
+        for topic, uris in self._link.register(items):
+            self._found_publishers(topic, uris)
+        self._known_pid, self._lost = pid, False
+        self.restarts_seen += 1
+        rospy.logwarn('The ROS master was restarted: registered %d publishers, %d subscribers and %d services again.',
+                      len(items.publications), len(items.subscriptions), len(items.services))
+
+    def _note_loss(self, err: Exception) -> None:
+        if not self._lost and not self._stop.is_set() and not rospy.is_shutdown():
+            rospy.logwarn('The ROS master does not answer (%s); looking again every %.1f s.', err, self._poll_s)
+        self._lost = True
+
+    def _run(self) -> None:
+        while not self._stop.wait(self._poll_s) and not rospy.core.is_shutdown_requested():
+            self.check()
+
+
+_watch_lock = threading.Lock()
+_watch: Optional[MasterWatch] = None
+
+
+def start_master_watch() -> MasterWatch:
+    """Watch the master on behalf of this node; one watch per process, however often called.
+
+    :raises rospy.ROSInitException: before rospy.init_node.
+    """
+    global _watch
+    if not rospy.core.is_initialized():
+        raise rospy.ROSInitException('start_master_watch needs rospy.init_node first')
+    with _watch_lock:
+        if _watch is None:
+            link = MasterLink(rosgraph.get_master_uri(), rospy.get_name(), rospy.core.get_node_uri())
+            _watch = MasterWatch(link, _own_registrations, _connect)
+            _watch.start()
+        return _watch
+
+
+def _own_registrations() -> Registrations:
+    topics = get_topic_manager()
+    return Registrations(topics.get_publications(), topics.get_subscriptions(), get_service_manager().get_services())
+
+
+def _connect(topic: str, publisher_uris: List[str]) -> None:
+    """What the node does when its master tells it of publishers; those already connected are left alone."""
+    for listener in get_registration_listeners().listeners:
+        if isinstance(listener, RegManager):
+            listener.publisher_update(topic, publisher_uris)

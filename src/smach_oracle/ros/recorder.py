@@ -1,0 +1,248 @@
+"""Records each trial into a bag of its own, without losing an event and without ever holding the robot up for good."""
+import atexit
+import logging
+import os
+import threading
+import time
+from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
+from weakref import WeakSet
+
+import rospy
+
+from ..oracle.events import Event, EventKind, EventSource
+from .recorder_disk import Reporter, Topics, TrialBags, status_message
+from .recorder_queue import EndItem, EventItem, MessageItem, RecorderQueue, SnapshotItem
+from .recorder_status import DiskWatch, Losses, RecorderState, Status
+from .recorder_topics import TopicListener, now
+
+MAX_EVENTS = 1000
+WEIGHT_OF_A_FILE = 20  # opening and closing one takes as long as writing so many events
+MAX_MESSAGE_BYTES = 64 * 1024 * 1024
+HUNG_AFTER_S = 5.0
+CLOSE_S = 1.0
+
+Snapshots = Mapping[str, Callable[[], Any]]  # topic -> genpy.Message or None
+
+
+class TrialRecorder:
+    """Writes the events of every attached machine, and the messages of other topics, to `folder`.
+
+    While the disk works, the machine waits for the recorder where it must (bounded queue). Where the disk fails, or
+    hangs for more than `hung_after_s`, events are dropped, counted and reported, and the robot goes on. With a node
+    (rospy initialised before), topics are subscribed to and `~record/status` is published; without one, the events
+    alone are recorded.
+    """
+
+    def __init__(self, folder: str, topics: Sequence[str] = (), *, warn: Optional[Callable[[str], None]] = None,
+                 say: Optional[Callable[[str], None]] = None, on_status: Optional[Callable[[Status], None]] = None,
+                 max_events: int = MAX_EVENTS, max_message_bytes: int = MAX_MESSAGE_BYTES,
+                 hung_after_s: float = HUNG_AFTER_S) -> None:
+        """Create the folder, mend the bags of recorders that died in it, and start.
+
+        :param topics: names of other topics to record, each from when it is first published.
+        :param warn: told what went wrong, `say`: what is good to know; default: rospy's log, or without a node the
+            log `smach_oracle.recorder`.
+        :param on_status: told each change of status, in the recorder's threads.
+        :raises OSError: where the folder cannot be made or written: better known before the robot moves.
+        """
+        self.folder = os.path.abspath(os.path.expanduser(folder))
+        prepare_folder(self.folder)
+        default_say, default_warn = default_log()
+        self._on_status = on_status
+        self._publisher = StatusPublisher() if has_node() else None
+        self._reporter = Reporter(say or default_say, warn or default_warn, self._report)
+        self.losses = Losses()
+        self._watch = DiskWatch(hung_after_s)
+        self._queue = RecorderQueue(max_events, max_message_bytes)
+        self._topics = own_topics()
+        self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch)
+        self._bags.recover()
+        self._attached: 'WeakSet[EventSource]' = WeakSet()
+        self._hung = False
+        self._closed = False
+        self._process = os.getpid()
+        self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
+        self._thread.start()
+        self._listener = TopicListener(topics, self._take_message) if topics and has_node() else None
+        atexit.register(self.close)
+
+    def attach(self, machine: Any, snapshots: Optional[Snapshots] = None) -> None:
+        """Record the trials of a machine: an OracleContainer, or any EventSource. Twice is once.
+
+        :param snapshots: by topic, what gives a message (or None) to be recorded at the start and at the end of each
+            trial; called in the machine's thread.
+        """
+        source = machine if isinstance(machine, EventSource) else machine.events
+        if source in self._attached:
+            return
+        self._attached.add(source)
+        source.observers.append(_Attachment(self._observe, self._put_snapshot, self._put_end, self._reporter.warn,
+                                            {resolve(topic): take for topic, take in (snapshots or {}).items()}))
+
+    def __call__(self, event: Event) -> None:
+        """Record one event; the observer that a machine without snapshots may be given directly."""
+        self._observe(event)
+
+    def _observe(self, event: Event) -> None:
+        if os.getpid() != self._process:
+            return  # a forked child has no writer thread, and the bag is its parent's
+        item = EventItem(event, now()._replace(wall=event.wall_time))
+        weight = WEIGHT_OF_A_FILE if event.kind == EventKind.TRIAL_START else 1
+        if not self._queue.put_event(item, self._may_wait, weight):
+            self.losses.add_events(event.trial_id, 1)
+            self._note_drop()
+
+    def _put_snapshot(self, trial_id: str, topic: str, message: Any) -> None:
+        self._queue.put_event(SnapshotItem(trial_id, topic, message, now()), self._may_wait)
+
+    def _put_end(self, trial_id: str) -> None:
+        self._queue.put_event(EndItem(trial_id, now()), self._may_wait)
+
+    def _take_message(self, item: MessageItem) -> None:
+        if not self._queue.put_message(item):
+            self.losses.add_message()
+
+    def _may_wait(self) -> bool:
+        return self._thread.is_alive() and not self._watch.hangs()
+
+    def _note_drop(self) -> None:
+        if self._hung or self._closed:
+            return
+        self._hung = True
+        text = '{}: the disk has hung for more than {:g} s'.format(self.folder, self._watch.hung_after_s)
+        self._reporter.warn('Trials are not recorded any more, events are dropped and counted; {}'.format(text))
+        self._report(Status(RecorderState.DROPPING, events_lost_in_total=self.losses.events, text=text))
+
+    def _write_all(self) -> None:
+        try:
+            closing = False
+            while not closing:
+                items, closing = self._queue.take(self._bags.wait_s())
+                for item in items:
+                    self._write(item)
+                self._bags.tick()
+                self._note_answer(items)
+            self._bags.close()
+        finally:
+            self._queue.finish()
+
+    def _note_answer(self, items: Sequence[Any]) -> None:
+        if self._hung and items:
+            self._hung = False
+            self._reporter.say('The disk answers again; {} events were lost so far'.format(self.losses.events))
+
+    def _write(self, item: Any) -> None:
+        try:
+            self._bags.write(item)
+        except Exception as err:  # one event that cannot be converted must not cost all later ones
+            if isinstance(item, EventItem):
+                self.losses.add_events(item.event.trial_id, 1)
+            self._reporter.warn('Not recorded: {!r}: {!r}'.format(item, err))
+
+    def _report(self, status: Status) -> None:
+        for tell in (self._on_status, self._publisher):
+            if tell is not None:
+                try:
+                    tell(status)
+                except Exception as err:  # whoever listens must not stop the writer
+                    self._reporter.warn('Recorder status not passed on: {!r}'.format(err))
+
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
+        """Write what waits, close all bags, also of trials that have not ended, and stop. Idempotent, any thread.
+
+        :returns: whether all was done within `timeout_s`; False where the disk hangs: the bags are mended at the next
+            start.
+        """
+        if os.getpid() != self._process:
+            return True
+        first, self._closed = not self._closed, True
+        done = self._queue.close(timeout_s)
+        if first and self._listener is not None:  # unsubscribing talks to the master, which may be gone
+            threading.Thread(target=self._listener.close, name='recorder unsubscribes', daemon=True).start()
+        if first:
+            self._say_goodbye(done)
+        return done
+
+    def _say_goodbye(self, done: bool) -> None:
+        atexit.unregister(self.close)
+        if not done:
+            self._reporter.warn('{}: the disk did not let the recorder close its bags in time'.format(self.folder))
+        self._report(Status(RecorderState.CLOSED, events_lost_in_total=self.losses.events,
+                            messages_dropped=self.losses.messages))
+
+
+class _Attachment:
+    """The observer of one machine: knows which trial it is in, and takes the snapshots around it."""
+
+    def __init__(self, observe: Callable[[Event], None], put_snapshot: Callable[[str, str, Any], None],
+                 put_end: Callable[[str], None], warn: Callable[[str], None], snapshots: Snapshots) -> None:
+        self._observe = observe
+        self._put_snapshot = put_snapshot
+        self._put_end = put_end
+        self._warn = warn
+        self._snapshots = snapshots
+        self._trial_id: Optional[str] = None
+
+    def __call__(self, event: Event) -> None:
+        if self._trial_id not in (None, event.trial_id):
+            self._put_end(self._trial_id or '')  # the earlier trial ended without saying so
+        self._trial_id = None if event.kind == EventKind.TRIAL_END else event.trial_id
+        if event.kind == EventKind.TRIAL_END:
+            self._take_snapshots(event)
+        self._observe(event)
+        if event.kind == EventKind.TRIAL_START:
+            self._take_snapshots(event)
+
+    def _take_snapshots(self, event: Event) -> None:
+        for topic, take in self._snapshots.items():
+            try:
+                message = take()
+            except Exception as err:  # the rates must not cost the events
+                self._warn('No {} in the bag of {}: {!r}'.format(topic, event.trial_id, err))
+                continue
+            if message is not None:
+                self._put_snapshot(event.trial_id, topic, message)
+
+
+class StatusPublisher:
+    """Tells the operator: latched topic `~record/status`."""
+
+    def __init__(self) -> None:
+        from smach_oracle.msg import RecorderStatus
+        self._publisher = rospy.Publisher('~record/status', RecorderStatus, latch=True, queue_size=10)
+
+    def __call__(self, status: Status) -> None:
+        message = status_message(status)
+        message.header.stamp.secs, message.header.stamp.nsecs = now().ros or (0, 0)
+        self._publisher.publish(message)
+
+
+def has_node() -> bool:
+    """Whether rospy.init_node was called in this process."""
+    return bool(rospy.core.is_initialized())
+
+
+def resolve(topic: str) -> str:
+    """A topic's name as it is in the bag; without a node there is no name to put in front of `~`."""
+    return str(rospy.resolve_name(topic)) if has_node() else '/' + topic.lstrip('~/')
+
+
+def own_topics() -> Topics:
+    """Where the events and the recorder's status are, in the bag and on the wire."""
+    return Topics(resolve('~oracle/events'), resolve('~record/status'))
+
+
+def default_log() -> Tuple[Callable[[str], None], Callable[[str], None]]:
+    """What to say good news and bad news to."""
+    if has_node():
+        return rospy.loginfo, rospy.logerr
+    log = logging.getLogger('smach_oracle.recorder')
+    return log.info, log.error
+
+
+def prepare_folder(folder: str) -> None:
+    """Make the folder and try that a file can be made in it; raises OSError."""
+    os.makedirs(folder, exist_ok=True)
+    probe = os.path.join(folder, '.recorder-{}-{}'.format(os.getpid(), time.monotonic_ns()))
+    os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+    os.unlink(probe)

@@ -1,0 +1,221 @@
+"""Run an unmodified SMACH script with all its state machines under an oracle: `rosrun smach_oracle oracle_run SCRIPT`.
+
+The script runs as `python3 SCRIPT` would run it: __main__, __file__, sys.argv, sys.path[0], exit code and tracebacks
+are its own.
+"""
+import argparse
+import atexit
+import os
+import sys
+import types
+from importlib.machinery import SourceFileLoader
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+from smach_oracle.oracle.config import Settings
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.policy import POLICIES
+
+from . import attachment
+from .settings import LoadedSettings, load_settings, resolve_python, split_python_name
+from .shutdown import ShutdownGuard
+
+USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
+USAGE_ERROR = 2  # exit code
+OPTIONS_WITH_VALUE = ('--config', '--record', '--record-topic', '--policy', '--rates-file')
+
+
+class CommandLine(NamedTuple):
+    """What stands where: `oracle_run OPTIONS SCRIPT SCRIPT_ARGS`, ROS remappings anywhere."""
+
+    options: List[str]
+    script: Optional[str]
+    script_args: List[str]
+
+
+def split(args: Sequence[str]) -> CommandLine:
+    """Tell our options from the script and its arguments.
+
+    The first word that is neither an option, nor an option's value, nor a ROS remapping (`a:=b`), is the script. All
+    that follows belongs to the script; so do remappings that stand before it.
+    """
+    options: List[str] = []
+    remappings: List[str] = []
+    rest = list(args)
+    while rest:
+        word = rest.pop(0)
+        if not word.startswith('-') and ':=' in word:
+            remappings.append(word)
+        elif word == '--' and rest:
+            return CommandLine(options, rest[0], rest[1:] + remappings)
+        elif not word.startswith('-'):
+            return CommandLine(options, word, rest + remappings)
+        else:
+            options.append(word)
+            if word in OPTIONS_WITH_VALUE and rest:
+                options.append(rest.pop(0))
+    return CommandLine(options, None, remappings)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of our own options."""
+    parser = argparse.ArgumentParser(
+        prog='oracle_run', usage=USAGE, allow_abbrev=False,
+        description='Run a SMACH script, as it is, with all its state machines under an oracle.',
+        epilog='Options stand before SCRIPT; all that follows it belongs to the script. The parameter ~oracle of the '
+               "script's node goes over the file; options go over both.")
+    parser.add_argument('--config', metavar='FILE', help='settings of the oracle (YAML)')
+    parser.add_argument('--policy', choices=sorted(POLICIES), help='how the oracle decides')
+    parser.add_argument('--rates-file', metavar='FILE', help='learned failure rates are kept here across runs')
+    parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
+    parser.add_argument('--without-oracle', action='store_true',
+                        help='recover nothing: events and bags only, everything ends as without us')
+    parser.add_argument('--record', metavar='FOLDER', help='one bag per trial in this folder')
+    parser.add_argument('--record-topic', metavar='TOPIC', action='append', default=[],
+                        help='record this topic as well (repeatable)')
+    return parser
+
+
+class Run(NamedTuple):
+    """A command line that has been understood."""
+
+    script: str
+    script_args: List[str]
+    config: Optional[str]
+    overrides: Mapping[str, Any]
+    recover: bool
+    options: attachment.Options
+
+
+def parse(args: Sequence[str]) -> Run:
+    """Understand the command line; ends the process with a message and code 2 where it is wrong."""
+    line = split(args)
+    parser = make_parser()
+    given = parser.parse_args(line.options)
+    if line.script is None:
+        parser.error('which SCRIPT?')
+    if not os.path.isfile(line.script):
+        parser.error('{}: no such file'.format(line.script))
+    overrides: Dict[str, Any] = {}
+    if given.policy:
+        overrides['policy'] = given.policy
+    if given.rates_file:
+        overrides['rates_file'] = os.path.abspath(given.rates_file)
+    if given.no_nested:
+        overrides['nested'] = False
+    record = os.path.abspath(os.path.expanduser(given.record)) if given.record else ''
+    return Run(line.script, line.script_args, given.config, overrides, not given.without_oracle,
+               attachment.Options(record, tuple(given.record_topic)))
+
+
+def check(run: Run) -> None:
+    """Find mistakes before the robot moves.
+
+    :raises ConfigError: in the settings file or the command line.
+    :raises OSError: where the folder for the bags cannot be made or written.
+    """
+    read_settings(run, param=None, resolver=_looked_through)
+    if run.options.record:
+        from .recorder import prepare_folder
+        prepare_folder(run.options.record)
+
+
+def _looked_through(name: str) -> Callable[[Any], bool]:
+    split_python_name(name)
+    return _never_called
+
+
+def _never_called(userdata: Any) -> bool:
+    """Stands for a precondition of the script's own while the settings are looked through; never called."""
+    raise NotImplementedError
+
+
+def read_settings(run: Run, param: Optional[str] = '~oracle',
+                  resolver: Callable[[str], Any] = resolve_python) -> Settings:
+    """The settings for the machines of this run.
+
+    :raises ConfigError: naming where the mistake is.
+    """
+    loaded: LoadedSettings = load_settings(run.config, param, run.overrides)
+    try:
+        return Settings.from_dict(loaded, resolver)
+    except ConfigError as err:
+        raise loaded.located(err) from err
+
+
+class Wrapper:
+    """Wraps the script's machines, and finds names for them.
+
+    The first is named after the script; machines of the same structure share a name, so that a script that builds a
+    new one for each trial goes on learning where it was.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._names: Dict[Tuple[Any, ...], str] = {}
+        self._stem = os.path.splitext(os.path.basename(run.script))[0].upper().replace(' ', '_')
+
+    def __call__(self, machine: Any) -> None:
+        """Swap the machine's class.
+
+        :raises ConfigError: where the settings do not fit the machine.
+        """
+        from .container import OracleContainer
+        settings = read_settings(self._run)
+        OracleContainer.wrap(machine, settings=settings, nested=settings.nested, name=self.name(machine),
+                             strict=False, recover=self._run.recover)
+
+    def name(self, machine: Any) -> str:
+        """E.g. "PICK_AND_PLACE", and "PICK_AND_PLACE_2" for a machine of another structure in the same script."""
+        structure = (tuple(machine.get_children()), tuple(sorted(machine.get_registered_outcomes())))
+        if structure not in self._names:
+            count = len(self._names) + 1
+            self._names[structure] = self._stem if count == 1 else '{}_{}'.format(self._stem, count)
+        return self._names[structure]
+
+
+def run_script(script: str, script_args: Sequence[str]) -> None:
+    """Execute a file as `python3 script script_args...` would; returns or raises as the script does."""
+    with open(script, 'rb') as source:
+        text = source.read()
+    file_name = os.path.abspath(script) if sys.version_info >= (3, 9) else script
+    module = types.ModuleType('__main__')
+    module.__dict__.update(__file__=file_name, __builtins__=__builtins__, __cached__=None, __annotations__={},
+                           __loader__=SourceFileLoader('__main__', file_name))
+    # It stays there: threads and exit handlers of the script may pickle its classes after its last line.
+    sys.modules['__main__'] = module
+    sys.argv[:] = [script] + list(script_args)
+    sys.path[0] = os.path.dirname(os.path.realpath(script))
+    _show_only_frames_of(file_name)
+    exec(compile(text, file_name, 'exec'), module.__dict__)
+
+
+def _show_only_frames_of(file_name: str) -> None:
+    """Make tracebacks begin in the script, as they do when it runs by itself."""
+    show = sys.excepthook
+
+    def excepthook(kind: type, error: BaseException, trace: Optional[types.TracebackType]) -> None:
+        inside = trace
+        while inside is not None and inside.tb_frame.f_code.co_filename != file_name:
+            inside = inside.tb_next
+        if inside is None and isinstance(error, SyntaxError):
+            show(kind, error.with_traceback(None), None)
+        else:
+            show(kind, error.with_traceback(inside or trace), inside or trace)
+    sys.excepthook = excepthook
+
+
+def main(args: Optional[Sequence[str]] = None) -> None:
+    """Entry point."""
+    run = parse(sys.argv[1:] if args is None else args)
+    try:
+        check(run)
+    except (ConfigError, OSError) as err:
+        print('oracle_run: {}'.format(err), file=sys.stderr)
+        sys.exit(USAGE_ERROR)
+    from .interception import Interception
+    attachment.configure(run.options)
+    guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
+    guard.install()
+    atexit.register(attachment.attachments().close, 1.0)
+    Interception(Wrapper(run)).install()
+    run_script(run.script, run.script_args)

@@ -1,0 +1,219 @@
+"""Settings of the executive from a YAML file, the parameter server and the command line.
+
+The parameter `~oracle` goes over the file, the command line over both; mappings are merged key by key, everything else
+is replaced. What the keys mean is checked by `smach_oracle.oracle`; here every error learns where the key came from.
+"""
+import importlib
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple
+
+import rospy
+import yaml
+
+from smach_oracle.oracle.errors import ConfigError
+
+DEFAULT_PARAM = '~oracle'
+PYTHON_PREFIX = 'python:'
+
+
+class LoadedSettings(Dict[str, Any]):
+    """Plain settings that know where each key was set."""
+
+    def __init__(self, values: Optional[Mapping[str, Any]] = None) -> None:
+        super().__init__()
+        self._origins: Dict[str, str] = {}
+        if values:
+            self.put(values, 'settings given in code')
+
+    def put(self, values: Mapping[str, Any], origin: str, lines: Optional[Mapping[str, int]] = None) -> None:
+        """Merge values over those that are there.
+
+        :param origin: what to call this source in an error.
+        :param lines: dotted key -> line number, where the source is a file.
+        """
+        _merge_into(self, values)
+        for key in _dotted_keys(values):
+            line = (lines or {}).get(key)
+            self._origins[key] = '{} line {}'.format(origin, line) if line else origin
+
+    def origin(self, key: str) -> str:
+        """Where a dotted key, or else the mapping it should be in, was set; '' where nowhere."""
+        while key:
+            if key in self._origins:
+                return self._origins[key]
+            key = key[:max(key.rfind('.'), key.rfind('['), 0)]
+        return ''
+
+    def located(self, err: ConfigError) -> ConfigError:
+        """The same error, naming the source as well."""
+        origin = self.origin(err.key)
+        return ConfigError('{}: {}'.format(origin, err.key), err.value, err.allowed) if origin else err
+
+
+def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PARAM,
+                  overrides: Optional[Mapping[str, Any]] = None) -> LoadedSettings:
+    """Read and merge the settings.
+
+    :param path: a YAML file, or None.
+    :param param: a parameter that holds a mapping; read only where this process is a ROS node.
+    :param overrides: from the command line.
+    :raises ConfigError: naming file and line, or parameter, key, value and what is allowed.
+    """
+    settings = LoadedSettings()
+    if path:
+        values, lines = read_yaml(path)
+        settings.put(values, str(path), lines)
+    if param and rospy.core.is_initialized():
+        settings.put(read_param(param), 'parameter ' + rospy.resolve_name(param))
+    if overrides:
+        settings.put(overrides, 'command line')
+    return settings
+
+
+def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
+    """Read a YAML file that holds a mapping.
+
+    :returns: the values, and dotted key -> line number.
+    :raises ConfigError: where it cannot be read, is no YAML, names a key twice or holds something else.
+    """
+    try:
+        text = Path(path).read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as err:
+        raise ConfigError('settings file', str(path), 'a readable YAML file ({})'.format(err)) from err
+    try:
+        lines = _line_numbers(str(path), yaml.compose(text, Loader=yaml.SafeLoader))
+        values = yaml.safe_load(text)
+        list(_dotted_keys(values if isinstance(values, dict) else {}))
+    except ConfigError:
+        raise
+    except yaml.YAMLError as err:
+        raise ConfigError(_marked(str(path), err), getattr(err, 'problem', None) or str(err), 'YAML') from err
+    except RecursionError as err:
+        raise ConfigError(str(path), 'something that contains itself', 'a tree of settings') from err
+    except ValueError as err:  # what a tag such as !!int promises and the value does not keep
+        raise ConfigError(str(path), str(err), 'YAML') from err
+    if values is None:
+        return {}, lines
+    if not isinstance(values, dict):
+        raise ConfigError(str(path), values, 'a mapping of settings')
+    return values, lines
+
+
+def read_param(param: str) -> Dict[str, Any]:
+    """Read a mapping from the parameter server.
+
+    :returns: empty where it is not set, or the master cannot be asked (logged): a robot starts without it.
+    :raises ConfigError: where it is set to something else.
+    """
+    try:
+        values = rospy.get_param(param, {})
+    except (OSError, rospy.ROSException) as err:
+        rospy.logwarn('Parameter %s could not be read: %s', rospy.resolve_name(param), err)
+        return {}
+    if not isinstance(values, dict):
+        raise ConfigError('parameter ' + rospy.resolve_name(param), values, 'a mapping of settings')
+    if isinstance(values.get('states'), dict):
+        values['states'] = dict(_state_entries(values['states']))
+    return values
+
+
+def resolve_python(name: str) -> Any:
+    """What `python:module:attribute` names, e.g. `python:my_robot.checks:view_is_clear`.
+
+    A dotted attribute is followed; the class of a state is instantiated without arguments.
+
+    :raises ValueError: where the form is wrong or the module has no such attribute.
+    :raises ImportError: where the module cannot be imported; whatever else the module raises surfaces as it is.
+    """
+    module, attributes = split_python_name(name)
+    found: Any = importlib.import_module(module)
+    for attribute in attributes.split('.'):
+        if not hasattr(found, attribute):
+            raise ValueError('{} has no {!r}'.format(module, attribute))
+        found = getattr(found, attribute)
+    return found() if isinstance(found, type) and hasattr(found, 'execute') else found
+
+
+def split_python_name(name: str) -> Tuple[str, str]:
+    """Module and attribute of `python:module:attribute`.
+
+    :raises ValueError: where it has another form.
+    """
+    parts = name[len(PYTHON_PREFIX):].split(':') if name.startswith(PYTHON_PREFIX) else []
+    if len(parts) != 2 or not all(parts):
+        raise ValueError('the form is python:module:attribute')
+    return parts[0], parts[1]
+
+
+def _merge_into(target: Dict[str, Any], values: Mapping[str, Any]) -> None:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            inner = target.get(key)
+            target[key] = dict(inner) if isinstance(inner, Mapping) else {}
+            _merge_into(target[key], value)
+        else:
+            target[key] = value
+
+
+def _dotted_keys(values: Mapping[str, Any], prefix: str = '') -> Iterator[str]:
+    for key, value in values.items():
+        dotted = '{}{}'.format(prefix, key)
+        yield dotted
+        if isinstance(value, Mapping):
+            yield from _dotted_keys(value, dotted + '.')
+
+
+def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tuple[str, Any]]:
+    """Undo what the parameter server makes of the key "PATH/LABEL": a mapping PATH with a mapping LABEL in it.
+
+    No setting of a state is itself a mapping, so a mapping inside a state's settings is a state further down.
+    """
+    for label, entry in states.items():
+        if not isinstance(entry, dict):
+            yield prefix + label, entry
+            continue
+        own = {key: value for key, value in entry.items() if not isinstance(value, dict)}
+        deeper = {key: value for key, value in entry.items() if isinstance(value, dict)}
+        if own or not deeper:
+            yield prefix + label, own
+        yield from _state_entries(deeper, '{}{}/'.format(prefix, label))
+
+
+def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
+    """Dotted key -> line, from 1, of every key in the file.
+
+    :raises ConfigError: where a key is given twice in one mapping, which YAML readers otherwise pass over.
+    """
+    lines: Dict[str, int] = {}
+    open_nodes = [('', root)]
+    seen = set()  # an alias may lead back to where it stands
+    while open_nodes:
+        prefix, node = open_nodes.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            open_nodes += [('{}[{}].'.format(prefix[:-1], index), item) for index, item in enumerate(node.value)]
+        elif isinstance(node, yaml.MappingNode):
+            open_nodes += _entries(path, prefix, node, lines)
+    return lines
+
+
+def _entries(path: str, prefix: str, node: yaml.MappingNode, lines: Dict[str, int]) -> List[Tuple[str, yaml.Node]]:
+    entries = []
+    first_lines: Dict[str, int] = {}
+    for key, value in node.value:
+        dotted = prefix + str(key.value)
+        line = key.start_mark.line + 1
+        if dotted in first_lines and key.tag != 'tag:yaml.org,2002:merge':
+            raise ConfigError('{} line {}: {}'.format(path, line, dotted),
+                              'a second time (first in line {})'.format(first_lines[dotted]), 'each key once')
+        first_lines[dotted] = line
+        entries.append((dotted + '.', value))
+    lines.update(first_lines)
+    return entries
+
+
+def _marked(path: str, err: yaml.YAMLError) -> str:
+    mark = getattr(err, 'problem_mark', None)
+    return '{} line {}'.format(path, mark.line + 1) if mark else path

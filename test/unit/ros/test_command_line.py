@@ -1,0 +1,91 @@
+"""The command line of oracle_run: what is ours, what is the script's."""
+import pytest
+
+from smach_oracle.ros import script_runner
+from smach_oracle.ros.script_runner import OPTIONS_WITH_VALUE, make_parser, parse, split
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    path = tmp_path / 'task.py'
+    path.write_text('pass\n')
+    monkeypatch.chdir(tmp_path)
+    return 'task.py'
+
+
+def test_what_follows_the_script_is_the_scripts(script):
+    line = split(['--policy', 'prose', 'task.py', '--config', 'mine', '--', '-x', 'other.py'])
+    assert line == (['--policy', 'prose'], 'task.py', ['--config', 'mine', '--', '-x', 'other.py'])
+
+
+def test_remappings_pass_through_wherever_they_stand():
+    line = split(['__name:=robot', '--no-nested', 'a:=b', 'task.py', 'x', '_rate:=5'])
+    assert line == (['--no-nested'], 'task.py', ['x', '_rate:=5', '__name:=robot', 'a:=b'])
+
+
+def test_a_script_whose_name_begins_with_a_dash_can_be_named():
+    assert split(['--no-nested', '--', '-task.py', '-x']) == (['--no-nested'], '-task.py', ['-x'])
+
+
+def test_every_option_that_takes_a_value_is_known_to_the_splitter():
+    takes_value = {name for action in make_parser()._actions for name in action.option_strings
+                   if action.nargs != 0 and name.startswith('--')}
+    assert takes_value == set(OPTIONS_WITH_VALUE)
+
+
+def test_options_become_settings_and_options_of_the_process(script, tmp_path):
+    run = parse(['--policy=algorithm1', '--rates-file', 'rates.json', '--no-nested', '--without-oracle',
+                 '--record', 'bags', '--record-topic', '/tf', '--record-topic', '/camera', '--config', 'o.yaml',
+                 script, '--n', '3'])
+    assert run.overrides == {'policy': 'algorithm1', 'rates_file': str(tmp_path / 'rates.json'), 'nested': False}
+    assert run.options == (str(tmp_path / 'bags'), ('/tf', '/camera'))
+    assert (run.recover, run.config, run.script_args) == (False, 'o.yaml', ['--n', '3'])
+
+
+@pytest.mark.parametrize('args, message', [
+    (['--polcy', 'prose', 'task.py'], 'unrecognized arguments: --polcy'),
+    (['--policy', 'best', 'task.py'], "invalid choice: 'best'"),
+    (['--conf', 'x.yaml', 'task.py'], 'unrecognized arguments: --conf'),
+    (['--record'], 'expected one argument'),
+    (['no_such.py'], 'no_such.py: no such file'),
+    (['--no-nested'], 'which SCRIPT'),
+    (['__name:=x'], 'which SCRIPT'),
+])
+def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
+    with pytest.raises(SystemExit) as caught:
+        parse(args)
+    assert caught.value.code == script_runner.USAGE_ERROR
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('text, parts', [
+    ('polcy: prose\n', ['o.yaml line 1', 'polcy', 'one of the keys']),
+    ('states:\n  PICK:\n    memory: 0\n', ['o.yaml line 3', 'states.PICK.memory', '0', 'from 1']),
+    ('memory: [\n', ['o.yaml line', 'YAML']),
+    ('high_from: 0.2\n', ['o.yaml line 1', 'high_from', '0.2', 'at least']),
+    ('states: {PICK: {preconditions: ["python:os"]}}\n', ['o.yaml line 1', 'python:os', 'module:attribute']),
+])
+def test_a_mistake_in_the_file_is_told_before_the_script_starts(script, tmp_path, capsys, text, parts):
+    (tmp_path / 'o.yaml').write_text(text)
+    (tmp_path / 'task.py').write_text('raise AssertionError("started")\n')
+    with pytest.raises(SystemExit) as caught:
+        script_runner.main(['--config', 'o.yaml', script])
+    error = capsys.readouterr().err
+    assert caught.value.code == 2
+    assert all(part in error for part in parts), error
+    assert 'Traceback' not in error
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_script_starts(script, capsys):
+    with pytest.raises(SystemExit) as caught:
+        script_runner.main(['--record', '/proc/no_bags_here', script])
+    assert caught.value.code == 2
+    assert '/proc/no_bags_here' in capsys.readouterr().err
+
+
+def test_help_names_every_option(capsys):
+    with pytest.raises(SystemExit) as caught:
+        parse(['--help'])
+    text = capsys.readouterr().out
+    assert caught.value.code == 0
+    assert all(option in text for option in OPTIONS_WITH_VALUE + ('--no-nested', '--without-oracle', 'SCRIPT'))
