@@ -1,0 +1,168 @@
+"""What every front end for experts needs of ROS: the open questions of one or many servers, claims that stay alive
+while a person thinks, and answers.
+"""
+import threading
+import time
+from typing import Dict, List, Optional, Sequence
+
+import rosgraph
+import rospy
+
+from smach_oracle.msg import ExpertDecision, OpenQueries
+from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
+
+from .followed_server import FollowedServer, Listed, ServerGoneError
+
+LEASE_S = 15.0
+_DISCOVERY_PERIOD_S = 2.0
+_FAREWELL_S = 1.0  # for giving back claims at the end; a server or master that hangs does not hold it up
+
+
+class FrontEnd:
+    """Open questions, claims and answers for one expert; may be used from any thread.
+
+    Without names of servers it follows every topic of type smach_oracle/OpenQueries that the master knows, now or
+    later.
+    """
+
+    def __init__(self, expert: str, servers: Sequence[str] = (), lease_s: float = LEASE_S) -> None:
+        """`expert`: the name under which to claim and answer. `servers`: names such as /robot/expert_query."""
+        self.expert = expert
+        self._discover = not servers
+        self._lease_s = lease_s
+        self._changed = threading.Condition()
+        self._version = 0
+        self._servers: Dict[str, FollowedServer] = {}
+        self._held: Dict[str, Listed] = {}
+        self._stopped = threading.Event()
+        for name in servers:
+            self._follow(rospy.resolve_name(name))
+        self._threads = [threading.Thread(target=target, daemon=True, name=target.__name__)
+                         for target in (self._keep_connected, self._keep_claims)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def servers(self) -> List[str]:
+        """Names of the servers followed, sorted."""
+        return sorted(self._servers)
+
+    def connected(self, server: str) -> bool:
+        """Whether the server is there now."""
+        followed = self._servers.get(server)
+        return followed is not None and followed.connected
+
+    def questions(self) -> List[Listed]:
+        """Open questions of all servers, oldest first."""
+        found = [listed for server in list(self._servers.values()) for listed in server.questions()]
+        return sorted(found, key=lambda listed: (listed.asked_s, listed.key))
+
+    def find(self, key: str) -> Optional[Listed]:
+        """One open question by its key, None where it is open no longer."""
+        return next((listed for listed in self.questions() if listed.key == key), None)
+
+    def wait_for_change(self, version: int, timeout_s: float) -> int:
+        """Block until any list has come since `version` (from an earlier call; begin with 0), or the time is over."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._version != version or self._stopped.is_set(), timeout_s)
+            return self._version
+
+    def claim(self, listed: Listed, take_over: bool = False) -> ClaimQueryResponse:
+        """Claim a question, and keep the claim alive until it is answered, released or lost.
+
+        :raises ServerGoneError: if its server cannot be reached.
+        """
+        action = ClaimQueryRequest.TAKE_OVER if take_over else ClaimQueryRequest.CLAIM
+        response = self._server(listed).claim(listed.goal.query_id, self.expert, action, self._lease_s)
+        if response.ok:
+            self._held[listed.key] = listed
+        return response
+
+    def release(self, listed: Listed) -> None:
+        """Give a claim back; a server that cannot be reached lets it run out."""
+        if self._held.pop(listed.key, None) is None:
+            return
+        try:
+            self._server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RELEASE)
+        except ServerGoneError as err:
+            rospy.logdebug('A claim was not given back: %s', err)
+
+    def answer(self, listed: Listed, decision: ExpertDecision) -> AnswerQueryResponse:
+        """Settle a question under this expert's name; a refused answer leaves a claim as it is.
+
+        :raises ServerGoneError: if its server cannot be reached; the same answer may be sent again.
+        """
+        decision.by = self.expert
+        response = self._server(listed).answer(listed.goal.query_id, decision)
+        if response.ok:
+            self._held.pop(listed.key, None)
+        return response
+
+    def stop(self) -> None:
+        """Give all claims back and follow nothing any more; what cannot be done within a second is left."""
+        self._stopped.set()
+        farewell = threading.Thread(target=self._take_leave, daemon=True, name='farewell')
+        farewell.start()
+        farewell.join(_FAREWELL_S)
+        self._notify()
+
+    def _take_leave(self) -> None:
+        for listed in list(self._held.values()):
+            self.release(listed)
+        for server in list(self._servers.values()):
+            server.stop()
+
+    def _server(self, listed: Listed) -> FollowedServer:
+        return self._servers[listed.server]
+
+    def _follow(self, name: str) -> None:
+        self._servers[name] = FollowedServer(name, self._notify)
+
+    def _notify(self) -> None:
+        with self._changed:
+            self._version += 1
+            self._changed.notify_all()
+
+    def _keep_connected(self) -> None:
+        while not rospy.is_shutdown():
+            try:
+                self._look_for_servers(rosgraph.Master(rospy.get_name()).getPublishedTopics(''))
+            except (OSError, rosgraph.MasterException) as err:
+                rospy.logdebug('The master does not answer: %s', err)
+            if self._stopped.wait(_DISCOVERY_PERIOD_S):
+                return
+
+    def _look_for_servers(self, published: Sequence[Sequence[str]]) -> None:
+        lists = {topic for topic, kind in published if kind == OpenQueries._type and topic.endswith('/open')}
+        if self._discover:
+            for topic in sorted(lists):
+                name = topic[:-len('/open')]
+                if name not in self._servers:
+                    self._follow(name)
+        for name, server in list(self._servers.items()):
+            server.refresh(name + '/open' in lists)
+
+    def _keep_claims(self) -> None:
+        while not self._stopped.wait(self._lease_s / 3.0) and not rospy.is_shutdown():
+            for listed in list(self._held.values()):
+                self._renew(listed)
+
+    def _renew(self, listed: Listed) -> None:
+        """Renew a claim; forget it where it is lost, keep trying where the server only cannot be reached."""
+        try:
+            response = self._server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RENEW,
+                                                  self._lease_s)
+        except ServerGoneError as err:
+            rospy.logdebug('A claim was not renewed: %s', err)
+            return
+        if not response.ok:
+            self._held.pop(listed.key, None)
+
+
+def wait_for_question(front_end: FrontEnd, timeout_s: float) -> Optional[Listed]:
+    """The oldest open question, waiting for one for some time; None where none came."""
+    until_s = time.monotonic() + timeout_s
+    version = 0
+    while not front_end.questions() and time.monotonic() < until_s and not rospy.is_shutdown():
+        version = front_end.wait_for_change(version, min(0.5, max(0.0, until_s - time.monotonic())))
+    return next(iter(front_end.questions()), None)

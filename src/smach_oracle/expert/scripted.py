@@ -1,0 +1,141 @@
+"""An expert without a person: follows the open lists and answers by rules (`rules.py`)."""
+import os
+import threading
+import time
+from typing import Any, Dict, Mapping, NamedTuple, Optional
+
+import rospy
+import yaml
+
+from smach_oracle.msg import OpenQuery
+
+from ..oracle.errors import ConfigError, OracleError
+from ..ros.command_line import parameters_only
+from ..ros.master_watch import start_master_watch
+from ..ros.question_messages import to_decision
+from .followed_server import Listed, ServerGoneError
+from .front_end import FrontEnd
+from .rules import IGNORE, Rule, Rules
+
+ALL_SERVERS = 'all'
+_IDLE_S = 0.5
+_RETRY_S = 0.2
+
+
+class _Work(NamedTuple):
+    """A question that will be answered."""
+
+    listed: Listed
+    rule: Rule
+    due_s: float  # monotonic; infinity for a question left to others
+
+
+class ScriptedExpert:
+    """Answers every question of a front end by rules, in a thread of its own; questions wait side by side.
+
+    A question that another expert has claimed is left alone until it is free again.
+    """
+
+    def __init__(self, front_end: FrontEnd, rules: Rules) -> None:
+        self._front_end = front_end
+        self._rules = rules
+        self._work: Dict[str, _Work] = {}
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name='scripted expert', daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Answer nothing any more; the front end is stopped too."""
+        self._stopped = True
+        self._front_end.stop()
+        self._thread.join(0.5)  # it may be waiting for a server that does not answer
+
+    def _run(self) -> None:
+        version = 0
+        while not (self._stopped or rospy.is_shutdown()):
+            version = self._front_end.wait_for_change(version, self._pause_s())
+            self._take_in({listed.key: listed for listed in self._front_end.questions()})
+            now_s = time.monotonic()
+            for key, work in list(self._work.items()):
+                if work.due_s <= now_s:
+                    self._answer(key, work)
+
+    def _pause_s(self) -> float:
+        due_s = min((work.due_s for work in self._work.values()), default=float('inf'))
+        return max(0.0, min(_IDLE_S, due_s - time.monotonic()))
+
+    def _take_in(self, questions: Mapping[str, Listed]) -> None:
+        for key in set(self._work) - set(questions):
+            del self._work[key]
+        for key, listed in questions.items():
+            free = listed.status == OpenQuery.PENDING or listed.holder == self._front_end.expert
+            if key not in self._work and free and listed.status != OpenQuery.INTERFACE_RUNNING:
+                self._begin(key, listed)
+
+    def _begin(self, key: str, listed: Listed) -> None:
+        goal = listed.goal
+        rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path, goal.failed_state)
+        due_s = float('inf') if rule.kind == IGNORE else time.monotonic() + rule.delay_s
+        self._work[key] = _Work(listed, rule, due_s)
+        if rule.delay_s > 0 and rule.kind != IGNORE:
+            try:
+                self._front_end.claim(listed)
+            except ServerGoneError as err:
+                rospy.logwarn('%s', err)
+
+    def _answer(self, key: str, work: _Work) -> None:
+        try:
+            decision = to_decision(work.rule.answer(self._front_end.expert))
+            response = self._front_end.answer(work.listed, decision)
+        except ServerGoneError as err:
+            rospy.logwarn('%s', err)
+            self._work[key] = work._replace(due_s=time.monotonic() + _RETRY_S)
+            return
+        except OracleError as err:
+            rospy.logerr('The rule for %s cannot be sent: %s', work.listed.goal.failed_state, err)
+            self._leave(key, work)
+            return
+        if not response.ok:
+            rospy.logwarn('Answer for %s refused: %s', work.listed.goal.failed_state, response.message)
+        self._leave(key, work)
+
+    def _leave(self, key: str, work: _Work) -> None:
+        """Done with it: answered, or to be left to others."""
+        self._front_end.release(work.listed)
+        self._work[key] = work._replace(due_s=float('inf'))
+
+
+def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
+    """Rules from a dictionary, else from a YAML file.
+
+    :raises ConfigError: naming what is wrong with them, or with the file.
+    """
+    if rules:
+        return Rules.parse(rules)
+    if not path:
+        raise ConfigError('~rules', rules, 'rules in the parameter ~rules, or a YAML file in ~rules_file')
+    try:
+        with open(os.path.expanduser(path)) as file:
+            content = yaml.safe_load(file)
+    except (OSError, yaml.YAMLError) as err:
+        raise ConfigError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err
+    return Rules.parse(content)
+
+
+def main() -> None:
+    """Entry point of the node `scripted_expert`; parameters ~rules or ~rules_file, ~servers, ~expert."""
+    parameters_only('Node: an expert who answers by rules. Parameters: ~rules or ~rules_file, ~servers, ~expert; '
+                    'see doc/expert.md.')
+    rospy.init_node('scripted_expert')
+    start_master_watch()
+    try:
+        rules = load_rules(rospy.get_param('~rules', None), rospy.get_param('~rules_file', ''))
+    except ConfigError as err:
+        rospy.logfatal('%s', err)
+        raise SystemExit(2) from err
+    servers = rospy.get_param('~servers', ALL_SERVERS).split()
+    if servers == [ALL_SERVERS]:
+        servers = []
+    expert = ScriptedExpert(FrontEnd(rospy.get_param('~expert', '') or rospy.get_name().strip('/'), servers), rules)
+    rospy.on_shutdown(expert.stop)
+    rospy.spin()

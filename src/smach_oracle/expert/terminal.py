@@ -1,0 +1,300 @@
+"""The terminal front end: shows open questions, one at a time, and takes an expert's answers."""
+import argparse
+import getpass
+import json
+import math
+import socket
+import sys
+import time
+from typing import Callable, List, Optional, Sequence, Set
+
+import rosgraph
+import rospy
+from rich.console import Console
+from rich.text import Text
+
+from smach_oracle.msg import ExpertDecision, OpenQuery
+
+from ..oracle.errors import AnswerError
+from ..ros.master_watch import start_master_watch
+from ..ros.userdata_codec import encode
+from . import render
+from .followed_server import Listed, ServerGoneError
+from .front_end import FrontEnd, wait_for_question
+from .next_steps import NextSteps
+from .options import Option, choose, options
+from .prompts import Choice, Interrupted, JsonValidator, Prompts
+from .text import clean, duration
+
+_COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'), ('t', 'take it over from who holds it'),
+                           ('r', 'show the question again'), ('q', 'quit')]
+_FIRST_LIST_S = 1.0
+_RETURN_S = 20.0  # how long a server may take to come back, and its robots to ask it again
+
+
+class Leave(Exception):
+    """The expert is done with this question."""
+
+
+class Quit(Exception):
+    """The expert is done for today."""
+
+
+class Terminal:
+    """A conversation with one expert; claims are given back however it ends."""
+
+    def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
+                 next_steps: Callable[[str, str], NextSteps] = NextSteps) -> None:
+        self._next_steps = next_steps
+        self._front_end = front_end
+        self._console = console
+        self._prompts = prompts
+        self._left: Set[str] = set()  # questions that the expert has left to others
+        self._mine = False
+        self._missing_since_s = math.inf
+
+    def run(self) -> None:
+        """Until the expert quits, by q, Ctrl-C or end of file."""
+        try:
+            wait_for_question(self._front_end, _FIRST_LIST_S)  # the first lists are on their way
+            while not rospy.is_shutdown():
+                self._work_on(self._pick())
+        except (Quit, KeyboardInterrupt, EOFError):
+            self._say('Claims are given back. Good-bye.', 'dim')
+        finally:
+            self._front_end.stop()
+
+    def _pick(self) -> Listed:
+        """The question to work on: the only new one, else the one whose number is typed."""
+        while True:
+            waiting = self._waiting()
+            fresh = [each for each in waiting if each.key not in self._left and each.status == OpenQuery.PENDING]
+            if len(waiting) == 1 and fresh:
+                return fresh[0]
+            try:
+                if not waiting:
+                    self._wait_for_questions()
+                    continue
+                picked = self._pick_from(waiting)
+            except Interrupted:
+                continue  # the list has changed: show it anew
+            if picked is not None:
+                return picked
+
+    def _wait_for_questions(self) -> None:
+        self._say('No open questions; waiting. (q quits)', 'dim')
+        while True:
+            line = self._prompts.ask('', self._servers_line, lambda: 'a question' if self._waiting() else None)
+            _quit_on(line)
+
+    def _pick_from(self, waiting: Sequence[Listed]) -> Optional[Listed]:
+        self._console.print(render.overview(waiting, time.monotonic()))
+        keys = [each.key for each in waiting]
+        line = self._prompts.ask(
+            'question [1-{}]: '.format(len(waiting)), self._servers_line,
+            lambda: 'changed' if [each.key for each in self._waiting()] != keys else None,
+            [(str(number), '{} {}'.format(each.goal.robot, each.goal.failed_state))
+             for number, each in enumerate(waiting, 1)] + [('q', 'quit')])
+        _quit_on(line)
+        if line.isdigit() and 1 <= int(line) <= len(waiting):
+            return waiting[int(line) - 1]
+        self._say('{!r} is none of 1 to {}, q'.format(line, len(waiting)), 'red')
+        return None
+
+    def _waiting(self) -> List[Listed]:
+        return [each for each in self._front_end.questions() if each.status != OpenQuery.INTERFACE_RUNNING]
+
+    def _work_on(self, listed: Listed) -> None:
+        """Claim, show and answer one question."""
+        self._missing_since_s = math.inf
+        steps = self._next_steps(listed.goal.robot, listed.goal.trial_id)
+        try:
+            self._claim_first(listed)
+            self._console.rule(style='dim')
+            self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
+            while not self._answered(listed, steps):
+                pass
+        except Leave:
+            self._left.add(listed.key)
+        except Interrupted as reason:
+            self._say('\n{}'.format(reason), 'bold yellow')
+        finally:
+            self._front_end.release(listed)
+            steps.stop()
+
+    def _claim_first(self, listed: Listed) -> None:
+        """Claim it, if that can be done now: otherwise it is claimed while the expert reads (`_look`)."""
+        try:
+            self._claim(listed)
+        except ServerGoneError as err:
+            self._mine = False
+            self._say(str(err), 'red')
+
+    def _claim(self, listed: Listed, take_over: bool = False) -> None:
+        response = self._front_end.claim(listed, take_over)
+        self._mine = response.ok
+        if not response.ok and not response.holder:
+            raise Interrupted(response.message)
+        if not response.ok:
+            self._say('{}; t takes it over.'.format(response.message), 'yellow')
+
+    def _answered(self, listed: Listed, steps: NextSteps) -> bool:
+        """Ask for one line and do what it says; whether the question is settled by it."""
+        available = options(listed.goal)
+        line = self._ask(listed, '\nanswer: ', [(option.key, option.words) for option in available] + _COMMANDS)
+        try:
+            if self._command(listed, line):
+                return False
+            decision = self._decide(listed, choose(line, available))
+            return decision is not None and self._send(listed, decision, steps)
+        except (AnswerError, ServerGoneError) as err:
+            self._say(str(err), 'red')
+        return False
+
+    def _command(self, listed: Listed, line: str) -> bool:
+        """Do what is no answer; whether it was that."""
+        _quit_on(line)
+        if line == 'l':
+            raise Leave
+        if line == 't':
+            self._claim(listed, take_over=True)
+        elif line == 'r':
+            self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
+        return line in ('', 't', 'r')
+
+    def _decide(self, listed: Listed, option: Option) -> Optional[ExpertDecision]:
+        """The decision with its outputs and reason; None where Ctrl-C went back."""
+        self._say('→ {}'.format(option.words), 'bold')
+        try:
+            return self._complete(listed, option)
+        except KeyboardInterrupt:
+            self._say('Not sent.', 'dim')
+            return None
+
+    def _complete(self, listed: Listed, option: Option) -> ExpertDecision:
+        decision = option.decision()
+        if option.kind == ExpertDecision.SUPERSEDE:
+            for key in listed.goal.output_keys:
+                text = self._ask(listed, '  {} as JSON (empty: not set): '.format(clean(key)), [], JsonValidator())
+                if text:
+                    decision.outputs.append(encode(key, json.loads(text)))
+        decision.why = self._ask(listed, '  reason (optional): ', [])
+        return decision
+
+    def _send(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+        steps.forget()
+        response = self._front_end.answer(listed, decision)
+        if not response.ok:
+            self._say('Refused: {}'.format(response.message), 'red')
+            return False
+        self._say('✓ The robot has your answer.', 'bold green')
+        self._tell_next(listed, steps)
+        return True
+
+    def _tell_next(self, listed: Listed, steps: NextSteps) -> None:
+        silent = True
+        for event in steps.follow():
+            silent = False
+            self._say('  ' + render.what_happened(event), 'green')
+        if silent:
+            self._say('  What it does next is not known: no events on {}/oracle/events.'.format(listed.goal.robot),
+                      'dim')
+
+    def _ask(self, listed: Listed, message: str, choices: Sequence[Choice],
+             validator: Optional[JsonValidator] = None) -> str:
+        return self._prompts.ask(message, lambda: self._status_line(listed), lambda: self._look(listed), choices,
+                                 validator)
+
+    def _look(self, listed: Listed) -> Optional[str]:
+        """Why to stop working on a question; None as long as it is ours to answer."""
+        if not self._front_end.connected(listed.server):
+            return self._gone_for_good('{} is gone.'.format(listed.server))
+        now = self._front_end.find(listed.key)
+        try:
+            if now is None:
+                return self._why_gone(listed)
+            self._missing_since_s = math.inf
+            if self._mine and now.holder not in ('', self._front_end.expert):
+                self._mine = False
+                return '{} has taken this question over.'.format(clean(now.holder))
+            if not now.holder:  # our claim is gone with a restarted server, or who held it has left
+                self._mine = self._front_end.claim(listed).ok
+        except ServerGoneError:
+            pass
+        return None
+
+    def _why_gone(self, listed: Listed) -> Optional[str]:
+        """Who settled it; a server that knows nothing of it was restarted, and is asked again by a living robot."""
+        response = self._front_end.claim(listed)
+        if response.ok:
+            return None
+        unknown = response.message.startswith('there is no question')
+        return self._gone_for_good(response.message) if unknown else response.message
+
+    def _gone_for_good(self, why: str) -> Optional[str]:
+        """The reason, once a server or its robot has had time to come back."""
+        now_s = time.monotonic()
+        self._missing_since_s = min(self._missing_since_s, now_s)
+        return why if now_s - self._missing_since_s > _RETURN_S else None
+
+    def _status_line(self, listed: Listed) -> str:
+        now = self._front_end.find(listed.key) or listed
+        parts = [self._front_end.expert, 'no time limit' if now.deadline_s == math.inf
+                 else '{} left'.format(duration(now.deadline_s - time.monotonic()))]
+        if not self._front_end.connected(listed.server):
+            parts.append('{} is gone; waiting for it'.format(listed.server))
+        elif not self._mine:
+            parts.append('{} works on it'.format(now.holder or 'nobody'))
+        others = len(self._waiting()) - 1
+        if others > 0:
+            parts.append('{} more'.format(others))
+        parts.append('{} in {}'.format(listed.goal.failed_state, listed.goal.container_path))
+        return ' · '.join(parts)
+
+    def _servers_line(self) -> str:
+        servers = ['{}{}'.format(name, '' if self._front_end.connected(name) else ' (gone)')
+                   for name in self._front_end.servers]
+        running = ['interface {} runs for {}'.format(each.goal.interface, each.goal.failed_state)
+                   for each in self._front_end.questions() if each.status == OpenQuery.INTERFACE_RUNNING]
+        return ' · '.join([self._front_end.expert, ', '.join(servers) or 'no server found yet'] + running)
+
+    def _say(self, text: str, style: str) -> None:
+        self._console.print(Text(clean(text, lines=True), style))
+
+
+def _quit_on(line: str) -> None:
+    if line == 'q':
+        raise Quit
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog='expert_terminal', description='Answers the questions of robots.')
+    parser.add_argument('--server', action='append', default=[], metavar='NAME',
+                        help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
+                             '(default: all that the master knows)')
+    parser.add_argument('--name', default='{}@{}'.format(getpass.getuser(), socket.gethostname()),
+                        help='your name, as robots and other experts see it (default: %(default)s)')
+    return parser.parse_args(arguments)
+
+
+def _wait_for_master(console: Console) -> None:
+    """rospy would wait without a word."""
+    if not rosgraph.is_master_online():
+        console.print(Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()), 'yellow'))
+    while not rosgraph.is_master_online():
+        time.sleep(0.5)
+
+
+def main() -> None:
+    """Entry point of `expert_terminal`."""
+    options_given = _parse(rospy.myargv(sys.argv)[1:])
+    console = Console()
+    try:
+        _wait_for_master(console)
+        # a name of its own each; Ctrl-C is ours; the log stays off the screen (its file has it)
+        rospy.init_node('expert_terminal', anonymous=True, disable_signals=True, log_level=rospy.FATAL)
+    except KeyboardInterrupt:
+        return
+    start_master_watch()
+    Terminal(FrontEnd(options_given.name, options_given.server), console, Prompts()).run()
+    rospy.signal_shutdown('the expert has left')

@@ -1,0 +1,42 @@
+"""What of a goal on its way counts as lost; no master."""
+import time
+
+import pytest
+from actionlib import CommState
+
+from smach_oracle.ros.goal_link import SentGoal
+
+
+class FakeHandle:
+    def __init__(self, state):
+        self._state = state
+
+    def get_comm_state(self):
+        return self._state
+
+    def get_terminal_state(self):
+        return 3
+
+    def get_result(self):
+        return 'the result'
+
+
+def sent_and_seen(*states):
+    sent = SentGoal(time.monotonic())
+    for state in states:
+        sent.on_transition(FakeHandle(state))
+    return sent
+
+
+@pytest.mark.parametrize('states, lost', [
+    ([], True), ([CommState.PENDING], False), ([CommState.PENDING, CommState.ACTIVE], False),
+    ([CommState.ACTIVE, CommState.WAITING_FOR_RESULT], True)])
+def test_a_goal_nobody_took_up_and_an_end_without_a_result_are_lost_in_time(states, lost):
+    sent = sent_and_seen(*states)
+    assert not sent.unheard(time.monotonic() + 1.0)
+    assert sent.unheard(time.monotonic() + 60.0) == lost
+
+
+def test_a_result_that_is_here_is_an_event():
+    event = sent_and_seen(CommState.ACTIVE, CommState.WAITING_FOR_RESULT, CommState.DONE).poll(0.0)
+    assert (event.status, event.result) == (3, 'the result')

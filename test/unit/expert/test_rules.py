@@ -1,0 +1,99 @@
+"""Experts without a person: what rules answer, and how wrong rules are refused."""
+import threading
+import time
+
+import pytest
+from expert_fixtures import make_question
+
+from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
+from smach_oracle.expert.scripted import load_rules
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.question import Answer, AnswerKind, InterfaceOffer
+
+GOTO = {'kind': 'goto', 'state': 'DETECT'}
+ASSIST = {'kind': 'interface', 'interface': 'assist'}
+
+
+def test_the_most_specific_rule_answers():
+    rules = Rules.parse({'default': {'kind': 'give_up'}, 'PICK': GOTO, 'KITCHEN/PICK': ASSIST})
+    assert rules.next('/r', 't', 'KITCHEN', 'PICK').kind == 'interface'
+    assert rules.next('/r', 't', 'HALL', 'PICK').kind == 'goto'
+    assert rules.next('/r', 't', 'HALL', 'PLACE').kind == 'give_up'
+
+
+def test_without_a_rule_the_question_is_left_to_others():
+    assert Rules.parse({'PICK': GOTO}).next('/r', 't', 'HALL', 'PLACE') == Rule(IGNORE)
+
+
+def test_several_rules_of_a_state_are_used_one_after_another_in_every_trial():
+    rules = Rules.parse({'PICK': [GOTO, ASSIST]})
+    kinds = [rules.next('/r', trial, 'P', 'PICK').kind for trial in ('t1', 't1', 't1', 't2', 't2')]
+    assert kinds == ['goto', 'interface', 'interface', 'goto', 'interface']
+
+
+def test_robots_do_not_use_up_each_other_s_rules():
+    rules = Rules.parse({'PICK': [GOTO, ASSIST]})
+    assert [rules.next(robot, 't', 'P', 'PICK').kind for robot in ('/a', '/b')] == ['goto', 'goto']
+
+
+@pytest.mark.parametrize('settings, text', [
+    ('PICK', "rules: 'PICK' is not allowed; allowed: a mapping"),
+    ({'PICK': []}, 'PICK: .* is not allowed; allowed: a rule'),
+    ({'PICK': 'goto DETECT'}, "PICK: 'goto DETECT' is not allowed; allowed: a mapping with a kind"),
+    ({'PICK': {'kind': 'go'}}, "PICK.kind: 'go' is not allowed; .*: give_up, goto, interface, supersede or ignore"),
+    ({'PICK': {'state': 'DETECT'}}, 'PICK.kind: None is not allowed'),
+    ({'PICK': [GOTO, {'kind': 'goto'}]}, r'PICK\[1\].state: None is not allowed; allowed: a name; goto needs one'),
+    ({'PICK': dict(GOTO, delay=3)}, 'PICK.delay: .* allowed: the keys kind, state'),
+    ({'PICK': dict(GOTO, delay_s=-1)}, 'PICK.delay_s: -1 is not allowed; allowed: seconds from 0'),
+    ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
+    ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
+    ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed; allowed: a string'),
+    ({3: GOTO}, 'allowed: labels of states as keys')])
+def test_wrong_rules_are_refused_with_what_is_allowed(settings, text):
+    with pytest.raises(ConfigError, match=text):
+        Rules.parse(settings)
+
+
+def test_rules_come_from_a_file(tmp_path):
+    path = tmp_path / 'rules.yaml'
+    path.write_text('PICK: {kind: goto, state: DETECT}')
+    assert load_rules(None, str(path)).next('/r', 't', 'P', 'PICK').state == 'DETECT'
+    path.write_text('PICK: {kind: goto')
+    for wrong in (str(path), str(tmp_path / 'none.yaml'), ''):
+        with pytest.raises(ConfigError):
+            load_rules(None, wrong)
+
+
+def ask(rules, cancelled=None, **changes):
+    return RuleExpert(Rules.parse(rules)).ask(make_question(**changes), cancelled or threading.Event(),
+                                              lambda *_: None)
+
+
+def test_an_expert_by_rules_answers_in_the_same_process():
+    answer = ask({'PICK': {'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'grasped': 'mug'}, 'why': 'test'}})
+    assert answer == Answer(AnswerKind.SUPERSEDE, outcome='succeeded', outputs={'grasped': 'mug'}, by='scripted',
+                            why='test')
+
+
+def test_an_answer_that_comes_after_the_deadline_is_none():
+    begun_s = time.monotonic()
+    assert ask({'PICK': dict(GOTO, delay_s=60)}, deadline_s=0.1) is None
+    assert ask({'PICK': {'kind': 'ignore'}}, deadline_s=0.1) is None
+    assert 0.2 <= time.monotonic() - begun_s < 10.0
+
+
+def test_a_question_taken_back_is_not_waited_for():
+    cancelled = threading.Event()
+    threading.Timer(0.1, cancelled.set).start()
+    assert ask({'PICK': {'kind': 'ignore'}}, cancelled) is None
+
+
+def test_an_expert_by_rules_runs_the_interfaces_it_was_given():
+    done = Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='assist')
+    expert = RuleExpert(Rules({}), interfaces={'assist': lambda question: done})
+    told = []
+    run = [expert.run_interface(InterfaceOffer(name, '/x'), make_question(), threading.Event(),
+                                lambda *what: told.append(what)) for name in ('assist', 'other')]
+    assert run == [done, None]
+    assert told == [('interface_start', 'assist', ''), ('interface_end', 'assist', 'succeeded'),
+                    ('interface_start', 'other', ''), ('interface_end', 'other', '')]

@@ -1,0 +1,277 @@
+"""A conversation at the terminal, typed key by key into a pipe, with a front end that plays the rest of the world."""
+import io
+import json
+import math
+import threading
+import time
+
+import pytest
+from expert_fixtures import make_question
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
+from rich.console import Console
+
+import rospy
+from smach_oracle.expert import terminal
+from smach_oracle.expert.followed_server import Listed, ServerGoneError
+from smach_oracle.expert.prompts import Interrupted, JsonValidator, Prompts, ValidationError
+from smach_oracle.expert.terminal import Terminal
+from smach_oracle.msg import ExpertDecision, OpenQuery, OracleEvent
+from smach_oracle.ros.question_messages import to_goal
+from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
+
+ENTER, CTRL_C, CTRL_D = '\r', '\x03', '\x04'
+
+
+class FakeFrontEnd:
+    """Questions that a test opens and settles; what is asked of it is kept."""
+
+    def __init__(self, *goals):
+        self.expert = 'ann'
+        self.servers = ['/robot/expert_query']
+        self.listed = [Listed('/robot/expert_query', goal, OpenQuery.PENDING, '', time.monotonic(), math.inf)
+                       for goal in goals]
+        self.settled = {}
+        self.decisions = []
+        self.refusals = []
+        self.claims = []
+        self.released = []
+        self.stopped = False
+        self.alive = True
+        self.unreachable = 0  # that many calls of `claim` fail
+
+    def questions(self):
+        return [each for each in self.listed if each.key not in self.settled] if self.alive else []
+
+    def find(self, key):
+        return next((each for each in self.questions() if each.key == key), None)
+
+    def wait_for_change(self, version, timeout_s):
+        time.sleep(min(timeout_s, 0.01))
+        return version
+
+    def connected(self, server):
+        return self.alive
+
+    def hold(self, holder):
+        self.listed = [each._replace(holder=holder, status=OpenQuery.CLAIMED) for each in self.listed]
+
+    def claim(self, listed, take_over=False):
+        self.claims.append((listed.goal.query_id, take_over))
+        if self.unreachable:
+            self.unreachable -= 1
+            raise ServerGoneError('unable to contact master')
+        if listed.key in self.settled:
+            return ClaimQueryResponse(False, self.settled[listed.key], '')
+        holder = self.find(listed.key).holder
+        if holder not in ('', self.expert) and not take_over:
+            return ClaimQueryResponse(False, '{} works on this question'.format(holder), holder)
+        self.hold(self.expert)
+        return ClaimQueryResponse(True, '', self.expert)
+
+    def release(self, listed):
+        self.released.append(listed.goal.query_id)
+
+    def answer(self, listed, decision):
+        if self.refusals:
+            return AnswerQueryResponse(False, self.refusals.pop(0), ExpertDecision())
+        self.decisions.append(decision)
+        self.settled[listed.key] = 'ann was first'
+        return AnswerQueryResponse(True, '', decision)
+
+    def stop(self):
+        self.stopped = True
+
+
+class FakeSteps:
+    """What the robot does next, as a test wants it."""
+
+    events = [OracleEvent(kind=OracleEvent.JUMP, target='DETECT'), OracleEvent(kind=OracleEvent.STATE_START,
+                                                                              state='DETECT')]
+
+    def __init__(self, robot, trial_id):
+        self.robot = robot
+
+    def forget(self):
+        pass
+
+    def follow(self):
+        return iter(self.events)
+
+    def stop(self):
+        pass
+
+
+def goal(query_id='q1', **changes):
+    return to_goal(make_question(query_id, **changes), '/robot', rospy.Time(1))
+
+
+def converse(front_end, typed, meanwhile=None, steps=FakeSteps, after_s=0.8):
+    """Type all that into a terminal; what it has shown when it ends."""
+    console = Console(file=io.StringIO(), width=100)
+    with create_pipe_input() as keys:
+        keys.send_text(typed)
+        if meanwhile is not None:
+            threading.Timer(after_s, meanwhile, [keys]).start()
+        Terminal(front_end, console, Prompts(keys, DummyOutput()), steps).run()
+    return console.file.getvalue()
+
+
+def test_an_answer_by_number_is_sent_with_its_reason_and_what_followed_is_told():
+    front_end = FakeFrontEnd(goal())
+    shown = converse(front_end, '1' + ENTER + 'seen on the camera' + ENTER + 'q' + ENTER)
+    decision, = front_end.decisions
+    assert (decision.kind, decision.state, decision.why) == (ExpertDecision.GOTO, 'DETECT', 'seen on the camera')
+    assert front_end.claims[0] == ('q1', False) and front_end.stopped
+    for part in ('/robot asks about PICK_AND_PLACE', '✓ The robot has your answer.', 'The machine goes to DETECT.',
+                 'DETECT runs.', 'No open questions; waiting.'):
+        assert part in shown
+
+
+def test_superseding_asks_for_the_output_userdata_as_json():
+    front_end = FakeFrontEnd(goal(output_keys=('grasped', 'grip', 'unused')))
+    converse(front_end, ENTER.join(['s1', '{"name": "mug"}', '0.02', '', '', 'q', '']))
+    decision, = front_end.decisions
+    assert (decision.kind, decision.outcome) == (ExpertDecision.SUPERSEDE, 'succeeded')
+    assert {item.key: json.loads(bytes(item.value)) for item in decision.outputs} == {
+        'grasped': {'name': 'mug'}, 'grip': 0.02}
+
+
+def test_what_cannot_be_understood_or_is_refused_is_told_and_asked_again():
+    front_end = FakeFrontEnd(goal())
+    front_end.refusals = ['PICK_AND_PLACE has no state']
+    shown = converse(front_end, ENTER.join(['x', 'PLACE', '1', '', 'g', 'enough', 'q', '']))
+    assert "'x' is no answer here" in shown
+    assert 'PLACE cannot be entered now' in shown
+    assert 'Refused: PICK_AND_PLACE has no state' in shown
+    assert [(decision.kind, decision.why) for decision in front_end.decisions] == [(ExpertDecision.GIVE_UP, 'enough')]
+
+
+@pytest.mark.parametrize('key', [CTRL_C, CTRL_D])
+def test_leaving_the_program_gives_the_claim_back(key):
+    front_end = FakeFrontEnd(goal())
+    assert 'Good-bye' in converse(front_end, key)
+    assert front_end.released == ['q1'] and front_end.stopped and not front_end.decisions
+
+
+def test_ctrl_c_at_the_reason_sends_nothing_and_asks_again():
+    front_end = FakeFrontEnd(goal())
+    shown = converse(front_end, '1' + ENTER + 'no' + CTRL_C + 'q' + ENTER)
+    assert 'Not sent.' in shown and not front_end.decisions
+
+
+def test_ctrl_c_after_an_answer_does_not_call_it_unsent():
+    class Interrupting(FakeSteps):
+        def follow(self):
+            raise KeyboardInterrupt
+
+    front_end = FakeFrontEnd(goal())
+    shown = converse(front_end, ENTER.join(['1', '', '']), steps=Interrupting)
+    assert len(front_end.decisions) == 1
+    assert 'Not sent.' not in shown and 'Good-bye' in shown
+
+
+def test_a_question_that_cannot_be_claimed_yet_is_shown_once_and_claimed_later():
+    front_end = FakeFrontEnd(goal())
+    front_end.unreachable = 3
+
+    def answer_late(keys):
+        keys.send_text(ENTER.join(['1', '', 'q', '']))
+
+    shown = converse(front_end, '', answer_late, after_s=2.5)
+    assert shown.count('unable to contact master') == 1
+    assert shown.count('/robot asks about PICK_AND_PLACE') == 1
+    assert front_end.unreachable == 0 and len(front_end.decisions) == 1
+
+
+def test_a_question_settled_elsewhere_ends_the_typing():
+    front_end = FakeFrontEnd(goal())
+
+    def bob_answers(keys):
+        front_end.settled[front_end.listed[0].key] = 'bob was first: go to PICK'
+        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
+
+    shown = converse(front_end, 'goto DET', bob_answers)
+    assert 'bob was first: go to PICK' in shown and not front_end.decisions
+    assert 'No open questions; waiting.' in shown
+
+
+def test_a_robot_that_dies_is_waited_for_only_so_long(monkeypatch):
+    monkeypatch.setattr(terminal, '_RETURN_S', 1.0)
+    front_end = FakeFrontEnd(goal())
+
+    def robot_dies(keys):
+        front_end.alive = False
+        threading.Timer(2.5, keys.send_text, ['q' + ENTER]).start()
+
+    shown = converse(front_end, '', robot_dies)
+    assert '/robot/expert_query is gone.' in shown
+    assert shown.index('is gone.') < shown.index('No open questions; waiting.')
+
+
+def test_a_question_taken_over_by_another_is_told_and_can_be_taken_back():
+    front_end = FakeFrontEnd(goal())
+
+    def bob_takes_over(keys):
+        front_end.hold('bob')
+        threading.Timer(1.0, keys.send_text, [ENTER.join(['1', 't', '1', '', 'q', ''])]).start()
+
+    shown = converse(front_end, '', bob_takes_over)
+    assert 'bob has taken this question over.' in shown
+    assert 'bob works on this question; t takes it over.' in shown
+    assert front_end.claims[-1] == ('q1', True) and len(front_end.decisions) == 1
+
+
+def test_of_several_questions_one_is_picked_by_its_number():
+    front_end = FakeFrontEnd(goal('q1'), goal('q2', failed_state='OPEN_FRIDGE'))
+    shown = converse(front_end, ENTER.join(['7', '2', '1', '', 'q', '']))
+    assert "'7' is none of 1 to 2" in shown and 'PICK_AND_PLACE/OPEN_FRIDGE' in shown
+    assert front_end.claims[0] == ('q2', False)
+
+
+def test_a_question_left_to_others_is_offered_again_but_not_opened_by_itself():
+    front_end = FakeFrontEnd(goal())
+    shown = converse(front_end, ENTER.join(['l', 'q', '']))
+    assert front_end.released == ['q1'] and not front_end.decisions
+    assert 'PICK_AND_PLACE/PICK' in shown.split('answer')[-1]
+
+
+def test_a_question_that_comes_while_waiting_is_shown_at_once():
+    front_end = FakeFrontEnd()
+
+    def arrives(keys):
+        front_end.listed = FakeFrontEnd(goal()).listed
+        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
+
+    shown = converse(front_end, '', arrives, after_s=1.6)
+    assert shown.index('No open questions') < shown.index('/robot asks about PICK_AND_PLACE')
+
+
+def test_a_robot_without_events_is_said_to_be_silent():
+    class Silent(FakeSteps):
+        events = []
+
+    shown = converse(FakeFrontEnd(goal()), ENTER.join(['1', '', 'q', '']), steps=Silent)
+    assert 'no events on /robot/oracle/events' in shown
+
+
+def test_a_prompt_ends_when_what_it_asks_about_is_over():
+    with create_pipe_input() as keys:
+        with pytest.raises(Interrupted, match='over'):
+            Prompts(keys, DummyOutput()).ask('? ', lambda: 'bar', lambda: 'over')
+
+
+class FakeDocument:
+    def __init__(self, text):
+        self.text = text
+
+
+@pytest.mark.parametrize('text', ['', ' ', '1', '"a"', '{"a": [null]}'])
+def test_json_and_nothing_are_taken(text):
+    JsonValidator().validate(FakeDocument(text))
+
+
+@pytest.mark.parametrize('text', ['mug', '{', 'NaN', "{'a': 1}"])
+def test_what_is_not_json_is_told_while_typing(text):
+    with pytest.raises(ValidationError, match='not JSON'):
+        JsonValidator().validate(FakeDocument(text))
