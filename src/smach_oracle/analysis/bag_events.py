@@ -1,0 +1,106 @@
+"""Finds bags and reads the executive's events out of them, with rosbags: no ROS installation is needed."""
+import json
+import os
+import sys
+from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
+
+try:
+    from rosbags.rosbag1 import Reader
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+except ImportError as err:
+    raise ImportError('Bags are read with the Python package rosbags, which {} does not have ({}). Install it (pip '
+                      "install rosbags), or run the command with the Python of this package's virtual environment."
+                      .format(sys.executable, err)) from err
+
+from ..oracle.errors import OracleError
+from ..oracle.events import Event, EventKind
+
+EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
+_KINDS = {int(kind): kind for kind in EventKind}
+
+
+class BagError(OracleError):
+    """A bag cannot be used; the text says why."""
+
+
+class Skipped(NamedTuple):
+    """A bag that was not used."""
+
+    path: str
+    reason: str
+
+
+def find_bags(places: Sequence[str]) -> List[str]:
+    """Paths of all bags in folders and below, also unfinished ones (`.bag.active`), sorted; each once.
+
+    A path of a file is taken as it is. Left out: the backups `X.orig.bag` that `rosbag reindex` makes of `X.bag`.
+
+    Raises BagError where a place does not exist.
+    """
+    found: Dict[str, None] = {}
+    for place in places:
+        if os.path.isfile(place):
+            found[os.path.realpath(place)] = None
+        elif not os.path.isdir(place):
+            raise BagError('{}: no such folder'.format(place))
+        else:
+            found.update((os.path.realpath(path), None) for path in _walk(place))
+    return sorted(found)
+
+
+def _walk(folder: str) -> Iterator[str]:
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            backup_of = name[:-len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
+            if name.endswith(('.bag', '.bag.active')) and backup_of not in names:
+                yield os.path.join(parent, name)
+
+
+class EventReader:
+    """Reads events out of bags; remembers the message definitions it has met, so that many bags are quick."""
+
+    def __init__(self) -> None:
+        self._stores: Dict[str, Any] = {}  # by message definition: another release's events may have other fields
+
+    def read(self, path: str) -> List[Event]:
+        """All events in a bag, in the order of their recording; the topic's name does not matter.
+
+        Raises BagError.
+        """
+        if path.endswith('.active'):
+            raise BagError('still being recorded, or its recorder died: start the recorder again in this folder, '
+                           'or run `rosbag reindex` on it and take the .active off its name')
+        try:
+            return self._read(path)
+        except BagError:
+            raise
+        except Exception as err:  # a damaged file can make rosbags raise anything, assertions among it
+            raise BagError('damaged, or no bag: {}'.format(_words(err))) from err
+
+    def _read(self, path: str) -> List[Event]:
+        with Reader(path) as reader:
+            connections = [item for item in reader.connections if item.msgtype == EVENT_TYPE]
+            if not connections:
+                raise BagError('no events of the executive in it')
+            stores = {item.id: self._store(item.msgdef) for item in connections}
+            return [_event(stores[item.id].deserialize_ros1(data, EVENT_TYPE))
+                    for item, _, data in reader.messages(connections)]
+
+    def _store(self, definition: Any) -> Any:
+        text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
+        if text not in self._stores:
+            store = get_typestore(Stores.EMPTY)
+            store.register(get_types_from_msg(text, EVENT_TYPE))
+            self._stores[text] = store
+        return self._stores[text]
+
+
+def _event(message: Any) -> Event:
+    kind = _KINDS.get(message.kind, message.kind)  # a later release may know more kinds
+    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path, message.state, message.outcome,
+                 message.target, message.failure_kind, message.failure_class, message.rate, message.continuous,
+                 message.query_id, message.by, message.text, json.loads(message.data) if message.data else None)
+
+
+def _words(err: Exception) -> str:
+    return str(err).strip().rstrip('.') or type(err).__name__

@@ -1,0 +1,85 @@
+"""Count what happened in recorded trials: the paper's Table I, its time series, and the data behind them.
+
+Exit code: 0, all bags were read; 1, some were skipped; 2, there was nothing to count or an output cannot be written.
+"""
+import argparse
+import os
+import re
+import sys
+from typing import List, Optional, Sequence
+
+from ..oracle.naming import DEFAULT_FAILING_OUTCOMES, FailingNames
+from . import table
+from .bag_events import BagError, Skipped
+from .trials import Trials, TrialSummary, load_trials
+
+ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Run the command; returns its exit code."""
+    args = _parse(argv)
+    try:
+        found = load_trials(args.folders, FailingNames(args.failing_outcomes))
+        groups = table.make_groups(found.trials)
+        sys.stdout.write(table.format_text(groups))
+        _warn_of(found.skipped)
+        _write_files(args, found, groups)
+    except BagError as err:
+        return _complain(str(err))
+    except OSError as err:
+        return _complain('{}: {}'.format(err.filename or 'output', err.strerror or err))
+    except ImportError as err:
+        return _complain('the figure needs matplotlib: {}'.format(err))
+    return SOME_SKIPPED if found.skipped else ALL_READ
+
+
+def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog='bag_statistics', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', help='with bags in it or below it; or a bag')
+    parser.add_argument('--figure', metavar='OUT', help='write the time series to OUT.svg and OUT.png')
+    parser.add_argument('--columns', type=int, choices=(1, 2), default=1,
+                        help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)')
+    parser.add_argument('--x-axis', choices=('trials', 'time'), default='trials',
+                        help='of the figure: number of the trial, or time since the first (default: trials)')
+    parser.add_argument('--json', metavar='OUT', help='write the table, all trials and the skipped bags as JSON')
+    parser.add_argument('--csv', metavar='OUT', help='write one line a trial')
+    parser.add_argument('--failing-outcomes', nargs='+', metavar='NAME', default=list(DEFAULT_FAILING_OUTCOMES),
+                        help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
+                            ' '.join(DEFAULT_FAILING_OUTCOMES)))
+    return parser.parse_args(argv)
+
+
+def _write_files(args: argparse.Namespace, found: Trials, groups: List[table.Group]) -> None:
+    if args.json:
+        with open(args.json, 'w', encoding='utf-8') as target:
+            table.write_json(target, groups, found.trials, found.skipped)
+    if args.csv:
+        with open(args.csv, 'w', encoding='utf-8', newline='') as target:
+            table.write_csv(target, found.trials)
+    if args.figure:
+        _write_figures(args, found.trials)
+
+
+def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> None:
+    from .figure import save_time_series  # matplotlib takes a second: only where it is wanted
+    stem = re.sub(r'\.(svg|png)$', '', args.figure)
+    experiments = sorted({trial.experiment for trial in trials})
+    for experiment in experiments:
+        suffix = '' if len(experiments) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]', '_', experiment)
+        chosen = [trial for trial in trials if trial.experiment == experiment]
+        for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
+            sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
+
+
+def _warn_of(skipped: Sequence[Skipped]) -> None:
+    sys.stdout.flush()
+    for item in skipped:
+        sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
+
+
+def _complain(text: str) -> int:
+    sys.stdout.flush()
+    sys.stderr.write('bag_statistics: {}\n'.format(text))
+    return NOTHING_COUNTED

@@ -1,0 +1,125 @@
+"""`bag_statistics FOLDER` as a user runs it."""
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from smach_oracle.analysis import bag_statistics
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_the_table_of_both_arms(both_arms, capsys):
+    assert bag_statistics.main([str(both_arms)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ''
+    rows = [line.split() for line in out.splitlines() if line.startswith('PICK_AND_PLACE  ')]
+    assert [row[1:4] for row in rows] == [['with', 'oracle', '150'], ['without', 'oracle', '150']]
+    assert rows[0][4] == rows[1][8]  # the same faults: a trial that was recovered fails without the oracle
+
+
+def test_the_same_bags_give_the_same_output(both_arms, capsys, tmp_path):
+    outputs = []
+    for _run in range(2):
+        bag_statistics.main([str(both_arms), '--json', str(tmp_path / 'json'), '--csv', str(tmp_path / 'csv')])
+        outputs.append((capsys.readouterr().out, (tmp_path / 'json').read_text(), (tmp_path / 'csv').read_text()))
+    assert outputs[0] == outputs[1]
+
+
+def test_folders_may_be_given_one_by_one_and_bags_too(both_arms, capsys):
+    bag_statistics.main([str(both_arms)])
+    whole = capsys.readouterr().out
+    bag_statistics.main([str(both_arms / 'without_oracle'), str(both_arms / 'with_oracle')])
+    assert capsys.readouterr().out == whole
+    bag = sorted((both_arms / 'with_oracle').iterdir())[0]
+    assert bag_statistics.main([str(bag)]) == 0
+    assert 'with oracle: 1 runs' in capsys.readouterr().out
+
+
+def test_files_are_written_where_asked(both_arms, tmp_path, capsys):
+    figure = tmp_path / 'time_series.png'  # with or without an ending
+    assert bag_statistics.main([str(both_arms), '--figure', str(figure), '--json', str(tmp_path / 'a.json')]) == 0
+    assert figure.stat().st_size > 10_000 and (tmp_path / 'time_series.svg').stat().st_size > 10_000
+    data = json.loads((tmp_path / 'a.json').read_text())
+    assert len(data['trials']) == 300 and data['skipped'] == []
+    assert str(figure) in capsys.readouterr().out
+
+
+def test_two_experiments_have_a_figure_each(record, tmp_path, capsys):
+    from fake_trials import FakeMachine
+
+    from smach_oracle.ros.recorder import TrialRecorder
+    record('pick', 3)
+    recorder = TrialRecorder(str(tmp_path / 'drink'))
+    FakeMachine(recorder, path='DRINK').run(1, trial_id='drink 1')
+    recorder.close(20.0)
+    assert bag_statistics.main([str(tmp_path), '--figure', str(tmp_path / 'f')]) == 0
+    assert sorted(path.name for path in tmp_path.glob('f_*')) == [
+        'f_DRINK.png', 'f_DRINK.svg', 'f_PICK_AND_PLACE.png', 'f_PICK_AND_PLACE.svg']
+
+
+def test_skipped_bags_are_named_and_the_exit_code_tells(record, capsys):
+    folder = record('bags', 2)
+    Path(folder, 'broken.bag').write_text('?')
+    assert bag_statistics.main([folder]) == 1
+    out, err = capsys.readouterr()
+    assert 'with oracle: 2 runs' in out
+    assert 'broken.bag' in err and 'magic' in err
+
+
+@pytest.mark.parametrize('prepare, words', [
+    (lambda folder: None, 'no such folder'),
+    (lambda folder: folder.mkdir(), 'no bags'),
+    (lambda folder: (folder.mkdir(), (folder / 'x.bag').write_text('?')), 'nothing was recorded'),
+])
+def test_nothing_to_count_is_an_error(tmp_path, capsys, prepare, words):
+    prepare(tmp_path / 'bags')
+    assert bag_statistics.main([str(tmp_path / 'bags')]) == 2
+    out, err = capsys.readouterr()
+    assert out == '' and words in err and str(tmp_path / 'bags') in err and 'Traceback' not in err
+
+
+def test_an_output_that_cannot_be_written_is_an_error(record, tmp_path, capsys):
+    folder = record('bags', 1)
+    for option in ('--json', '--csv', '--figure'):
+        assert bag_statistics.main([folder, option, str(tmp_path / 'missing' / 'out')]) == 2
+        assert 'missing/out' in capsys.readouterr().err
+
+
+def test_other_words_for_failure(record, capsys):
+    folder = record('bags', 4)
+    bag_statistics.main([folder, '--failing-outcomes', 'succeeded'])
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('  ended in failure'))
+    assert line.split()[3] == '4'
+
+
+def test_neither_ros_nor_smach_need_be_installed(both_arms, tmp_path):
+    """Everything of ROS is hidden from the interpreter, not only the network."""
+    refused = ('rospy', 'rosbag', 'genpy', 'roslib', 'rosgraph', 'actionlib', 'smach', 'smach_ros', 'std_msgs',
+               'smach_oracle.msg', 'smach_oracle.ros')
+    script = '\n'.join([
+        'import sys',
+        'class Refuse:',
+        '    def find_spec(self, name, path=None, target=None):',
+        '        if name in {!r}: raise ImportError(name + " is not installed here")'.format(refused),
+        'sys.meta_path.insert(0, Refuse())',
+        'sys.path.insert(0, {!r})'.format(str(ROOT / 'src')),
+        'from smach_oracle.analysis.bag_statistics import main',
+        'sys.exit(main(sys.argv[1:]))'])
+    run = subprocess.run([sys.executable, '-c', script, str(both_arms), '--figure', str(tmp_path / 'f')],
+                         env={'PATH': os.environ['PATH'], 'HOME': str(tmp_path)}, timeout=100,
+                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+    assert run.returncode == 0, run.stderr
+    assert 'with oracle: 150 runs' in run.stdout
+
+
+def test_the_command_counts_300_bags_in_seconds(both_arms):
+    began = time.monotonic()
+    run = subprocess.run([sys.executable, str(ROOT / 'scripts' / 'bag_statistics'), str(both_arms)], timeout=100,
+                         stdout=subprocess.PIPE, universal_newlines=True)
+    assert run.returncode == 0 and 'PICK_AND_PLACE' in run.stdout
+    assert time.monotonic() - began < 20.0  # half a second on an idle machine
