@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""What a decision costs after a million visits, in units of what it costs after ten.
+
+    python3 benchmarks/oracle_decision.py [--check] [--visits N]
+
+Both are measured in one run, best of many: a failure, from the end of the failed state to the entry into the next, for
+each policy, with the preconditions met. With --check the exit status is 1 where the ratio is above 1.5.
+"""
+import argparse
+import itertools
+import sys
+import time
+from typing import Any, List, Tuple
+
+import smach
+from oracle_overhead import silence
+
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.policy import POLICIES
+
+LIMIT = 1.5
+FAILURES = 300
+
+
+class Failing(smach.State):
+    """Fails when told to, and notes when."""
+
+    def __init__(self) -> None:
+        smach.State.__init__(self, outcomes=['ok', 'aborted'])
+        self.fail = False
+        self.at = 0.0
+
+    def execute(self, ud: smach.UserData) -> str:
+        """Do nothing."""
+        if not self.fail:
+            return 'ok'
+        self.fail = False
+        self.at = time.perf_counter()
+        return 'aborted'
+
+
+def machine_after(visits: int, policy: str) -> Tuple[Any, List[float]]:
+    """A machine that makes `visits` visits and then fails now and then; and the seconds that each decision takes."""
+    state, costs = Failing(), []
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', state, {'ok': 'B'})
+        smach.StateMachine.add('B', Failing(), {'ok': 'A'})
+    OracleContainer.wrap(machine, settings={'policy': policy, 'max_recoveries': 10 ** 9, 'memory': 10 ** 6},
+                         preconditions={'A': [lambda ud: True]})
+    left = [FAILURES]
+
+    def told(ud: Any, active: List[str]) -> None:
+        if active != ['ORACLE'] and state.at:
+            costs.append(time.perf_counter() - state.at)
+            state.at = 0.0
+
+    def check() -> bool:
+        step = next(steps)
+        if step >= visits and step % 10 == 0:
+            state.fail = True
+            left[0] -= 1
+        return left[0] < 0
+
+    steps = itertools.count()
+    machine.register_transition_cb(told)
+    smach.set_shutdown_check(check)
+    machine.execute()
+    smach.set_shutdown_check(lambda: False)
+    return machine, costs
+
+
+def main() -> int:
+    """Measure and report."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('--check', action='store_true', help='exit with status 1 where the limit is missed')
+    parser.add_argument('--visits', type=int, default=10 ** 6, help='visits before the first failure')
+    args = parser.parse_args()
+    silence()
+    print('engine: {}'.format(smach.__file__))
+    worst = 0.0
+    for policy in sorted(POLICIES):
+        few, many = (min(machine_after(visits, policy)[1]) for visits in (10, args.visits))
+        few = min(few, min(machine_after(10, policy)[1]))
+        worst = max(worst, many / few)
+        print('{}: a decision takes {:.1f} us after ten visits, {:.1f} us after {}: {:.2f} times (limit {:g})'.format(
+            policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT))
+    return 1 if args.check and worst > LIMIT else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

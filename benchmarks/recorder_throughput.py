@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""How fast a wrapped machine runs while it is recorded, and whether anything is lost or piles up in memory.
+
+A two-state loop without work in its states: the executive at its full speed, the worst case for a recorder. Needs no
+ROS master. `recorder_throughput.py --help` shows the options.
+"""
+import argparse
+import glob
+import os
+import resource
+import shutil
+import sys
+import tempfile
+import time
+from typing import Any, Callable, List, Optional
+
+import smach
+from rosbags.rosbag1 import Reader
+
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.events import Event
+from smach_oracle.ros.recorder import TrialRecorder
+
+
+class Step(smach.State):
+    """Goes on until the machine has taken enough transitions."""
+
+    left = 0
+
+    def __init__(self) -> None:
+        super().__init__(outcomes=['next', 'done'])
+
+    def execute(self, userdata: Any) -> str:
+        Step.left -= 1
+        return 'next' if Step.left > 0 else 'done'
+
+
+def make_machine() -> smach.StateMachine:
+    machine = smach.StateMachine(outcomes=['done'])
+    with machine:
+        smach.StateMachine.add('A', Step(), {'next': 'B'})
+        smach.StateMachine.add('B', Step(), {'next': 'A'})
+    OracleContainer.wrap(machine, name='TOP')
+    return machine
+
+
+def run(transitions: int, observe: Optional[Callable[[Event], None]] = None) -> float:
+    """Returns the seconds that one trial takes."""
+    machine = make_machine()
+    if observe is not None:
+        machine.events.observers.append(observe)
+    Step.left = transitions
+    began = time.perf_counter()
+    machine.execute()
+    return time.perf_counter() - began
+
+
+class Count:
+    """An observer that only counts: what observing itself costs."""
+
+    def __init__(self) -> None:
+        self.events = 0
+
+    def __call__(self, event: Event) -> None:
+        self.events += 1
+
+
+def recorded_numbers(folder: str) -> List[int]:
+    """Sequence numbers of the events in the only bag, in the order of the bag."""
+    (path,) = glob.glob(os.path.join(folder, '*.bag'))
+    numbers = []
+    with Reader(path) as reader:
+        for _, _, data in reader.messages([item for item in reader.connections if item.topic.endswith('events')]):
+            # uint8 kind, Header (seq, stamp, frame_id), float64 wall_time, string trial_id, uint64 seq
+            start = 1 + 12 + 4 + int.from_bytes(data[13:17], 'little') + 8
+            start += 4 + int.from_bytes(data[start:start + 4], 'little')
+            numbers.append(int.from_bytes(data[start:start + 8], 'little'))
+    return numbers
+
+
+def peak_rss_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--transitions', type=int, default=100_000, help='of the recorded trial (default: %(default)s)')
+    parser.add_argument('--folder', help='for the bags, to try a certain disk (default: that for temporary files)')
+    args = parser.parse_args()
+    smach.set_loggers(*[lambda text: None] * 4)
+    folder = tempfile.mkdtemp(dir=args.folder)
+    try:
+        return measure(args.transitions, folder)
+    finally:
+        shutil.rmtree(folder)
+
+
+def measure(transitions: int, folder: str) -> int:
+    bare_s = run(transitions)
+    count = Count()
+    counted_s = run(transitions, count)
+    run(1000, TrialRecorder(folder + '/warm_up'))
+    before_mb = peak_rss_mb()
+    recorder = TrialRecorder(folder + '/bags')
+    recorded_s = run(transitions, recorder)
+    closing = time.perf_counter()
+    closed = recorder.close(60.0)
+    closing_s = time.perf_counter() - closing
+    grown_mb = peak_rss_mb() - before_mb
+    whole = recorded_numbers(folder + '/bags') == list(range(count.events)) and closed
+    print('{} transitions, {} events, {:.1f} MB of bag'.format(transitions, count.events, bag_mb(folder + '/bags')))
+    for name, seconds in (('no observer', bare_s), ('an observer that counts', counted_s), ('recorded', recorded_s)):
+        print('{:<24} {:8.2f} us per transition {:10.0f} events/s {:7.1f} x'.format(
+            name, seconds / transitions * 1e6, count.events / seconds, seconds / bare_s))
+    print('written to the end {:.2f} s after the trial'.format(closing_s))
+    print('events lost: {}; numbering without a gap: {}'.format(recorder.losses.events, 'yes' if whole else 'NO'))
+    print('memory: peak grew by {:.1f} MB while recording'.format(grown_mb))
+    return 0 if whole else 1
+
+
+def bag_mb(folder: str) -> float:
+    return sum(os.path.getsize(path) for path in glob.glob(folder + '/*.bag')) / 2 ** 20
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""Run the checks, say what each found and how long it took, and end with `N passed, N failed`.
+
+Called by scripts/test, in the environment of scripts/ros_env.
+"""
+import argparse
+import fnmatch
+import signal
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Dict, List
+
+from checks import Bench, Check, benchmark_checks, lint_checks, pytest_checks, rostest_checks
+from processes import Runner
+from report import Outcome, show, write_junit
+
+ROOT = Path(__file__).resolve().parents[2]
+# what may run side by side: rostests wait most of their time, benchmarks must be alone
+JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'package': 1, 'bench': 1}
+
+
+def find_checks(group: str) -> Dict[str, Check]:
+    """The checks of one group, by name."""
+    if group == 'lint':
+        return lint_checks(ROOT)
+    if group == 'unit':
+        return pytest_checks(ROOT, 'unit', by_folder=True)
+    if group == 'ros':
+        return rostest_checks(ROOT)
+    if group == 'package':
+        return pytest_checks(ROOT, 'package', by_folder=False)
+    return benchmark_checks(ROOT)
+
+
+def select(checks: Dict[str, Check], pattern: str) -> Dict[str, Check]:
+    """The checks whose name contains `pattern`, or matches it where it has wildcards."""
+    return {name: check for name, check in checks.items() if fnmatch.fnmatch(name, '*{}*'.format(pattern))}
+
+
+def run_group(checks: Dict[str, Check], bench: Bench, jobs: int) -> List[Outcome]:
+    """Run `checks`, `jobs` at a time, showing each as it ends."""
+    outcomes = []
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        futures = [pool.submit(check, bench) for check in checks.values()]
+        try:
+            for future in as_completed(futures):
+                outcomes.append(future.result())
+                show(outcomes[-1])
+                sys.stdout.flush()
+        except KeyboardInterrupt:
+            bench.runner.stop()
+            raise
+    return outcomes
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog='scripts/test', description='Set up, then check everything.')
+    parser.add_argument('group', nargs='?', choices=sorted(JOBS) + ['all'], default='all',
+                        help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
+                             'package: build and install; bench: limits on speed (default: all)')
+    parser.add_argument('pattern', nargs='?', default='', help='only checks with this in their name; * is a wildcard')
+    parser.add_argument('--jobs', type=int, help='checks at a time (default: 2, benchmarks 1)')
+    return parser.parse_args()
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> int:
+    arguments = parse_arguments()
+    # SIGINT too: a shell that starts this in the background has it ignored, here and in all that is started from here
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
+    bench = Bench(ROOT, ROOT / 'build' / 'test_results', Runner())
+    bench.results.mkdir(parents=True, exist_ok=True)
+    started = time.monotonic()
+    outcomes: List[Outcome] = []
+    try:
+        for group in JOBS if arguments.group == 'all' else [arguments.group]:
+            checks = select(find_checks(group), arguments.pattern)
+            if checks:
+                print('--- {}'.format(group))
+                outcomes += run_group(checks, bench, arguments.jobs or JOBS[group])
+    except KeyboardInterrupt:
+        print('interrupted; what ran has been stopped')
+        return 130
+    return _summarise(outcomes, bench, time.monotonic() - started)
+
+
+def _summarise(outcomes: List[Outcome], bench: Bench, seconds: float) -> int:
+    write_junit(outcomes, bench.results / 'all.xml')
+    bad = [outcome.name for outcome in outcomes if not outcome.ok]
+    print('--- {:.0f} s; results and logs in {}'.format(seconds, bench.results))
+    if bad:
+        print('failed: {}'.format(', '.join(bad)))
+    skipped = sum(outcome.skipped for outcome in outcomes)
+    if skipped:
+        print('{} skipped'.format(skipped))
+    passed, failed = (sum(getattr(outcome, name) for outcome in outcomes) for name in ('passed', 'failed'))
+    # a check without a single case counts as a failure, and so does a selection that selects nothing
+    failed += sum(1 for outcome in outcomes if not outcome.ok and not outcome.failed) + (not outcomes)
+    print('{} passed, {} failed'.format(passed, failed))
+    return 1 if failed else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

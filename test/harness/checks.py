@@ -1,0 +1,125 @@
+"""The checks of scripts/test, by group. Each takes a `Bench` and returns an `Outcome`."""
+import os
+import shutil
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Callable, Dict, List, Optional
+
+from processes import Runner
+from report import Outcome, read_junit, tail_of
+
+PACKAGE = 'smach_oracle'
+PYTHON_SOURCES = ['src', 'scripts', 'test', 'benchmarks', 'cmake', 'setup.py']
+VERMIN = 'from vermin import main; main()'
+MAX_ROSTEST_S = 240.0
+
+
+@dataclass
+class Bench:
+    """Where the checks work: the checkout, the folder for results, and what runs their commands."""
+
+    root: Path
+    results: Path
+    runner: Runner
+
+    def run(self, name: str, command: List[str], timeout_s: float, env: Optional[Dict[str, str]] = None) -> Outcome:
+        """Run one command that passes or fails as a whole."""
+        log = self.results / 'log' / (name.replace('/', '_').replace(' ', '_') + '.log')
+        started = time.monotonic()
+        problem = self.runner.run(command, log, timeout_s, self.root, env)
+        outcome = Outcome(name, seconds=time.monotonic() - started, log=str(log))
+        if problem:
+            outcome.failed = 1
+            outcome.detail = '{}\n{}'.format(tail_of(log), problem)
+        else:
+            outcome.passed = 1
+        return outcome
+
+
+Check = Callable[[Bench], Outcome]
+
+
+def _command(name: str, command: List[str], bench: Bench, timeout_s: float = 300.0) -> Outcome:
+    return bench.run(name, command, timeout_s)
+
+
+def lint_checks(root: Path) -> Dict[str, Check]:
+    """Linters, the types of oracle/, Python 3.8, catkin_lint, and every launch file."""
+    checks = {
+        'ruff': ['ruff', 'check', '--no-cache', '--output-format', 'concise', '.'],
+        'mypy oracle': [sys.executable, '-m', 'mypy', '--cache-dir', os.devnull],
+        'python 3.8': [sys.executable, '-c', VERMIN, '--target=3.8-', '--no-tips', '--violations'] + PYTHON_SOURCES,
+        'catkin_lint': ['catkin_lint', '--offline', '--strict', '-W2', str(root)],
+    }
+    for launch in sorted((root / 'launch').glob('*.launch')):
+        checks['launch/' + launch.name] = [_roslaunch_check(), '-o', os.devnull, str(launch)]
+    return {name: partial(_command, name, command) for name, command in checks.items()}
+
+
+def _roslaunch_check() -> str:
+    import rospkg
+    return os.path.join(rospkg.RosPack().get_path('roslaunch'), 'scripts', 'roslaunch-check')
+
+
+def pytest_checks(root: Path, folder: str, by_folder: bool) -> Dict[str, Check]:
+    """pytest on test/FOLDER, as one check or as one per folder and file in it."""
+    top = root / 'test' / folder
+    parts = sorted({path.relative_to(top).parts[0] for path in top.rglob('test_*.py')}) if by_folder else ['']
+    names = ['/'.join(filter(None, [folder, part])) for part in parts]
+    return {name: partial(_pytest, name) for name in names}
+
+
+def _pytest(name: str, bench: Bench) -> Outcome:
+    result = bench.results / '{}.xml'.format(name.replace('/', '-'))
+    command = [sys.executable, '-m', 'pytest', '-q', '--tb=short', '--junit-xml', str(result), 'test/' + name]
+    return _with_junit(bench.run(name, command, 600.0), [result])
+
+
+def _with_junit(outcome: Outcome, results: List[Path]) -> Outcome:
+    """Replace the count of one command by the counts of the cases it reported."""
+    counted = Outcome(outcome.name, seconds=outcome.seconds, log=outcome.log)
+    read_junit([path for path in results if path.exists()], counted)
+    if outcome.failed and not counted.failed:
+        # it died, or failed outside every case
+        counted.failed += 1
+        counted.detail += outcome.detail
+    return counted
+
+
+def rostest_checks(root: Path) -> Dict[str, Check]:
+    """Every test/rostest/*.test, each with a master of its own on a free port."""
+    tests = sorted((root / 'test' / 'rostest').glob('*.test'))
+    return {'rostest/' + path.stem: partial(_rostest, path) for path in tests}
+
+
+def _rostest(path: Path, bench: Bench) -> Outcome:
+    command = ['rostest', '--package', PACKAGE, '--pkgdir', str(bench.root), str(path)]
+    folder = bench.results / 'rostest' / path.stem
+    # rostest hands the place of the results on unquoted: it must not have a space in it
+    scratch = Path(tempfile.mkdtemp(prefix='rostest-'))
+    env = {'ROS_TEST_RESULTS_DIR': str(scratch), 'ROS_LOG_DIR': str(scratch / 'log'), 'ROS_HOME': str(scratch / 'home')}
+    outcome = bench.run('rostest/' + path.stem, command, MAX_ROSTEST_S, env)
+    shutil.rmtree(str(folder), ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    shutil.move(str(scratch), str(folder))
+    # rostest's own file repeats as one case each what the tests' files have in full
+    return _with_junit(outcome, sorted(folder.glob('**/rosunit-*.xml')))
+
+
+def benchmark_checks(root: Path) -> Dict[str, Check]:
+    """Benchmarks that know `--check`: they measure briefly and fail where a limit is missed."""
+    files = [path for path in sorted((root / 'benchmarks').glob('*.py')) if "'--check'" in path.read_text('utf-8')]
+    return {'benchmarks/' + path.stem: partial(_benchmark, path) for path in files}
+
+
+def _benchmark(path: Path, bench: Bench) -> Outcome:
+    """A limit on time holds if it holds once: what else the machine does can only make a program slower."""
+    for _ in range(2):
+        outcome = bench.run('benchmarks/' + path.stem, [sys.executable, str(path), '--check'], 300.0)
+        if outcome.ok:
+            break
+    return outcome

@@ -1,0 +1,120 @@
+"""Run a command with a time limit, and leave nothing of it behind.
+
+roslaunch puts every node into a session of its own, so that killing the command, or its process group, is not enough.
+Every process of a check therefore carries a mark in its environment, by which its last descendant is found.
+"""
+import os
+import signal
+import subprocess
+import threading
+import time
+import uuid
+from pathlib import Path
+from typing import Dict, List, Optional
+
+MARK = 'SMACH_ORACLE_CHECK'
+# roslaunch alone would wait 15 s for a node that does not listen
+STOP_GRACE_S = 5.0
+
+
+class Runner:
+    """Runs commands, from several threads if need be, until `stop` ends them all."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running: List[subprocess.Popen] = []
+        self.stopped = False
+
+    def run(self, command: List[str], log: Path, timeout_s: float, cwd: Path,
+            env: Optional[Dict[str, str]] = None) -> str:
+        """Run `command` with its output in `log`. Return '' on success, else what went wrong."""
+        mark = uuid.uuid4().hex
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open('wb') as output:
+            with self._lock:
+                if self.stopped:
+                    return 'interrupted'
+                process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, cwd=str(cwd),
+                                           stdin=subprocess.DEVNULL, start_new_session=True,
+                                           env=dict(os.environ, **(env or {}), **{MARK: mark}))
+                self._running.append(process)
+        try:
+            problem = _wait(process, timeout_s)
+        finally:
+            with self._lock:
+                self._running.remove(process)
+            left = kill_marked(mark)
+        if left:
+            with log.open('a') as output:
+                output.write('\nleft behind, and killed:\n  {}\n'.format('\n  '.join(left)))
+        return 'interrupted' if self.stopped else problem
+
+    def stop(self) -> None:
+        """End what runs, as Ctrl-C would, or by force where that takes long; start nothing any more."""
+        with self._lock:
+            self.stopped = True
+            running = list(self._running)
+        for process in running:
+            _signal(process, signal.SIGINT)
+        deadline = time.monotonic() + STOP_GRACE_S
+        while time.monotonic() < deadline and any(process.poll() is None for process in running):
+            time.sleep(0.05)
+        for process in running:
+            if process.poll() is None:
+                _signal(process, signal.SIGKILL)
+
+
+def _wait(process: subprocess.Popen, timeout_s: float) -> str:
+    try:
+        status = process.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        # roslaunch needs a while to take its nodes down one after the other
+        for number, grace_s in ((signal.SIGINT, 20.0), (signal.SIGKILL, 5.0)):
+            _signal(process, number)
+            try:
+                process.wait(grace_s)
+                break
+            except subprocess.TimeoutExpired:
+                continue
+        return 'not done after {:g} s'.format(timeout_s)
+    if status < 0:
+        return 'killed by {}'.format(signal.Signals(-status).name)
+    return 'exit status {}'.format(status) if status else ''
+
+
+def _signal(process: subprocess.Popen, number: int) -> None:
+    try:
+        os.killpg(process.pid, number)
+    except ProcessLookupError:
+        pass
+
+
+def kill_marked(mark: str) -> List[str]:
+    """Kill every process whose environment carries `mark`; return their command lines."""
+    wanted = '{}={}'.format(MARK, mark).encode()
+    killed = {}
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline:
+        found = [pid for pid in _pids() if wanted in _read(pid, 'environ').split(b'\0')]
+        if not found:
+            break
+        for pid in found:
+            killed[pid] = _read(pid, 'cmdline').replace(b'\0', b' ').decode(errors='replace').strip()
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        time.sleep(0.05)
+    return ['{} {}'.format(pid, command) for pid, command in sorted(killed.items())]
+
+
+def _pids() -> List[int]:
+    return [int(name) for name in os.listdir('/proc') if name.isdigit()]
+
+
+def _read(pid: int, name: str) -> bytes:
+    try:
+        return Path('/proc', str(pid), name).read_bytes()
+    except OSError:
+        # gone meanwhile, or somebody else's
+        return b''

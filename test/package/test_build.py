@@ -1,0 +1,115 @@
+"""The package builds alone and in catkin workspaces, installs, runs where it was installed, and yields to upstream."""
+import pytest
+from workspace import PYTHON, copy_sources, fake_upstream, run
+
+NAMES = ('smach', 'smach_ros', 'smach_msgs')
+WHERE = 'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs; ' \
+        'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__)"'
+SCRIPT = '''
+import smach
+
+
+class Flaky(smach.State):
+    runs = 0
+
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded', 'aborted'])
+
+    def execute(self, userdata):
+        Flaky.runs += 1
+        return 'aborted' if Flaky.runs == 1 else 'succeeded'
+
+
+machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+with machine:
+    smach.StateMachine.add('FLAKY', Flaky())
+print('ended in', machine.execute())
+'''
+
+
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory):
+    """An install space, built alone in a build folder beside its sources, which are gone by now."""
+    top = tmp_path_factory.mktemp('alone')
+    copy_sources(top / 'smach_oracle')
+    (top / 'out').mkdir()
+    run('cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; make -j2; make install'.format(PYTHON),
+        top / 'out')
+    (top / 'smach_oracle').rename(top / 'moved_away')
+    (top / 'out').rename(top / 'out_moved_away')
+    return top
+
+
+def in_installed(installed, command):
+    return run(command, installed, str(installed / 'installed/setup.bash'))
+
+
+def test_the_install_space_runs_without_its_sources(installed):
+    assert in_installed(installed, WHERE).count(str(installed / 'installed')) == len(NAMES)
+
+
+def test_installed_messages_are_found_by_rosmsg(installed):
+    assert 'local_data' in in_installed(installed, 'rosmsg show smach_msgs/SmachContainerStatus')
+    assert 'seq' in in_installed(installed, 'rosmsg show smach_oracle/OracleEvent')
+
+
+def test_every_command_is_installed_for_rosrun(installed):
+    commands = {path.name for path in (installed / 'moved_away/scripts').iterdir()
+                if path.read_text().startswith('#!/usr/bin/env python3')}
+    assert commands == {path.name for path in (installed / 'installed/lib/smach_oracle').iterdir()}
+
+
+def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
+    (installed / 'flaky.py').write_text(SCRIPT)
+    # without a master, as before the robot is switched on, is not what oracle_run is for: start one on a free port
+    command = '''
+        port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("localhost", 0)); print(s.getsockname()[1])')
+        export ROS_MASTER_URI=http://localhost:$port ROS_HOSTNAME=localhost ROS_LOG_DIR="$PWD/log"
+        roscore -p $port >/dev/null 2>&1 & core=$!; trap 'kill -INT $core; wait $core || true' EXIT
+        until rosnode list >/dev/null 2>&1; do sleep 0.2; done
+        timeout 60 rosrun smach_oracle oracle_run flaky.py'''
+    assert 'ended in succeeded' in in_installed(installed, command)
+
+
+def test_launch_files_and_settings_are_installed(installed):
+    files = in_installed(installed, 'roslaunch --files smach_oracle pick_and_place.launch')
+    assert str(installed / 'installed') in files
+    for name in ('pick_and_place.py', 'pick_and_place.yaml'):
+        assert (installed / 'installed/share/smach_oracle/src/smach_oracle/tasks' / name).exists()
+
+
+def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
+    copy_sources(tmp_path / 'src/smach_oracle')
+    for name in NAMES:
+        fake_upstream(tmp_path / 'src', name)
+    output = run('catkin_make {}'.format(PYTHON), tmp_path)
+    assert output.count("upstream's is used, from this workspace") == len(NAMES)
+    where = run(WHERE, tmp_path, str(tmp_path / 'devel/setup.bash'))
+    assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
+    check = 'import smach_oracle, smach, smach_ros, smach_msgs; print(smach.upstream, smach_ros.upstream)'
+    assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel/setup.bash'))
+
+
+def test_an_isolated_workspace_builds_upstream_first_and_uses_it(tmp_path):
+    copy_sources(tmp_path / 'src/smach_oracle')
+    fake_upstream(tmp_path / 'src', 'smach')
+    output = run('catkin_make_isolated --cmake-args {}'.format(PYTHON), tmp_path)
+    assert "smach: upstream's is used" in output
+    assert "smach_ros: upstream's is absent, ours stands in" in output
+    check = 'import smach_oracle, smach; print(smach.upstream)'
+    assert 'True' in run('python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel_isolated/setup.bash'))
+
+
+def test_our_stand_ins_go_when_upstream_comes(tmp_path):
+    sources = copy_sources(tmp_path / 'smach_oracle')
+    build = sources / 'build'
+    build.mkdir()
+    python = list(NAMES)
+    assert run('cmake .. {}'.format(PYTHON), build).count('ours stands in') == len(python)
+    assert run('cmake .. {}'.format(PYTHON), build).count('ours stands in') == len(python)
+    for name in NAMES:
+        (tmp_path / 'upstream' / name).mkdir(parents=True)
+        (tmp_path / 'upstream' / name / '__init__.py').write_text('')
+    output = run('PYTHONPATH="{}" cmake .. {}'.format(tmp_path / 'upstream', PYTHON), build)
+    assert output.count("upstream's is used") == len(python)
+    assert not [path for name in NAMES for path in (build / 'devel').glob('lib/python3/dist-packages/' + name)]

@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+"""Front ends, servers and askers that die: what becomes of the question."""
+import os
+import sys
+import tempfile
+import time
+import unittest
+from unittest import mock
+
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from expert_fixtures import Asked, Process, make_question  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.expert import followed_server  # noqa: E402
+from smach_oracle.expert.front_end import FrontEnd, ServerGoneError, wait_for_question  # noqa: E402
+from smach_oracle.msg import ExpertDecision, OpenQuery  # noqa: E402
+from smach_oracle.oracle.question import AnswerKind  # noqa: E402
+from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+
+SHARED = '/shared/expert_query'
+RULES = """
+PICK:
+  - {kind: goto, state: DETECT, delay_s: 0.4, why: look again}
+  - {kind: supersede, outcome: succeeded, outputs: {grasped: [mug, 1]}}
+default: {kind: ignore}
+"""
+
+
+def goto(state='DETECT'):
+    return ExpertDecision(kind=ExpertDecision.GOTO, state=state)
+
+
+class TestExpertFaults(unittest.TestCase):
+
+    def server(self):
+        process = Process.installed('expert_query_server', '__name:=shared', '_asker_gone_s:=1.0')
+        self.addCleanup(process.kill)
+        return process
+
+    def front_end(self, name='ann', servers=(SHARED,)):
+        front_end = FrontEnd(name, servers)
+        self.addCleanup(front_end.stop)
+        return front_end
+
+    def ask(self, client, **changes):
+        asked = Asked(client, make_question(self.id(), **changes))
+        self.addCleanup(asked.cancelled.set)
+        return asked
+
+    def client(self, server=SHARED):
+        client = ExpertQueryClient(server)
+        self.addCleanup(client.close)
+        return client
+
+    def test_a_front_end_killed_while_it_holds_a_claim_leaves_the_question_to_others(self):
+        self.server()
+        ann = self.front_end()
+        asked = self.ask(self.client())
+        holder = Process.role('hold', SHARED)
+        self.addCleanup(holder.kill)
+        self.assertTrue(wait_for(lambda: any(each.holder == 'holder' for each in ann.questions()), 15.0))
+        listed, = ann.questions()
+        self.assertEqual(listed.status, OpenQuery.CLAIMED)
+        time.sleep(2.0)
+        self.assertEqual(ann.questions()[0].holder, 'holder', 'it renews its claim of 1.5 s')
+        self.assertIn('holder works on this question', ann.answer(listed, goto()).message)
+        holder.kill()
+        self.assertTrue(wait_for(lambda: ann.questions()[0].status == OpenQuery.PENDING, 5.0))
+        self.assertTrue(ann.answer(listed, goto()).ok)
+        self.assertTrue(asked.wait())
+        self.assertEqual([what[:2] for what in asked.progress], [('claimed', 'holder'), ('released', 'holder')])
+
+    def test_a_server_killed_and_restarted_is_asked_again(self):
+        first = self.server()
+        ann = self.front_end()
+        asked = self.ask(self.client(), deadline_s=60.0)
+        self.assertIsNotNone(wait_for_question(ann, 15.0))
+        first.kill()
+        self.assertTrue(wait_for(lambda: not ann.connected(SHARED)))
+        self.assertEqual(ann.questions(), [])
+        self.assertFalse(asked.wait(0.5), 'the question waits for the server to come back')
+        self.server()
+        listed = wait_for_question(ann, 20.0)
+        self.assertEqual(listed.goal.query_id, self.id())
+        self.assertLess(listed.deadline_s - time.monotonic(), 59.0, 'the deadline does not begin anew')
+        self.assertTrue(ann.answer(listed, goto('PICK')).ok)
+        self.assertTrue(asked.wait())
+        self.assertEqual(asked.answer.state, 'PICK')
+
+    def test_with_no_server_at_all_the_deadline_still_holds(self):
+        client = self.client('/nowhere/expert_query')
+        begun_s = time.monotonic()
+        asked = self.ask(client, deadline_s=0.5)
+        self.assertTrue(asked.wait(5.0))
+        self.assertIsNone(asked.answer)
+        self.assertGreater(asked.returned_s - begun_s, 0.45)
+        taken_back = Asked(client, make_question('taken back'))
+        self.assertFalse(taken_back.wait(0.2))
+        taken_back.cancelled.set()
+        self.assertTrue(taken_back.wait(1.0))
+
+    def test_a_question_whose_server_dies_for_good_ends_by_its_deadline(self):
+        server = self.server()
+        ann = self.front_end()
+        asked = self.ask(self.client(), deadline_s=4.0)
+        self.assertIsNotNone(wait_for_question(ann, 15.0))
+        server.kill()
+        self.assertTrue(asked.wait(8.0))
+        self.assertIsNone(asked.answer)
+        with self.assertRaisesRegex(ServerGoneError, '/shared/expert_query/answer cannot be reached'):
+            ann._servers[SHARED].answer('q', goto())
+
+    def test_a_server_that_hangs_holds_no_front_end_up(self):
+        server = self.server()
+        ann = self.front_end()
+        asked = self.ask(self.client())
+        listed = wait_for_question(ann, 15.0)
+        self.assertTrue(ann.claim(listed).ok)
+        server.freeze()
+        with mock.patch.object(followed_server, 'CALL_LIMIT_S', 1.0):
+            with self.assertRaisesRegex(ServerGoneError, '/shared/expert_query/answer does not answer'):
+                ann.answer(listed, goto())
+        begun_s = time.monotonic()
+        with self.assertRaisesRegex(ServerGoneError, 'does not answer'):
+            ann.answer(listed, goto('PICK'))
+        ann.stop()
+        self.assertLess(time.monotonic() - begun_s, 2.5)
+        server.thaw()
+        self.assertTrue(asked.wait(), 'the answer that hung arrives after all')
+        self.assertEqual(asked.answer.state, 'DETECT')
+
+    def test_a_scripted_expert_whose_server_hangs_ends_quickly_on_ctrl_c(self):
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as rules:
+            rules.write('default: {kind: give_up, delay_s: 3.0}')
+            rules.flush()
+            server = self.server()
+            expert = Process.installed('scripted_expert', '_rules_file:=' + rules.name)
+            self.addCleanup(expert.kill)
+            ann = self.front_end()
+            self.ask(self.client())
+            self.assertTrue(wait_for(lambda: any(each.holder for each in ann.questions()), 15.0))
+        server.freeze()
+        time.sleep(0.5)
+        self.assertLess(expert.interrupt(), 4.0)
+
+    def test_the_question_of_a_killed_robot_is_closed(self):
+        self.server()
+        ann = self.front_end()
+        asker = Process.role('ask', SHARED, self.id())
+        self.addCleanup(asker.kill)
+        listed = wait_for_question(ann, 15.0)
+        self.assertIsNotNone(listed)
+        time.sleep(2.0)
+        self.assertIsNotNone(ann.find(listed.key), 'it stays open as long as the robot is there')
+        asker.kill()
+        self.assertTrue(wait_for(lambda: ann.connected(SHARED) and ann.find(listed.key) is None, 10.0))
+        response = ann.answer(listed, goto())
+        self.assertFalse(response.ok)
+        self.assertIn('the asker is gone', response.message)
+
+    def test_a_server_with_an_open_question_ends_quickly_on_ctrl_c(self):
+        server = self.server()
+        ann = self.front_end()
+        self.ask(self.client())
+        self.assertIsNotNone(wait_for_question(ann, 15.0))
+        self.assertLess(server.interrupt(), 3.0)
+
+    def test_a_robot_that_waits_for_an_answer_ends_quickly_on_ctrl_c(self):
+        self.server()
+        ann = self.front_end()
+        asker = Process.role('ask', SHARED, self.id())
+        self.addCleanup(asker.kill)
+        self.assertIsNotNone(wait_for_question(ann, 15.0))
+        self.assertLess(asker.interrupt(), 3.0)
+
+    def test_a_scripted_expert_answers_by_its_rules(self):
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as rules:
+            rules.write(RULES)
+            rules.flush()
+            expert = Process.installed('scripted_expert', '_rules_file:=' + rules.name)
+            self.addCleanup(expert.kill)
+            client = self.client('')  # a server of our own
+            first = self.ask(client)
+            self.assertTrue(first.wait(20.0))
+        self.assertEqual((first.answer.state, first.answer.by, first.answer.why),
+                         ('DETECT', 'scripted_expert', 'look again'))
+        self.assertEqual(first.progress, [('claimed', 'scripted_expert', 'claimed')])
+        second = Asked(client, make_question('second'))
+        self.assertTrue(second.wait())
+        self.assertEqual((second.answer.kind, second.answer.outputs), (AnswerKind.SUPERSEDE, {'grasped': ['mug', 1]}))
+        ignored = Asked(client, make_question('third', failed_state='PLACE', deadline_s=1.0))
+        self.assertTrue(ignored.wait())
+        self.assertIsNone(ignored.answer)
+        self.assertLess(expert.interrupt(), 3.0)
+
+
+if __name__ == '__main__':
+    rospy.init_node('expert_faults')
+    rostest.rosrun('smach_oracle', 'expert_faults', TestExpertFaults)

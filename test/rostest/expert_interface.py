@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""Shared-autonomy interfaces that an expert starts: seen to run, superseding the state, failing, preempted."""
+import os
+import sys
+import threading
+import time
+import unittest
+
+import actionlib
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from expert_fixtures import Asked, make_question  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.expert.front_end import FrontEnd  # noqa: E402
+from smach_oracle.msg import (ExpertDecision, OpenQuery, SharedAutonomyAction, SharedAutonomyFeedback,  # noqa: E402
+                              SharedAutonomyResult, UserdataItem)
+from smach_oracle.oracle.question import AnswerKind, InterfaceOffer  # noqa: E402
+from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
+
+
+class FakeInterface:
+    """A shared-autonomy interface whose person does what the test says."""
+
+    def __init__(self, work):
+        self._server = actionlib.SimpleActionServer('/assist', SharedAutonomyAction, self._execute, auto_start=False)
+        self._work = work
+        self.goals = []
+        self._server.start()
+
+    def _execute(self, goal):
+        self.goals.append(goal)
+        self._server.publish_feedback(SharedAutonomyFeedback(0.5, 'half done'))
+        self._work(self._server)
+
+    def stop(self):
+        self._server.action_server.stop()
+
+
+class TestInterfaces(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.client = ExpertQueryClient(server_wait_s=2.0)
+        cls.ann = FrontEnd('ann')
+        cls.offer = InterfaceOffer('assist', '/assist')
+
+    def setUp(self):
+        self.cancelled = threading.Event()
+        self.told = []
+        self.question = make_question(self.id())
+
+    def interface(self, work):
+        interface = FakeInterface(work)
+        self.addCleanup(interface.stop)
+        return interface
+
+    def run_interface(self):
+        return self.client.run_interface(self.offer, self.question, self.cancelled,
+                                         lambda *what: self.told.append(what))
+
+    def statuses(self):
+        return [(each.status, each.holder) for each in self.ann.questions() if each.goal.query_id == self.id()]
+
+    def test_an_interface_does_the_state_s_work_and_is_seen_to_run(self):
+        seen = []
+
+        def work(server):
+            seen.append(wait_for(self.statuses))
+            server.set_succeeded(SharedAutonomyResult('succeeded', encode_all({'grasped': 'mug'}), 'by hand'))
+
+        interface = self.interface(work)
+        asked = Asked(self.client, self.question)
+        listed = wait_for(lambda: next(iter(self.ann.questions()), None))
+        self.assertTrue(self.ann.answer(listed, ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist')).ok)
+        self.assertTrue(asked.wait())
+        self.assertEqual((asked.answer.kind, asked.answer.interface), (AnswerKind.INTERFACE, 'assist'))
+        self.assertTrue(wait_for(lambda: not self.statuses()))
+        answer = self.run_interface()
+        self.assertEqual((answer.kind, answer.outcome, answer.outputs), (
+            AnswerKind.SUPERSEDE, 'succeeded', {'grasped': 'mug'}))
+        goal, = interface.goals
+        self.assertEqual((goal.state, goal.outcomes, decode_all(goal.userdata)), (
+            'PICK', ['succeeded', 'aborted'], {'target': 'mug'}))
+        self.assertEqual(seen, [[(OpenQuery.INTERFACE_RUNNING, 'ann')]])
+        self.assertEqual(self.told, [('interface_start', 'assist', ''), ('interface_end', 'assist', 'succeeded')])
+        self.assertTrue(wait_for(lambda: not self.statuses()), 'it leaves the list when the interface ends')
+
+    def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
+        begun_s = time.monotonic()
+        self.assertIsNone(self.run_interface())
+        self.assertTrue(1.9 < time.monotonic() - begun_s < 6.0)
+        self.assertEqual(self.told[-1], ('interface_end', 'assist', ''))
+
+    def test_an_interface_that_fails_or_answers_nonsense_supersedes_nothing(self):
+        results = [('aborted', SharedAutonomyResult('succeeded', [], 'the arm is stuck')),
+                   ('succeeded', SharedAutonomyResult('finished', [], '')),
+                   ('succeeded', SharedAutonomyResult('succeeded', encode_all({'other': 1}), '')),
+                   ('succeeded', SharedAutonomyResult('succeeded', [UserdataItem('grasped', 1, '', '', b'{')], ''))]
+        self.interface(lambda server: getattr(server, 'set_' + results[0][0])(results.pop(0)[1]))
+        for _ in range(4):
+            self.assertIsNone(self.run_interface())
+        self.assertEqual(results, [])
+
+    def test_a_preempt_stops_the_interface_at_once(self):
+        preempted = threading.Event()
+
+        def work(server):
+            self.cancelled.set()
+            if wait_for(server.is_preempt_requested):
+                preempted.set()
+            server.set_preempted()
+
+        self.interface(work)
+        begun_s = time.monotonic()
+        self.assertIsNone(self.run_interface())
+        self.assertLess(time.monotonic() - begun_s, 3.0)
+        self.assertTrue(preempted.wait(5.0), 'the interface was told')
+
+
+if __name__ == '__main__':
+    rospy.init_node('expert_interface')
+    rostest.rosrun('smach_oracle', 'expert_interface', TestInterfaces)

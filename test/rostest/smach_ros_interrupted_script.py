@@ -1,0 +1,34 @@
+#!/usr/bin/env python3
+"""A script that waits for a message that never comes, for tests that press Ctrl-C."""
+import sys
+import threading
+
+import rospy
+import smach
+from std_msgs.msg import Empty
+
+from smach_ros import MonitorState, set_preempt_handler
+
+
+def main(where, handler):
+    rospy.init_node('interrupted_script', anonymous=True, disable_signals=handler == 'unsignalled')
+    machine = smach.StateMachine(outcomes=['valid', 'invalid', 'preempted'])
+    up = ['not told']
+    with machine:
+        smach.StateMachine.add('WAIT', MonitorState('never', Empty, lambda ud, message: True))
+    machine.register_start_cb(lambda ud, states: threading.Timer(0.5, print, ['waiting'], {'flush': True}).start(), [])
+    machine.register_termination_cb(lambda ud, states, outcome: up.append(not rospy.is_shutdown()), [])
+    if handler != 'none':
+        set_preempt_handler(machine)
+    outcomes = []
+    if where == 'thread':
+        thread = threading.Thread(target=lambda: outcomes.append(machine.execute()))
+        thread.start()
+        thread.join()
+    else:
+        outcomes.append(machine.execute())
+    print('ended: %s while up: %s' % (outcomes[0], up[-1]))
+
+
+if __name__ == '__main__':
+    main(*sys.argv[1:3])

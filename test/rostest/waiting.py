@@ -1,0 +1,14 @@
+"""Waiting for what another process or thread will bring about."""
+import time
+from typing import Any, Callable
+
+
+def wait_for(condition: Callable[[], Any], limit_s: float = 15.0) -> Any:
+    """Poll until the condition holds, at most so many seconds; its last value."""
+    until = time.monotonic() + limit_s
+    while time.monotonic() < until:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    return condition()

@@ -1,0 +1,50 @@
+"""The source tree, for the tests that hold the house rules."""
+import ast
+from pathlib import Path
+from typing import Iterator, List, Tuple
+
+ROOT = Path(__file__).resolve().parents[3]
+SOURCES = ('src', 'scripts', 'test', 'benchmarks', 'cmake')
+
+
+def is_python(path: Path) -> bool:
+    """Whether `path` is Python by its suffix or, in scripts/, by its first line."""
+    if path.suffix == '.py':
+        return True
+    return not path.suffix and path.is_file() and b'python' in path.read_bytes()[:40].split(b'\n')[0]
+
+
+def python_files(*folders: str) -> List[Path]:
+    """Every Python file of the checkout, or of the folders given."""
+    found = [path for folder in folders or SOURCES for path in sorted((ROOT / folder).rglob('*')) if is_python(path)]
+    assert found, 'no Python files in {}'.format(folders)
+    return found
+
+
+def shown(path: Path) -> str:
+    """`path` as test ids and messages name it."""
+    return str(path.relative_to(ROOT))
+
+
+def parse(path: Path) -> ast.Module:
+    """The syntax tree of `path`, as Python 3.8 reads it."""
+    return ast.parse(path.read_text(encoding='utf-8'), shown(path), feature_version=(3, 8))
+
+
+def imports(path: Path) -> Iterator[Tuple[int, str]]:
+    """Every module that `path` imports, anywhere in it, as (line, dotted name); relative names are made absolute.
+
+    ``from a import b`` gives ``a.b``: only that tells ``from smach_oracle import ros`` from an import of the top.
+    """
+    parts = path.relative_to(ROOT).with_suffix('').parts[1:]
+    for node in ast.walk(parse(path)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            base = '.'.join(parts[:len(parts) - node.level]) if node.level else ''
+            module = '.'.join(filter(None, [base, node.module]))
+            for alias in node.names:
+                yield node.lineno, '{}.{}'.format(module, alias.name)
+
+

@@ -1,0 +1,113 @@
+"""scripts/test itself: what it counts, how it ends, and that it leaves nothing running."""
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from house import ROOT
+
+sys.path.insert(0, str(ROOT / 'test/harness'))
+
+from checks import Bench, benchmark_checks, rostest_checks  # noqa: E402
+from processes import Runner, kill_marked  # noqa: E402
+from report import Outcome, read_junit, show, write_junit  # noqa: E402
+
+JUNIT = '''<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
+<testcase classname="a" name="bad"><failure>1 is not 2</failure></testcase>
+<testcase classname="a" name="worse"><error message="it fell"/></testcase>
+<testcase classname="a" name="not_here"><skipped/></testcase></testsuite>'''
+# a grandchild in a session of its own, as roslaunch starts its nodes
+DETACHED = 'import subprocess, sys, time; subprocess.Popen(["sleep", "{}"], start_new_session=True); {}'
+
+
+@pytest.fixture
+def bench(tmp_path):
+    return Bench(tmp_path, tmp_path, Runner())
+
+
+def sleeping(seconds):
+    listed = subprocess.run(['pgrep', '-fx', 'sleep {}'.format(seconds)], stdout=subprocess.PIPE, check=False)
+    return listed.stdout.decode().split()
+
+
+def test_every_case_is_counted_and_the_failed_ones_are_told(tmp_path):
+    (tmp_path / 'one.xml').write_text(JUNIT)
+    outcome = Outcome('one')
+    read_junit([tmp_path / 'one.xml'], outcome)
+    assert (outcome.passed, outcome.failed, outcome.skipped) == (1, 2, 1)
+    assert 'a.bad:\n1 is not 2' in outcome.detail and 'it fell' in outcome.detail
+
+
+def test_a_result_that_is_cut_off_is_a_failure(tmp_path):
+    (tmp_path / 'half.xml').write_text(JUNIT[:40])
+    outcome = Outcome('half')
+    read_junit([tmp_path / 'half.xml'], outcome)
+    assert outcome.failed == 1
+
+
+def test_a_check_without_any_case_has_not_passed(capsys):
+    show(Outcome('empty'))
+    assert capsys.readouterr().out.startswith('FAIL empty')
+
+
+def test_all_results_are_in_one_file(tmp_path):
+    (tmp_path / 'one.xml').write_text(JUNIT)
+    write_junit([Outcome('ruff', failed=1, detail='long line'), Outcome('unit', junit=[tmp_path / 'one.xml'])],
+                tmp_path / 'all.xml')
+    everything = Outcome('all')
+    read_junit([tmp_path / 'all.xml'], everything)
+    assert (everything.passed, everything.failed, everything.skipped) == (1, 3, 1)
+
+
+def test_a_failing_command_shows_its_last_words(bench):
+    outcome = bench.run('words', [sys.executable, '-c', 'print("last words"); raise SystemExit(3)'], 20.0)
+    assert not outcome.ok and 'last words' in outcome.detail and 'exit status 3' in outcome.detail
+
+
+def test_a_command_that_hangs_is_ended_and_told(bench):
+    outcome = bench.run('hang', ['sleep', '60'], 0.5)
+    assert outcome.failed == 1 and 'not done after 0.5 s' in outcome.detail
+
+
+def test_nothing_is_left_running_even_what_left_its_process_group(bench):
+    bench.run('detached', [sys.executable, '-c', DETACHED.format('61.25', 'pass')], 20.0)
+    assert not sleeping('61.25')
+    assert 'left behind, and killed' in (bench.results / 'log/detached.log').read_text()
+
+
+def test_an_interrupt_ends_what_runs_and_starts_nothing_more(bench):
+    command = [sys.executable, '-c', DETACHED.format('62.25', 'time.sleep(60)')]
+    outcomes = []
+    thread = threading.Thread(target=lambda: outcomes.append(bench.run('long', command, 60.0)))
+    thread.start()
+    deadline = time.monotonic() + 20.0
+    while not sleeping('62.25') and time.monotonic() < deadline:
+        time.sleep(0.05)
+    bench.runner.stop()
+    thread.join(20.0)
+    assert not thread.is_alive() and not sleeping('62.25')
+    assert outcomes[0].failed == 1
+    assert 'interrupted' in bench.run('late', ['true'], 5.0).detail
+
+
+def test_a_mark_that_nobody_carries_kills_nobody():
+    assert kill_marked('nobody') == []
+
+
+def test_every_rostest_is_run():
+    assert len(rostest_checks(ROOT)) == len(list((ROOT / 'test/rostest').glob('*.test'))) > 0
+
+
+def test_benchmarks_without_limits_are_not_run(tmp_path):
+    (tmp_path / 'benchmarks').mkdir()
+    (tmp_path / 'benchmarks/free.py').write_text('print(1)')
+    (tmp_path / 'benchmarks/held.py').write_text("parser.add_argument('--check')")
+    assert list(benchmark_checks(tmp_path)) == ['benchmarks/held']
+
+
+def test_the_last_line_is_the_sum(tmp_path):
+    result = subprocess.run([sys.executable, str(ROOT / 'test/harness'), 'bench', 'no such benchmark'],
+                            stdout=subprocess.PIPE, timeout=60, check=False)
+    assert result.returncode == 1
+    assert result.stdout.decode().splitlines()[-1] == '0 passed, 1 failed'

@@ -1,0 +1,111 @@
+"""What the README and the documentation claim is true: commands, options, files, types, and the example runs."""
+import os
+import re
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+from house import ROOT, shown
+
+README = (ROOT / 'README.md').read_text(encoding='utf-8')
+DOCUMENTS = [ROOT / 'README.md'] + sorted((ROOT / 'doc').glob('**/*.md'))
+OURS = {'scripts', 'rosrun', 'roslaunch'}
+
+
+def blocks(language):
+    return re.findall(r'^```{}\n(.*?)^```'.format(language), README, re.MULTILINE | re.DOTALL)
+
+
+def command_lines():
+    for block in blocks('bash'):
+        for line in block.splitlines():
+            words = shlex.split(line, comments=True)
+            if words:
+                yield words
+
+
+def run_python(*arguments):
+    """Run Python as a user of the package does, built or from its sources; return the output."""
+    path = [os.environ.get('SMACH_UPSTREAM'), os.environ.get('PYTHONPATH'), str(ROOT / 'src')]
+    env = dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, path)))
+    command = [sys.executable] + [str(argument) for argument in arguments]
+    result = subprocess.run(command, env=env, timeout=60, check=False,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert result.returncode == 0, result.stdout.decode()
+    return result.stdout.decode()
+
+
+@pytest.mark.parametrize('words', command_lines(), ids=' '.join)
+def test_a_command_of_the_readme_is_there(words):
+    if words[0] == 'rosrun':
+        assert words[1] == 'smach_oracle'
+        command = ROOT / 'scripts' / words[2]
+        assert command.read_text().startswith('#!/usr/bin/env python3')
+    else:
+        command = ROOT / (words[1] if words[0] == 'source' else words[0])
+        if words[0] == 'roslaunch':
+            command = ROOT / 'launch' / words[2]
+    assert command.is_file()
+    assert words[0] in ('source', 'roslaunch') or os.access(str(command), os.X_OK)
+
+
+def test_every_option_in_the_readme_is_one_that_its_command_knows():
+    for words in command_lines():
+        if words[0] != 'rosrun':
+            continue
+        # what follows a script belongs to the script
+        own = words[3:next((index for index, word in enumerate(words) if word.endswith('.py')), len(words))]
+        options = [word for word in own if word.startswith('--')]
+        known = run_python(ROOT / 'scripts' / words[2], '--help') if options else ''
+        assert all(option in known for option in options), (words[2], options)
+
+
+def test_every_launch_argument_in_the_readme_is_one_that_the_file_takes():
+    for words in command_lines():
+        if words[0] == 'roslaunch':
+            arguments = ElementTree.parse(str(ROOT / 'launch' / words[2])).getroot().findall('arg')
+            given = {word.split(':=')[0] for word in words[3:]}
+            assert given <= {argument.get('name') for argument in arguments if argument.get('default') is not None}
+
+
+def test_every_command_named_in_the_text_is_there():
+    names = set(re.findall(r'`([a-z]+_[a-z_]+)`', README))
+    commands = {name for name in names if re.match(r'(expert|scripted|bag|oracle|run|stub)_', name)}
+    assert commands and all((ROOT / 'scripts' / name).is_file() for name in commands - {'oracle_run.launch'}), commands
+
+
+def test_the_example_runs(tmp_path):
+    example, = blocks('python')
+    script = tmp_path / 'example.py'
+    script.write_text(example)
+    run_python(script)
+
+
+def test_every_type_in_the_table_of_the_ros_interface_is_there():
+    rows = re.findall(r'^\| `~[^|]*\| (action|topic|service) `(\w+)`', README, re.MULTILINE)
+    folders = {'action': 'action/{}.action', 'topic': 'msg/{}.msg', 'service': 'srv/{}.srv'}
+    assert len(rows) >= 6
+    assert all((ROOT / folders[kind].format(name)).is_file() for kind, name in rows)
+
+
+@pytest.mark.parametrize('path', DOCUMENTS, ids=shown)
+def test_every_file_that_a_document_links_to_is_there(path):
+    text = re.sub(r'^```.*?^```', '', path.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL)
+    links = [link.split('#')[0] for link in re.findall(r'\]\(([^)\s]+)\)', text) if '://' not in link]
+    assert not [link for link in links if link and not (path.parent / link).exists()]
+
+
+def test_every_folder_and_file_named_in_the_readme_is_there():
+    named = re.findall(r'`((?:src|scripts|launch|doc|test|benchmarks)(?:/[\w./]+)?)[` ]', README)
+    named += re.findall(r'`(requirements[\w.-]*)`', README)
+    assert len(named) > 10
+    assert not [name for name in named if not (ROOT / name).exists()]
+
+
+def test_every_document_is_in_the_index():
+    index = (ROOT / 'doc/index.md').read_text(encoding='utf-8')
+    listed = set(re.findall(r'\]\(([\w./-]+)\)', index))
+    documents = {str(path.relative_to(ROOT / 'doc')) for path in (ROOT / 'doc').glob('**/*.md')} - {'index.md'}
+    assert documents <= listed
