@@ -57,7 +57,7 @@ class TaskWorld(unittest.TestCase):
 
     def test_the_hidden_cause_is_told_for_the_record(self) -> None:
         cause = rospy.wait_for_message('world/cause', TrialCause, 10.0)
-        self.assertEqual((cause.seed, cause.states), (3, []))
+        self.assertEqual((cause.seed, cause.kinds), (3, []))
 
 
 if __name__ == '__main__':

@@ -154,8 +154,9 @@ def assisted_outputs(state: str) -> Dict[str, Any]:
 
 def cause_of(seed: int, faults: List[Fault]) -> TrialCause:
     """The hidden cause as a message."""
-    return TrialCause(header=Header(stamp=rospy.get_rostime()), seed=seed, states=[fault.state for fault in faults],
-                      cures=[fault.cure for fault in faults], strength=[fault.strength for fault in faults])
+    return TrialCause(header=Header(stamp=rospy.get_rostime()), seed=seed, task='pick_and_place',
+                      kinds=['fault_of_{}'.format(fault.state.lower()) for fault in faults],
+                      details=['cured by {}, strength {}'.format(fault.cure, fault.strength) for fault in faults])
 
 
 def _seconds(parameter: str) -> float:

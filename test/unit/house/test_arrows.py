@@ -6,14 +6,15 @@ from typing import Set
 import pytest
 from house import ROOT, imports, python_files, shown
 
-ROOMS = ('oracle', 'ros', 'expert', 'simulation', 'tasks', 'analysis')
+ROOMS = ('oracle', 'ros', 'expert', 'simulation', 'tasks', 'analysis', 'geometry')
 INTERFACES = {'msg', 'srv'}
 # room: the other rooms that it may import
 ARROWS = {
     'oracle': set(),
     'ros': {'oracle'},
-    'expert': {'oracle', 'ros'},
-    'simulation': {'oracle', 'ros', 'analysis'},
+    'expert': {'oracle', 'ros', 'geometry'},
+    'simulation': {'oracle', 'ros', 'analysis', 'geometry', 'expert'},
+    'geometry': set(),
     'tasks': set(),
     'analysis': {'oracle'},
 }
@@ -38,6 +39,13 @@ def test_a_room_imports_only_the_rooms_that_it_may(room):
             if parts[0] == 'smach_oracle' and parts[1] not in ARROWS[room] | INTERFACES | {room}:
                 wrong.append('{}:{} imports {}'.format(shown(path), line, name))
     assert not wrong
+
+
+def test_no_subsystem_of_the_robot_can_read_the_truth_of_the_world():
+    for path in python_files('src/smach_oracle/simulation/robot'):
+        wrong = [name for _, name in imports(path)
+                 if name.startswith('smach_oracle.simulation.') and name.split('.')[2] != 'robot']
+        assert not wrong, '{} imports {}'.format(shown(path), wrong)
 
 
 def test_every_room_is_known_here():

@@ -1,0 +1,54 @@
+"""Rigid transforms as 4x4 arrays: `a_from_b` takes points in frame b to frame a (m, right-handed, REP 103)."""
+from typing import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+def transform(position: Sequence[float] = (0.0, 0.0, 0.0), rotation: np.ndarray = np.eye(3)) -> np.ndarray:
+    """4x4 of a position (3,) in m and a rotation matrix (3, 3)."""
+    result = np.eye(4)
+    result[:3, :3] = rotation
+    result[:3, 3] = position
+    return result
+
+
+def from_rpy(position: Sequence[float], roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> np.ndarray:
+    """4x4 of a position (m) and angles about the fixed axes x, y, z (rad), as in URDF."""
+    return transform(position, Rotation.from_euler('xyz', [roll, pitch, yaw]).as_matrix())
+
+
+def from_quaternion(position: Sequence[float], xyzw: Sequence[float]) -> np.ndarray:
+    """4x4 of a position (m) and a quaternion (x, y, z, w), which need not have unit length.
+
+    :raises ValueError: for a quaternion of zero length or one that is not finite.
+    """
+    if not np.isfinite(xyzw).all() or not np.isfinite(position).all():
+        raise ValueError('pose is not finite: position {}, quaternion {}'.format(list(position), list(xyzw)))
+    return transform(position, Rotation.from_quat(xyzw).as_matrix())
+
+
+def quaternion(matrix: np.ndarray) -> np.ndarray:
+    """(x, y, z, w) of the rotation of a 4x4 or 3x3."""
+    return Rotation.from_matrix(matrix[:3, :3]).as_quat()
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a rigid 4x4."""
+    rotation = matrix[:3, :3].T
+    return transform(-rotation @ matrix[:3, 3], rotation)
+
+
+def apply(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (..., 3) in m, taken through a 4x4."""
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def rotation_vector(matrix: np.ndarray) -> np.ndarray:
+    """Axis times angle (3,), rad, of the rotation of a 4x4 or 3x3."""
+    return Rotation.from_matrix(matrix[:3, :3]).as_rotvec()
+
+
+def yaw_of(matrix: np.ndarray) -> float:
+    """Heading of the x axis in the xy plane, rad."""
+    return float(np.arctan2(matrix[1, 0], matrix[0, 0]))

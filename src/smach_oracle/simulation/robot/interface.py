@@ -1,0 +1,76 @@
+"""What the PR2 offers its own subsystems: encoders, controllers, a camera. Nothing here knows the truth of the world.
+
+Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the world's DirectRobot,
+which runs in one process. Lengths in m, angles in rad, times in s; frames as in REP 105 and REP 120.
+"""
+from typing import Dict, List, NamedTuple, Sequence
+
+import numpy as np
+from typing_extensions import Protocol
+
+ARMS = ('left', 'right')
+ARM_JOINTS: Dict[str, List[str]] = {
+    arm: [arm[0] + name for name in ('_shoulder_pan_joint', '_shoulder_lift_joint', '_upper_arm_roll_joint',
+                                     '_elbow_flex_joint', '_forearm_roll_joint', '_wrist_flex_joint',
+                                     '_wrist_roll_joint')] for arm in ARMS}
+TOOL_FRAME = {arm: arm[0] + '_gripper_tool_frame' for arm in ARMS}
+BASE_FRAME = 'base_footprint'  # on the floor below the middle of the base; the frame subsystems think in
+ODOM_FRAME = 'odom_combined'
+CAMERA_FRAME = 'wide_stereo_optical_frame'
+GRIPPER_OPEN = 0.09  # m between the finger tips
+
+
+class RobotError(Exception):
+    """A controller refused or missed a command; the text says which, what was asked and what came of it."""
+
+
+class GripperState(NamedTuple):
+    """Where a gripper came to rest."""
+
+    position: float  # m between the finger tips
+    effort: float  # N
+    stalled: bool  # it stopped before the position that it was sent to: it holds something, or is blocked
+    reached: bool
+
+
+class Frame(NamedTuple):
+    """What the head camera saw at one moment."""
+
+    stamp: float  # s, ROS time
+    colour: np.ndarray  # (h, w, 3) uint8, RGB
+    depth: np.ndarray  # (h, w) float32, m along the optical axis, registered to colour; NaN where nothing was measured
+    intrinsics: np.ndarray  # (3, 3)
+    base_from_camera: np.ndarray  # 4x4, BASE_FRAME from CAMERA_FRAME (z forward, x right, y down)
+
+
+class Robot(Protocol):
+    """A PR2, as its encoders and controllers present it. Calls return when the motion has ended."""
+
+    def joints(self) -> Dict[str, float]:
+        """Encoder readings of all joints of the URDF that move, now, with everything at rest."""
+
+    def odom_from_base(self) -> np.ndarray:
+        """4x4: where the robot believes to stand (ODOM_FRAME from BASE_FRAME)."""
+
+    def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
+        """Follow a joint trajectory.
+
+        :param positions: (n, len(joints)), the points after the present one.
+        :param times: (n,), s from the start, increasing.
+        :raises RobotError: where the controller refuses it, or a joint ends or strays too far from it.
+        """
+
+    def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
+        """Open or close a gripper to `position` m between the tips, with at most `max_effort` N."""
+
+    def torso(self, height: float) -> None:
+        """Lift the torso joint to `height` m. Raises RobotError."""
+
+    def look_at(self, point: Sequence[float]) -> None:
+        """Point the camera's optical axis at a point of BASE_FRAME. Raises RobotError."""
+
+    def drive(self, odom_from_goal: np.ndarray) -> None:
+        """Drive the base to a pose in ODOM_FRAME, straight and blindly. Raises RobotError where it ends elsewhere."""
+
+    def see(self) -> Frame:
+        """A fresh frame of the head camera. Raises RobotError where none comes."""

@@ -1,0 +1,77 @@
+"""What a trial's world is made of: plain data, drawn from the trial's seed by the scenes, built by the world."""
+from typing import Dict, NamedTuple, Tuple
+
+Vector = Tuple[float, float, float]
+
+
+class Body(NamedTuple):
+    """A thing in the world. Its frame is the world's: the floor is z = 0, the robot starts near the origin facing x."""
+
+    name: str
+    shape: str  # 'box', 'cylinder' or 'urdf'
+    size: Vector  # m; box: full extents; cylinder: radius, radius, height; urdf: unused
+    position: Vector  # m, of its centre (urdf: of its root)
+    yaw: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    mass: float = 0.0  # kg; 0: it cannot move
+    friction: float = 0.8
+    colour: Vector = (0.5, 0.5, 0.5)
+    urdf: str = ''  # text of the model, for shape 'urdf'
+    joints: Tuple[Tuple[str, float], ...] = ()  # urdf: where its joints start
+    joint_friction: Tuple[Tuple[str, float], ...] = ()  # urdf: N or N m
+
+
+class Sensor(NamedTuple):
+    """How well the head camera sees in this trial."""
+
+    noise: float = 1.0  # depth noise, times that of a Kinect
+    dropout: float = 0.005  # share of depth pixels lost at random
+    brightness: float = 1.0  # of the light, 1 is a lit room
+    colour_noise: float = 6.0  # sigma, of 255
+
+
+class Disturbance(NamedTuple):
+    """Something that happens to the world in the course of a trial."""
+
+    kind: str  # which, of those that world/disturbances.py knows
+    after: str  # the event that sets it off, e.g. 'look_at' (first head motion), 'see:2' (second frame), 'drive:1'
+    values: Tuple[Tuple[str, float], ...] = ()
+
+
+class Cause(NamedTuple):
+    """A reason to fail that this world was given, for the analysis afterwards."""
+
+    kind: str  # short and stable, e.g. 'crowded', 'arm_in_view', 'sensor_noise', 'slippery_object'
+    text: str  # in words, with figures
+
+
+class RobotStart(NamedTuple):
+    """How the robot stands at the beginning; joints that are not named have their defaults."""
+
+    joints: Tuple[Tuple[str, float], ...] = ()
+    base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
+    drive_error: Vector = (0.0, 0.0, 0.0)  # sigma of x, y, yaw that each drive adds between truth and odometry
+
+
+class Goal(NamedTuple):
+    """What makes the trial a true success; the judge reads it, nobody else."""
+
+    kind: str  # 'stands_at' or 'in_hand'
+    body: str  # name of the body; '' : any of the movable ones
+    position: Vector = (0.0, 0.0, 0.0)  # stands_at: m, of its centre, in the world
+    tolerance: float = 0.06  # m, horizontally
+
+
+class Scene(NamedTuple):
+    """A trial's world."""
+
+    task: str
+    seed: int
+    bodies: Tuple[Body, ...]
+    goal: Goal
+    robot: RobotStart = RobotStart()
+    sensor: Sensor = Sensor()
+    disturbances: Tuple[Disturbance, ...] = ()
+    causes: Tuple[Cause, ...] = ()
+    notes: Dict[str, float] = {}
