@@ -1,0 +1,130 @@
+"""What the robot knows of its kitchen: a refrigerator, where it stands and how it is built. The map, not the truth.
+
+The fridge's frame: origin on the floor in the middle of the front opening, x into the fridge, y to the left of whoever
+faces it, z up. Its door hangs on the left and opens towards that side. Lengths in m, angles in rad.
+"""
+from typing import Any, Dict, List, NamedTuple, Tuple
+
+import numpy as np
+
+from ...geometry.transforms import apply, from_rpy, inverse, yaw_of
+
+
+class Kitchen(NamedTuple):
+    """The map of the kitchen."""
+
+    place: Tuple[float, float, float] = (1.60, 0.0, 0.0)  # x, y, yaw of the fridge's frame in odom_combined
+    width: float = 0.60  # outer
+    depth: float = 0.50  # of the body, without the door
+    height: float = 1.50
+    wall: float = 0.02
+    shelves: Tuple[float, ...] = (0.45, 0.80, 1.25)  # heights of their upper faces
+    drinks_shelf: int = 1  # which of them has the drinks
+    door_thickness: float = 0.04
+    handle_radius: float = 0.011
+    handle_inset: float = 0.05  # its axis, from the free edge of the door
+    handle_stand_off: float = 0.065  # its axis, from the outer face of the door
+    handle_span: Tuple[float, float] = (0.725, 1.175)  # heights of its ends
+
+
+class MapBox(NamedTuple):
+    """A box of the map, in the frame of the base."""
+
+    centre: np.ndarray  # (3,)
+    half: np.ndarray  # (3,)
+    yaw: float
+
+
+def kitchen_from(settings: Dict[str, Any]) -> Kitchen:
+    """The map with some of its values given, as from a parameter.
+
+    :raises ValueError: for a name that is not there, or a value of another form than its default.
+    """
+    if not isinstance(settings, dict):
+        raise ValueError('kitchen: a dictionary is needed, not {!r}'.format(settings))
+    unknown = sorted(set(settings) - set(Kitchen._fields))
+    if unknown:
+        raise ValueError('kitchen: unknown {}; allowed: {}'.format(', '.join(map(str, unknown)),
+                                                                   ', '.join(Kitchen._fields)))
+    kitchen = Kitchen(**{name: _like(name, value) for name, value in settings.items()})
+    if not 0 <= kitchen.drinks_shelf < len(kitchen.shelves):
+        raise ValueError('kitchen: drinks_shelf is {}, shelves there are {}'.format(kitchen.drinks_shelf,
+                                                                                   len(kitchen.shelves)))
+    return kitchen
+
+
+def base_from_fridge(kitchen: Kitchen, odom_from_base: np.ndarray) -> np.ndarray:
+    """4x4: where the fridge is, as far as the robot knows where it stands itself."""
+    x, y, yaw = kitchen.place
+    return inverse(odom_from_base) @ from_rpy((x, y, 0.0), yaw=yaw)
+
+
+def odom_from_pose(kitchen: Kitchen, x: float, y: float, yaw: float) -> np.ndarray:
+    """4x4 in odom_combined of a pose on the floor given in the fridge's frame."""
+    return from_rpy((kitchen.place[0], kitchen.place[1], 0.0), yaw=kitchen.place[2]) @ from_rpy((x, y, 0.0), yaw=yaw)
+
+
+def door_frame(kitchen: Kitchen, angle: float) -> np.ndarray:
+    """4x4, fridge from door: origin at the hinge on the floor, x along the outer normal, y towards the free edge."""
+    # closed, the outer normal is -x of the fridge and the free edge lies towards -y: a turn by half a circle
+    return from_rpy((0.0, kitchen.width / 2, 0.0), yaw=np.pi - angle)
+
+
+def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
+    """(3,) of the handle's axis at a height, in the fridge's frame, with the door open by `angle`."""
+    out = kitchen.door_thickness + kitchen.handle_stand_off
+    return apply(door_frame(kitchen, angle), np.array([out, kitchen.width - kitchen.handle_inset, height]))
+
+
+def fridge_boxes(kitchen: Kitchen, base_from_fridge: np.ndarray, door_angle: float) -> List[MapBox]:
+    """The fridge as boxes for a collision map: walls, shelves, the door at `door_angle`, its handle."""
+    wall, half_width = kitchen.wall, kitchen.width / 2
+    middle = kitchen.depth / 2
+    parts = [((middle, side * (half_width - wall / 2), kitchen.height / 2), (middle, wall / 2, kitchen.height / 2))
+             for side in (-1, 1)]
+    parts.append(((kitchen.depth - wall / 2, 0.0, kitchen.height / 2), (wall / 2, half_width, kitchen.height / 2)))
+    parts += [((middle, 0.0, top - 0.01), (middle, half_width, 0.01)) for top in kitchen.shelves + (kitchen.height,)]
+    boxes = [_placed(base_from_fridge, centre, half) for centre, half in parts]
+    base_from_door = base_from_fridge @ door_frame(kitchen, door_angle)
+    thick, low, high = kitchen.door_thickness, kitchen.handle_span[0], kitchen.handle_span[1]
+    boxes.append(_placed(base_from_door, (thick / 2, half_width, kitchen.height / 2),
+                         (thick / 2, half_width, kitchen.height / 2)))
+    out = (thick + kitchen.handle_stand_off + kitchen.handle_radius) / 2
+    boxes.append(_placed(base_from_door, (out, kitchen.width - kitchen.handle_inset, (low + high) / 2),
+                         (out, kitchen.handle_radius, (high - low) / 2)))
+    return boxes
+
+
+def shelf_region(kitchen: Kitchen) -> Tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (3,), in the fridge's frame, of the space above the shelf that has the drinks."""
+    floor = kitchen.shelves[kitchen.drinks_shelf]
+    ceiling = min([top for top in kitchen.shelves if top > floor] + [kitchen.height]) - kitchen.wall
+    side = kitchen.width / 2 - kitchen.wall
+    return np.array([0.0, -side, floor]), np.array([kitchen.depth - kitchen.wall, side, ceiling])
+
+
+def look_point(kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
+    """(3,) in the frame of the base: where to point the camera to see the drinks."""
+    floor = kitchen.shelves[kitchen.drinks_shelf]
+    return apply(base_from_fridge, np.array([0.15, 0.0, floor + 0.05]))
+
+
+def _placed(base_from_part: np.ndarray, centre: Tuple[float, float, float], half: Tuple[float, float, float]) -> MapBox:
+    return MapBox(apply(base_from_part, np.array(centre)), np.array(half), yaw_of(base_from_part))
+
+
+def _like(name: str, value: Any) -> Any:
+    """`value` as the default of this name is: an int, a float, or a tuple of floats (of the same length, if a pose)."""
+    default = Kitchen._field_defaults[name]
+    try:
+        if isinstance(default, tuple):
+            made = tuple(float(item) for item in value)
+            right = np.isfinite(made).all() and (name == 'shelves' and made or len(made) == len(default))
+        else:
+            made = type(default)(value)
+            right = made == float(value) and (made > 0 or isinstance(default, int)) and np.isfinite(made)
+    except (TypeError, ValueError) as err:
+        raise ValueError('kitchen: {} is {!r}; needed is something like {!r}'.format(name, value, default)) from err
+    if not right:
+        raise ValueError('kitchen: {} is {!r}; needed is something like {!r}'.format(name, value, default))
+    return made

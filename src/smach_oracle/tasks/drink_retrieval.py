@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Fetch a drink out of a refrigerator and hand it to a person, again and again (the paper's second use case, VI-B).
+
+A plain SMACH script over actions. It stops a trial at the first action that fails.
+"""
+import argparse
+import math
+import sys
+from typing import List, Optional
+
+import rospy
+import smach
+from control_msgs.msg import SingleJointPositionAction, SingleJointPositionGoal
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from smach_ros import SimpleActionState
+from smach_oracle.msg import (CloseDoorAction, CloseDoorGoal, DetectDrinkAction, DetectDrinkGoal, HandOverAction,
+                              HandOverGoal, OpenDoorAction, OpenDoorGoal, PickAction, PickGoal)
+from smach_oracle.srv import ResetWorld, ResetWorldRequest
+from std_msgs.msg import Header
+
+SERVER_WAIT_S = 20.0
+ODOM = 'odom_combined'
+FRIDGE = 'fridge'  # the collision map that PICK plans in: the known furniture, and what the camera sees on its shelf
+TORSO_HEIGHT = 0.25  # m
+# x, y in m, yaw in rad, in odom_combined
+IN_THE_FRIDGE = (1.00, -0.20, 0.0)
+OUT_OF_THE_FRIDGE = (0.70, -0.42, 0.0)
+HOME = (0.0, 0.0, -math.pi / 2)
+PALM = (-0.10, -0.62, 0.85)  # m; the middle of the palm that waits for the drink
+
+
+def make_machine() -> smach.StateMachine:
+    """The state machine of Fig. 7 in the paper, without its oracle."""
+    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    with sm:
+        smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'OPEN_FRIDGE'})
+        smach.StateMachine.add('OPEN_FRIDGE', action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
+                               {'succeeded': 'MOVE_IN'})
+        smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
+        smach.StateMachine.add('DETECT_DRINK',
+                               action('detect_drink', DetectDrinkAction, goal=DetectDrinkGoal(0.05),
+                                      result_slots=['drink', 'size']),
+                               {'succeeded': 'PICK_DRINK'})
+        smach.StateMachine.add('PICK_DRINK',
+                               action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size'],
+                                      result_slots=['grasp']),
+                               {'succeeded': 'MOVE_OUT'})
+        smach.StateMachine.add('MOVE_OUT', drive(*OUT_OF_THE_FRIDGE), {'succeeded': 'CLOSE_FRIDGE'})
+        smach.StateMachine.add('CLOSE_FRIDGE', action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
+                               {'succeeded': 'MOVE_HOME'})
+        smach.StateMachine.add('MOVE_HOME', drive(*HOME), {'succeeded': 'HAND_OVER'})
+        smach.StateMachine.add('HAND_OVER', action('hand_over', HandOverAction, goal=HandOverGoal('right', palm())))
+    return sm
+
+
+def action(name: str, spec: type, **options: object) -> SimpleActionState:
+    """An action state that does not wait for its server for ever."""
+    return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S), **options)
+
+
+def torso(height_m: float) -> SimpleActionState:
+    """A state that lifts the torso."""
+    return action('torso_controller/position_joint_action', SingleJointPositionAction,
+                  goal=SingleJointPositionGoal(position=height_m))
+
+
+def drive(x_m: float, y_m: float, yaw: float) -> SimpleActionState:
+    """A state that drives the base to a pose in odom_combined."""
+    heading = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    target = PoseStamped(Header(frame_id=ODOM), Pose(Point(x_m, y_m, 0.0), heading))
+    return action('move_base', MoveBaseAction, goal=MoveBaseGoal(target))
+
+
+def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
+    """Pick the drink with the right arm; the door stands open on the left."""
+    return PickGoal('right', userdata.drink, userdata.size, FRIDGE)
+
+
+def palm() -> PoseStamped:
+    """Where the person holds out a hand."""
+    return PoseStamped(Header(frame_id=ODOM), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
+
+
+def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
+    """Run the machine once per trial.
+
+    :returns: how many trials ended in success.
+    """
+    rospy.wait_for_service('world/reset', SERVER_WAIT_S)
+    reset = rospy.ServiceProxy('world/reset', ResetWorld)
+    successes = 0
+    for trial in range(trials):
+        if rospy.is_shutdown():
+            break
+        answer = reset(ResetWorldRequest(seed=seed + trial))
+        if not answer.ok:
+            raise RuntimeError('world/reset: ' + answer.message)
+        sm.userdata = smach.UserData()
+        outcome = sm.execute()
+        successes += outcome == 'succeeded'
+        rospy.loginfo('trial %d of %d (seed %d): %s', trial + 1, trials, seed + trial, outcome)
+    return successes
+
+
+def main(argv: Optional[List[str]] = None) -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description='Fetch a drink out of a refrigerator and hand it over.')
+    parser.add_argument('--trials', type=int, default=1, help='how many times (default: 1)')
+    parser.add_argument('--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)')
+    args = parser.parse_args(rospy.myargv(argv if argv is not None else sys.argv)[1:])
+    if args.trials < 1 or args.seed < 0:
+        parser.error('--trials must be 1 or more and --seed 0 or more')
+    rospy.init_node('drink_retrieval')
+    successes = run_trials(make_machine(), args.trials, args.seed)
+    rospy.loginfo('%d of %d trials succeeded', successes, args.trials)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
