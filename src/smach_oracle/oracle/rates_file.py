@@ -6,7 +6,7 @@ relative to the top machine ('' itself), so that renaming the machine loses noth
 import json
 import os
 import tempfile
-from typing import Any, Dict, Iterable
+from typing import Any, Dict, Iterable, Mapping
 
 import smach
 
@@ -15,9 +15,18 @@ VERSION = 1
 DAMAGED = '.damaged'
 
 
+def learned_by(ledgers: Iterable[Any]) -> Dict[str, Dict[str, Any]]:
+    """Return what was learned, as the "containers" of a rates file."""
+    return {ledger.relative_path: ledger.learned_rates() for ledger in ledgers}
+
+
 def write_rates(path: str, ledgers: Iterable[Any]) -> None:
     """Write what was learned to `path`, atomically and durably. Raises OSError; the old file is then untouched."""
-    containers = {ledger.relative_path: ledger.learned_rates() for ledger in ledgers}
+    write_learned(path, learned_by(ledgers))
+
+
+def write_learned(path: str, containers: Mapping[str, Any]) -> None:
+    """Write what `learned_by` returned, as `write_rates` does. Raises OSError."""
     text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1, sort_keys=True)
     folder = os.path.dirname(os.path.abspath(path))
     descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp', dir=folder)

@@ -1,7 +1,8 @@
 """Trials: one execution of the top machine is one trial; and what one execution of any container begins and ends."""
-from typing import Any, Callable, Optional
+from typing import Any, Callable, Dict, Optional
 
 from .events import NO_OUTCOME, EventKind
+from .rates_file import learned_by
 from .reporting import ledgers_of
 from .wrapping import adopt
 
@@ -24,7 +25,7 @@ def run_container(machine: Any, execute: Callable[[], Optional[str]]) -> Optiona
 def _run_trial(machine: Any, execute: Callable[[], Optional[str]]) -> Optional[str]:
     ledger = machine._oracle
     ledger.emit(EventKind.TRIAL_START, data={'initial': [machine._initial_state_label or ''],
-                                             'recovers': ledger.tree.recover})
+                                             'recovers': ledger.tree.recover, 'settings': _settings(ledger)})
     outcome, text = None, ''
     try:
         outcome = _run(machine, execute)
@@ -33,8 +34,23 @@ def _run_trial(machine: Any, execute: Callable[[], Optional[str]]) -> Optional[s
         text = '{}: {}'.format(type(err).__name__, err)
         raise
     finally:
-        ledger.emit(EventKind.TRIAL_END, outcome=outcome or '', text=text or _why_none(outcome))
+        ledger.emit(EventKind.TRIAL_END, outcome=outcome or '', text=text or _why_none(outcome), data=_learned(machine))
         ledger.save_rates()
+
+
+def _settings(ledger: Any) -> Dict[str, Any]:
+    """What the oracle of the top machine decides by, but for what is set for single states."""
+    settings, defaults = ledger.settings, ledger.settings.defaults
+    return {'policy': settings.policy, 'memory': defaults.memory, 'estimator': defaults.estimator,
+            'prior': defaults.prior, 'moderate_from': defaults.moderate_from, 'high_from': defaults.high_from,
+            'max_recoveries': defaults.max_recoveries}
+
+
+def _learned(machine: Any) -> Optional[Dict[str, Any]]:
+    """What was learned so far, where it is kept across runs: a record of the trial tells how to go on after it."""
+    if not machine._oracle.settings.rates_file:
+        return None
+    return {'learned': learned_by(ledgers_of(machine))}
 
 
 def _run(machine: Any, execute: Callable[[], Optional[str]]) -> Optional[str]:

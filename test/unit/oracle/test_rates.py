@@ -270,6 +270,20 @@ def test_a_writer_killed_at_any_moment_leaves_a_whole_file(tmp_path):
     assert machine.rate('A').failures == counts[-1]
 
 
+def test_the_record_of_a_trial_tells_how_to_go_on_after_it(tmp_path):
+    path = tmp_path / 'rates.json'
+    watch = watched(Scripted('aborted'), settings={'rates_file': str(path), 'memory': 7, 'policy': 'algorithm1'})
+    watch.machine.execute()
+    settings, learned = watch.events[0].data['settings'], watch.events[-1].data['learned']
+    assert (settings['policy'], settings['memory'], settings['moderate_from']) == ('algorithm1', 7, 0.4)
+    assert learned == json.loads(path.read_text())['containers']
+    rates_file.write_learned(str(tmp_path / 'again.json'), learned)
+    assert (tmp_path / 'again.json').read_text() == path.read_text()
+    plain = watched(Scripted('aborted'))
+    plain.machine.execute()
+    assert plain.events[-1].data is None, 'nothing is kept, so nothing is told'
+
+
 def test_rates_can_be_saved_and_loaded_by_hand(tmp_path):
     machine = watched(Scripted('aborted')).machine
     machine.execute()
