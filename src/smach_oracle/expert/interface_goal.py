@@ -1,0 +1,185 @@
+"""The SharedAutonomy action of an interface that one person uses at a time: one goal, settled by that person.
+
+A second goal is refused with a text; a preempt, and the loss of the node that asked, end the goal.
+"""
+import threading
+from typing import Any, Callable, Dict, Mapping, Optional, Sequence
+
+import actionlib
+import rospy
+
+from smach_oracle.msg import (SharedAutonomyAction, SharedAutonomyFeedback, SharedAutonomyGoal, SharedAutonomyResult,
+                              UserdataItem)
+from smach_oracle.srv import (FinishInterface, FinishInterfaceRequest, FinishInterfaceResponse, GiveUpInterface,
+                              GiveUpInterfaceRequest, GiveUpInterfaceResponse)
+
+from ..oracle.errors import OracleError
+from ..oracle.question import names
+from ..ros.userdata_codec import UserdataCodecError, decode, decode_all, encode_all
+
+NO_GOAL = 'no goal is active: the oracle has not started this interface, or it has ended'
+
+
+class InterfaceGoalError(OracleError, ValueError):
+    """A goal cannot be settled so; the text says what is allowed."""
+
+
+class InterfaceGoal:
+    """Hosts the action; `begun` and `ended` are called at the beginning and the end of each goal, in ROS threads."""
+
+    def __init__(self, name: str, begun: Callable[[SharedAutonomyGoal], None], ended: Callable[[], None]) -> None:
+        """`name` of the action, e.g. manipulation_interface.
+
+        `begun` may raise ValueError, whose text then refuses the goal.
+        """
+        self.name = rospy.resolve_name(name)
+        self._begun = begun
+        self._ended = ended
+        self._handle: Optional[actionlib.ServerGoalHandle] = None
+        self._lock = threading.RLock()
+        self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal, self._on_cancel,
+                                              auto_start=False)
+        self._action.start()
+
+    @property
+    def goal(self) -> Optional[SharedAutonomyGoal]:
+        """The goal that is worked on."""
+        handle = self._handle
+        return handle.get_goal() if handle is not None else None
+
+    def inputs(self) -> Dict[str, Any]:
+        """The failed state's input userdata, as far as it could be sent.
+
+        :raises InterfaceGoalError: where no goal is active or an input is malformed.
+        """
+        goal = self.goal
+        if goal is None:
+            raise InterfaceGoalError(NO_GOAL)
+        try:
+            return decode_all(goal.userdata, skip_unsent=True)
+        except UserdataCodecError as err:
+            raise InterfaceGoalError(str(err)) from err
+
+    def tell(self, progress: float, text: str) -> None:
+        """Feedback to the oracle: progress 0 to 1, -1 where unknown."""
+        handle = self._handle
+        if handle is not None:
+            handle.publish_feedback(SharedAutonomyFeedback(progress, text))
+
+    def finish(self, outcome: str, known: Mapping[str, Any], given: Sequence[UserdataItem] = (),
+               text: str = '') -> None:
+        """Supersede the state with `outcome`.
+
+        `known`: outputs that the interface can tell; keys that the state does not have are left out. `given`: outputs
+        that the person gave, which come first.
+
+        :raises InterfaceGoalError: where no goal is active, or the outcome or an output given does not fit it.
+        """
+        with self._lock:
+            goal = self.goal
+            if goal is None:
+                raise InterfaceGoalError(NO_GOAL)
+            if outcome not in goal.outcomes:
+                raise InterfaceGoalError('outcome {!r} is not one of {}; allowed: {}'.format(
+                    outcome, goal.state, names(goal.outcomes)))
+            outputs = {item.key: item for item in encode_all(known) if item.key in goal.output_keys}
+            outputs.update({item.key: _fitting(item, goal) for item in given})
+            result = SharedAutonomyResult(outcome, [outputs[key] for key in sorted(outputs)], text)
+            self._end(lambda handle: handle.set_succeeded(result, text))
+
+    def give_up(self, text: str) -> None:
+        """End the goal without a result; the oracle asks again.
+
+        :raises InterfaceGoalError: where no goal is active.
+        """
+        with self._lock:
+            if self._handle is None:
+                raise InterfaceGoalError(NO_GOAL)
+            self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(text=text), text))
+
+    def drop_if_asker_is_gone(self) -> None:
+        """End a goal whose asker's connection is gone; to be called now and then."""
+        with self._lock:
+            if self._handle is not None and not self._asker_connected(self._handle):
+                rospy.logwarn('%s: whoever asked is gone; its goal for %s ends', self.name, self.goal.state)
+                self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(), 'the asker is gone'))
+
+    def stop(self) -> None:
+        """Take the action down."""
+        if not rospy.is_shutdown():
+            self._action.stop()
+
+    def _asker_connected(self, handle: actionlib.ServerGoalHandle) -> bool:
+        asker = handle.status_tracker.goal._connection_header['callerid']
+        return any(each.endpoint_id == asker for each in self._action.result_pub.impl.connections)
+
+    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            self.drop_if_asker_is_gone()
+            goal = handle.get_goal()
+            why = self._why_not(goal)
+            if why:
+                rospy.logwarn('%s: goal for %s refused: %s', self.name, goal.state or '(no state)', why)
+                handle.set_rejected(SharedAutonomyResult(text=why), why)
+                return
+            self._handle = handle
+            handle.set_accepted()
+            rospy.loginfo('%s: a person takes over %s', self.name, goal.state)
+
+    def _why_not(self, goal: SharedAutonomyGoal) -> str:
+        if self._handle is not None:
+            return 'busy with {} of question {}; one goal at a time'.format(self.goal.state, self.goal.query_id)
+        if not goal.state or not goal.outcomes:
+            return 'a goal needs a state and its outcomes; given: {!r}, {}'.format(goal.state, names(goal.outcomes))
+        try:
+            self._begun(goal)
+        except ValueError as err:
+            return str(err)
+        return ''
+
+    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            if self._handle is not None and handle.get_goal_id().id == self._handle.get_goal_id().id:
+                self._end(lambda mine: mine.set_canceled(SharedAutonomyResult(text='preempted'), 'preempted'))
+
+    def _end(self, settle: Callable[[actionlib.ServerGoalHandle], None]) -> None:
+        handle, self._handle = self._handle, None
+        self._ended()
+        settle(handle)
+
+
+class SettlingServices:
+    """The services `~finish` and `~give_up` of an interface, for the front end of the person who uses it."""
+
+    def __init__(self, goal: InterfaceGoal, outputs: Callable[[str], Mapping[str, Any]]) -> None:
+        """`outputs`: for an outcome, what the interface can tell of the state's outputs."""
+        self._goal = goal
+        self._outputs = outputs
+        self._services = [rospy.Service('~finish', FinishInterface, self._finish),
+                          rospy.Service('~give_up', GiveUpInterface, self._give_up)]
+
+    def _finish(self, request: FinishInterfaceRequest) -> FinishInterfaceResponse:
+        try:
+            self._goal.finish(request.outcome, self._outputs(request.outcome), request.outputs, request.text)
+        except (InterfaceGoalError, UserdataCodecError) as err:
+            return FinishInterfaceResponse(False, str(err))
+        return FinishInterfaceResponse(True, '')
+
+    def _give_up(self, request: GiveUpInterfaceRequest) -> GiveUpInterfaceResponse:
+        try:
+            self._goal.give_up(request.text)
+        except InterfaceGoalError as err:
+            return GiveUpInterfaceResponse(False, str(err))
+        return GiveUpInterfaceResponse(True, '')
+
+
+def _fitting(item: UserdataItem, goal: SharedAutonomyGoal) -> UserdataItem:
+    """The item, if it is an output of the goal's state and says what it is."""
+    if item.key not in goal.output_keys:
+        raise InterfaceGoalError('output {!r} is not one of {}; allowed: {}'.format(
+            item.key, goal.state, names(goal.output_keys)))
+    try:
+        decode(item)
+    except UserdataCodecError as err:
+        raise InterfaceGoalError(str(err)) from err
+    return item
