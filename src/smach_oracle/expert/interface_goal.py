@@ -2,7 +2,6 @@
 
 A second goal is refused with a text; a preempt, and the loss of the node that asked, end the goal.
 """
-import threading
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
 import actionlib
@@ -25,7 +24,10 @@ class InterfaceGoalError(OracleError, ValueError):
 
 
 class InterfaceGoal:
-    """Hosts the action; `begun` and `ended` are called at the beginning and the end of each goal, in ROS threads."""
+    """Hosts the action; `begun` and `ended` are called at the beginning and the end of each goal.
+
+    They come under the action server's lock and must not wait for anything.
+    """
 
     def __init__(self, name: str, begun: Callable[[SharedAutonomyGoal], None], ended: Callable[[], None]) -> None:
         """`name` of the action, e.g. manipulation_interface.
@@ -36,9 +38,9 @@ class InterfaceGoal:
         self._begun = begun
         self._ended = ended
         self._handle: Optional[actionlib.ServerGoalHandle] = None
-        self._lock = threading.RLock()
         self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal, self._on_cancel,
                                               auto_start=False)
+        self._lock = self._action.lock  # its callbacks come under it; another one beside it would invite a deadlock
         self._action.start()
 
     @property
