@@ -2,6 +2,7 @@
 
 A second goal is refused with a text; a preempt, and the loss of the node that asked, end the goal.
 """
+import time
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
 import actionlib
@@ -16,6 +17,7 @@ from ..oracle.errors import OracleError
 from ..oracle.question import names
 from ..ros.userdata_codec import UserdataCodecError, decode, decode_all, encode_all
 
+ASKER_GONE_S = 3.0
 NO_GOAL = 'no goal is active: the oracle has not started this interface, or it has ended'
 
 
@@ -38,6 +40,8 @@ class InterfaceGoal:
         self._begun = begun
         self._ended = ended
         self._handle: Optional[actionlib.ServerGoalHandle] = None
+        self._asker: Any = None  # its connection
+        self._asker_seen_s = 0.0
         self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal, self._on_cancel,
                                               auto_start=False)
         self._lock = self._action.lock  # its callbacks come under it; another one beside it would invite a deadlock
@@ -100,9 +104,9 @@ class InterfaceGoal:
             self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(text=text), text))
 
     def drop_if_asker_is_gone(self) -> None:
-        """End a goal whose asker's connection is gone; to be called now and then."""
+        """End a goal whose asker's connection has been gone for 3 s; to be called now and then."""
         with self._lock:
-            if self._handle is not None and not self._asker_connected(self._handle):
+            if self._handle is not None and self._asker_missing_s() > ASKER_GONE_S:
                 rospy.logwarn('%s: whoever asked is gone; its goal for %s ends', self.name, self.goal.state)
                 self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(), 'the asker is gone'))
 
@@ -111,9 +115,15 @@ class InterfaceGoal:
         if not rospy.is_shutdown():
             self._action.stop()
 
-    def _asker_connected(self, handle: actionlib.ServerGoalHandle) -> bool:
-        asker = handle.status_tracker.goal._connection_header['callerid']
-        return any(each.endpoint_id == asker for each in self._action.result_pub.impl.connections)
+    def _asker_missing_s(self) -> float:
+        """For how long its own connection has been gone; another one of the same name is another process."""
+        connections = self._action.result_pub.impl.connections
+        if self._asker is None:
+            name = self._handle.status_tracker.goal._connection_header['callerid']
+            self._asker = next((each for each in connections if each.endpoint_id == name), None)
+        if any(each is self._asker for each in connections):
+            self._asker_seen_s = time.monotonic()
+        return time.monotonic() - self._asker_seen_s
 
     def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
         with self._lock:
@@ -124,7 +134,7 @@ class InterfaceGoal:
                 rospy.logwarn('%s: goal for %s refused: %s', self.name, goal.state or '(no state)', why)
                 handle.set_rejected(SharedAutonomyResult(text=why), why)
                 return
-            self._handle = handle
+            self._handle, self._asker, self._asker_seen_s = handle, None, time.monotonic()
             handle.set_accepted()
             rospy.loginfo('%s: a person takes over %s', self.name, goal.state)
 

@@ -1,0 +1,203 @@
+"""From the velocity that a person wants a tool to have to the velocities of the arm's joints, within all limits.
+
+Damped least squares; a limit slows all joints alike, so that the tool keeps its direction and only gets slower.
+ROS-free. Lengths in m, angles in rad, times in s; twists are (6,): linear, then angular, along the axes of the chain's
+base, about the tool's origin.
+"""
+from functools import partial
+from typing import Callable, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+from typing_extensions import Protocol
+
+_ROOM = 1e-4  # rad; a joint with less room than this before its limit takes no part in a motion towards it
+
+
+class Arm(Protocol):
+    """A serial chain, such as geometry.chain.Chain."""
+
+    names: List[str]  # of the joints
+    lower: np.ndarray  # rad; -inf for continuous joints
+    upper: np.ndarray  # rad; inf for continuous joints
+    velocity: np.ndarray  # rad/s, inf where there is none
+
+    def forward(self, joints: np.ndarray) -> np.ndarray:
+        """4x4: the chain's base from its tip."""
+
+    def jacobian(self, joints: np.ndarray) -> np.ndarray:
+        """(6, n): the tip's twist for unit joint velocities."""
+
+
+class Clearance(NamedTuple):
+    """The nearest thing that the arm could hit."""
+
+    distance: float  # m; negative where they overlap
+    between: str  # what is near what, for people
+    touchable: bool  # a thing of the world may be touched on purpose, if slowly; the robot's own body may not
+
+
+Near = Callable[[np.ndarray], Optional[Clearance]]
+
+
+class DriveLimits(NamedTuple):
+    """What a motion is held to."""
+
+    linear: float = 0.25  # m/s of the tool
+    angular: float = 1.0  # rad/s of the tool
+    joint_share: float = 0.5  # of the joints' own velocity limits
+    joint_margin: float = 0.02  # rad kept from the joints' position limits
+    singular_below: float = 0.06  # singular values of the Jacobian below this are damped
+    damping: float = 0.08  # at a singularity
+    off_course: float = 0.35  # share of the twist that may be lost to a joint at its limit; beyond it, nothing moves
+    slow_below: float = 0.08  # m of clearance
+    stop_below: float = 0.01  # m of clearance
+    creep: float = 0.2  # share of the speed left at `stop_below` towards what may be touched
+    workspace: Tuple[Tuple[float, ...], Tuple[float, ...]] = ((-1.5,) * 3, (1.5,) * 3)  # m, corners for the tool
+    posture_gain: float = 0.5  # 1/s, how fast spare joints leave the neighbourhood of their limits
+
+
+class Step(NamedTuple):
+    """One control period."""
+
+    joints: np.ndarray  # (n,) rad, at its end
+    velocities: np.ndarray  # (n,) rad/s
+    twist: np.ndarray  # (6,) what the tool does then
+    speed: float  # share of the wanted speed that is left, 0 to 1
+    limit: str  # what slowed it, '' where nothing did
+    clearance: float  # m, inf where nothing is near
+
+
+class CartesianDrive:
+    """Drives one arm's tool by velocities. Stateless: each step starts from the joints that it is given."""
+
+    def __init__(self, arm: Arm, limits: DriveLimits = DriveLimits(), near: Optional[Near] = None) -> None:
+        """`near` tells, for joint positions (n,), the nearest thing that the arm could hit, None where none is near."""
+        self.arm = arm
+        self.limits = limits
+        self._near = near
+        self._lower = arm.lower + limits.joint_margin
+        self._upper = arm.upper - limits.joint_margin
+        finite = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+        self._middle = np.where(finite, (np.where(finite, arm.lower, 0) + np.where(finite, arm.upper, 0)) / 2, 0.0)
+        self._half_range = np.where(finite, np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf)
+
+    def step(self, joints: np.ndarray, twist: np.ndarray, period: float) -> Step:
+        """Where the joints go within one period for the tool to move by `twist`.
+
+        :raises ValueError: for joints, a twist or a period that is not finite or has the wrong shape; a period of 0.
+        """
+        joints, twist = _checked(joints, twist, period, len(self.arm.names))
+        nearest = self._near(joints) if self._near is not None else None
+        clearance = nearest.distance if nearest is not None else float('inf')
+        if not twist.any():
+            return Step(joints, np.zeros(len(joints)), np.zeros(6), 1.0, '', clearance)
+        wanted, limit, share = self._within_tool_limits(twist)
+        jacobian = self.arm.jacobian(joints)
+        velocities, why, rest = self._joint_velocities(joints, jacobian, wanted)
+        limit, share = why or limit, share * rest
+        for slower in (self._joint_speed, self._joint_room, self._workspace, partial(self._obstacles, nearest)):
+            scale, why = slower(joints, velocities, period)
+            if scale < 1.0:
+                velocities, limit, share = velocities * scale, why, share * scale
+        return Step(joints + velocities * period, velocities, jacobian @ velocities, share, limit, clearance)
+
+    def _within_tool_limits(self, twist: np.ndarray) -> Tuple[np.ndarray, str, float]:
+        scale = min(1.0, _ratio(self.limits.linear, np.linalg.norm(twist[:3])),
+                    _ratio(self.limits.angular, np.linalg.norm(twist[3:])))
+        return twist * scale, 'the tool\'s speed limit' if scale < 1.0 else '', scale
+
+    def _joint_velocities(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray
+                          ) -> Tuple[np.ndarray, str, float]:
+        """Velocities for the twist, joints that stand at their limits left out as long as the others can do it.
+
+        :returns: velocities (n,), the limit met or '', and the share of the twist that is left along its direction.
+        """
+        free = np.ones(len(joints), dtype=bool)
+        stuck = ''
+        while free.any():
+            velocities, damped = self._least_squares(joints, jacobian, twist, free)
+            blocked = free & (((velocities > 0) & (joints > self._upper - _ROOM))
+                              | ((velocities < 0) & (joints < self._lower + _ROOM)))
+            if not blocked.any():
+                break
+            free &= ~blocked
+            stuck = 'joint limit of ' + ', '.join(np.array(self.arm.names)[~free])
+        else:
+            return np.zeros(len(joints)), stuck, 0.0
+        lost = np.linalg.norm(jacobian @ velocities - twist) / np.linalg.norm(twist)
+        if stuck and lost > self.limits.off_course:
+            return np.zeros(len(joints)), stuck, 0.0
+        along = float(np.clip(jacobian @ velocities @ twist / (twist @ twist), 0.0, 1.0))
+        return velocities, 'singular posture' if damped and lost > 0.02 else '', along
+
+    def _least_squares(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray, free: np.ndarray
+                       ) -> Tuple[np.ndarray, bool]:
+        """Least squares over the free joints, damped in the directions that are nearly singular alone."""
+        left, values, right = np.linalg.svd(jacobian[:, free], full_matrices=False)
+        nearness = np.clip(1.0 - (values / self.limits.singular_below) ** 2, 0.0, 1.0)
+        damping = self.limits.damping ** 2 * nearness
+        solution = right.T @ (values / (values ** 2 + damping) * (left.T @ twist))
+        spare = self._posture(joints, twist)[free]
+        solution += spare - right.T @ (right @ spare)
+        velocities = np.zeros(len(joints))
+        velocities[free] = solution
+        return velocities, bool(nearness.any())
+
+    def _posture(self, joints: np.ndarray, twist: np.ndarray) -> np.ndarray:
+        """Velocities (n,) away from limits that are near, for the motion that the tool does not notice."""
+        offset = (joints - self._middle) / self._half_range
+        effort = min(1.0, np.linalg.norm(twist[:3]) / self.limits.linear
+                     + np.linalg.norm(twist[3:]) / self.limits.angular)
+        return -effort * self.limits.posture_gain * np.sign(offset) * np.maximum(np.abs(offset) - 0.6, 0.0)
+
+    def _joint_speed(self, joints: np.ndarray, velocities: np.ndarray, period: float) -> Tuple[float, str]:
+        shares = np.abs(velocities) / (self.arm.velocity * self.limits.joint_share)
+        fastest = int(np.argmax(shares))
+        return _ratio(1.0, shares[fastest]), 'speed limit of ' + self.arm.names[fastest]
+
+    def _joint_room(self, joints: np.ndarray, velocities: np.ndarray, period: float) -> Tuple[float, str]:
+        room = np.where(velocities > 0, self._upper - joints, joints - self._lower)
+        way = np.abs(velocities) * period
+        shares = np.where(way > 0, np.maximum(room, 0.0) / np.where(way > 0, way, 1.0), np.inf)
+        nearest = int(np.argmin(shares))
+        return min(1.0, float(shares[nearest])), 'joint limit of ' + self.arm.names[nearest]
+
+    def _workspace(self, joints: np.ndarray, velocities: np.ndarray, period: float) -> Tuple[float, str]:
+        low, high = (np.array(corner) for corner in self.limits.workspace)
+        here = self.arm.forward(joints)[:3, 3]
+        way = self.arm.forward(joints + velocities * period)[:3, 3] - here
+        room = np.where(way > 0, high - here, here - low)
+        shares = np.where(np.abs(way) > 1e-9, np.maximum(room, 0.0) / np.maximum(np.abs(way), 1e-9), np.inf)
+        nearest = int(np.argmin(shares))
+        return min(1.0, float(shares[nearest])), 'end of the workspace in ' + 'xyz'[nearest]
+
+    def _obstacles(self, now: Optional[Clearance], joints: np.ndarray, velocities: np.ndarray, period: float
+                   ) -> Tuple[float, str]:
+        if self._near is None or now is None or now.distance >= self.limits.slow_below:
+            return 1.0, ''
+        then = self._near(joints + velocities * period)
+        if then is None or then.distance >= now.distance:
+            return 1.0, ''
+        share = (now.distance - self.limits.stop_below) / (self.limits.slow_below - self.limits.stop_below)
+        least = self.limits.creep if now.touchable else 0.0
+        return float(np.clip(share, least, 1.0)), 'near: ' + now.between
+
+
+def pulled_back(commanded: np.ndarray, measured: np.ndarray, lead: float) -> np.ndarray:
+    """Commanded joint positions, kept within `lead` rad of the measured ones: pushing at a wall piles up no force."""
+    return measured + np.clip(commanded - measured, -lead, lead)
+
+
+def _ratio(limit: float, value: float) -> float:
+    return 1.0 if value <= limit else float(limit / value)
+
+
+def _checked(joints: np.ndarray, twist: np.ndarray, period: float, count: int) -> Tuple[np.ndarray, np.ndarray]:
+    joints, twist = np.asarray(joints, dtype=float), np.asarray(twist, dtype=float)
+    if joints.shape != (count,) or not np.isfinite(joints).all():
+        raise ValueError('joints must be {} finite numbers, not {}'.format(count, joints.tolist()))
+    if twist.shape != (6,) or not np.isfinite(twist).all():
+        raise ValueError('a twist must be 6 finite numbers (m/s, rad/s), not {}'.format(twist.tolist()))
+    if not 0.0 < period < float('inf'):
+        raise ValueError('a period must be more than 0 s, not {}'.format(period))
+    return joints, twist
