@@ -70,13 +70,13 @@ class Step(NamedTuple):
 class CartesianDrive:
     """Drives one arm's tool by velocities. Stateless: each step starts from the joints that it is given."""
 
-    def __init__(self, arm: Arm, limits: DriveLimits = DriveLimits(), near: Optional[Near] = None) -> None:
+    def __init__(self, arm: Arm, limits: Optional[DriveLimits] = None, near: Optional[Near] = None) -> None:
         """`near` tells, for joint positions (n,), the nearest thing that the arm could hit, None where none is near."""
         self.arm = arm
-        self.limits = limits
+        self.limits = limits or DriveLimits()
         self._near = near
-        self._lower = arm.lower + limits.joint_margin
-        self._upper = arm.upper - limits.joint_margin
+        self._lower = arm.lower + self.limits.joint_margin
+        self._upper = arm.upper - self.limits.joint_margin
         finite = np.isfinite(arm.lower) & np.isfinite(arm.upper)
         self._middle = np.where(finite, (np.where(finite, arm.lower, 0) + np.where(finite, arm.upper, 0)) / 2, 0.0)
         self._half_range = np.where(finite, np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf)
