@@ -1,8 +1,8 @@
-"""Finds bags and reads the executive's events out of them, with rosbags: no ROS installation is needed."""
+"""Finds bags and reads the executive's events and the worlds' causes out of them, with rosbags: it needs no ROS."""
 import json
 import os
 import sys
-from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 try:
     from rosbags.rosbag1 import Reader
@@ -16,6 +16,7 @@ from ..oracle.errors import OracleError
 from ..oracle.events import Event, EventKind
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
+CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
 _KINDS = {int(kind): kind for kind in EventKind}
 
 
@@ -28,6 +29,24 @@ class Skipped(NamedTuple):
 
     path: str
     reason: str
+
+
+class Cause(NamedTuple):
+    """What a simulated world was given to fail with (TrialCause)."""
+
+    seed: int
+    task: str
+    kinds: Tuple[str, ...]  # none: a benign world
+    details: Tuple[str, ...]
+
+
+class BagContent(NamedTuple):
+    """What the analysis takes from a bag."""
+
+    events: List[Event]  # in the order of their recording
+    causes: Dict[str, Cause]  # by trial id
+
+
 
 
 def find_bags(places: Sequence[str]) -> List[str]:
@@ -57,14 +76,15 @@ def _walk(folder: str) -> Iterator[str]:
 
 
 class EventReader:
-    """Reads events out of bags; remembers the message definitions it has met, so that many bags are quick."""
+    """Reads bags; remembers the message definitions it has met, so that many bags are quick."""
 
     def __init__(self) -> None:
         self._stores: Dict[str, Any] = {}  # by message definition: another release's events may have other fields
 
-    def read(self, path: str) -> List[Event]:
-        """All events in a bag, in the order of their recording; the topic's name does not matter.
+    def read(self, path: str) -> BagContent:
+        """All events in a bag, and the cause of each trial; the topics' names do not matter.
 
+        A cause is latched: a bag may begin with that of the trial before. The last one before a trial's end counts.
         Raises BagError.
         """
         if path.endswith('.active'):
@@ -77,22 +97,42 @@ class EventReader:
         except Exception as err:  # a damaged file can make rosbags raise anything, assertions among it
             raise BagError('damaged, or no bag: {}'.format(_words(err))) from err
 
-    def _read(self, path: str) -> List[Event]:
+    def _read(self, path: str) -> BagContent:
+        events: List[Event] = []
+        ends: Dict[str, int] = {}  # ns, of the last event of each trial
+        causes: List[Tuple[int, Cause]] = []
         with Reader(path) as reader:
-            connections = [item for item in reader.connections if item.msgtype == EVENT_TYPE]
-            if not connections:
+            connections = [item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)]
+            if not any(item.msgtype == EVENT_TYPE for item in connections):
                 raise BagError('no events of the executive in it')
-            stores = {item.id: self._store(item.msgdef) for item in connections}
-            return [_event(stores[item.id].deserialize_ros1(data, EVENT_TYPE))
-                    for item, _, data in reader.messages(connections)]
+            stores = {item.id: self._store(item.msgdef, item.msgtype) for item in connections}
+            for item, stamp, data in reader.messages(connections):
+                message = stores[item.id].deserialize_ros1(data, item.msgtype)
+                if item.msgtype == CAUSE_TYPE:
+                    causes.append((stamp, _cause(message)))
+                else:
+                    events.append(_event(message))
+                    ends[message.trial_id] = stamp
+        if ends:  # what is recorded while the last trial of a bag ends is its own
+            ends[max(ends, key=lambda trial_id: ends[trial_id])] = max([stamp for stamp, _ in causes], default=0)
+        found = {trial_id: _latest(causes, end) for trial_id, end in ends.items()}
+        return BagContent(events, {trial_id: cause for trial_id, cause in found.items() if cause is not None})
 
-    def _store(self, definition: Any) -> Any:
+    def _store(self, definition: Any, kind: str) -> Any:
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
         if text not in self._stores:
             store = get_typestore(Stores.EMPTY)
-            store.register(get_types_from_msg(text, EVENT_TYPE))
+            store.register(get_types_from_msg(text, kind))
             self._stores[text] = store
         return self._stores[text]
+
+
+def _latest(causes: Sequence[Tuple[int, Cause]], end: int) -> Optional[Cause]:
+    return next((cause for stamp, cause in reversed(causes) if stamp <= end), None)
+
+
+def _cause(message: Any) -> Cause:
+    return Cause(int(message.seed), message.task, tuple(message.kinds), tuple(message.details))
 
 
 def _event(message: Any) -> Event:

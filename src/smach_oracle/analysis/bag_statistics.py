@@ -9,7 +9,7 @@ import sys
 from typing import List, Optional, Sequence
 
 from ..oracle.naming import DEFAULT_FAILING_OUTCOMES, FailingNames
-from . import table
+from . import groups as grouping, table
 from .bag_events import BagError, Skipped
 from .trials import Trials, TrialSummary, load_trials
 
@@ -21,8 +21,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = _parse(argv)
     try:
         found = load_trials(args.folders, FailingNames(args.failing_outcomes))
-        groups = table.make_groups(found.trials)
-        sys.stdout.write(table.format_text(groups))
+        groups = grouping.make_groups(found.trials)
+        sys.stdout.write(table.format_text(groups, found.trials))
         _warn_of(found.skipped)
         _write_files(args, found, groups)
     except BagError as err:
@@ -51,7 +51,7 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _write_files(args: argparse.Namespace, found: Trials, groups: List[table.Group]) -> None:
+def _write_files(args: argparse.Namespace, found: Trials, groups: List[grouping.Group]) -> None:
     if args.json:
         with open(args.json, 'w', encoding='utf-8') as target:
             table.write_json(target, groups, found.trials, found.skipped)

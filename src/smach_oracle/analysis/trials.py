@@ -1,11 +1,13 @@
 """What happened in each trial, told from its events (definitions: doc/statistics.md)."""
+import os
 from collections import Counter
 from enum import Enum
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from ..oracle.events import NO_OUTCOME, Event, EventKind
 from ..oracle.naming import PREEMPTED, FailingNames
-from .bag_events import BagError, EventReader, Skipped, find_bags
+from .bag_events import BagError, Cause, EventReader, Skipped, find_bags
+from .truth import Truth, TruthFiles
 
 DEFAULT_FAILING = FailingNames()
 STOPPED_BY = ('KeyboardInterrupt:', 'SystemExit:')  # how the texts of exceptions begin that are nobody's failure
@@ -38,6 +40,19 @@ class TrialSummary(NamedTuple):
     failures_by_state: Tuple[Tuple[str, int], ...]  # 'PATH/STATE', sorted
     lost_events: int  # gaps in the numbering
     bags: Tuple[str, ...]
+    settings: Tuple[Tuple[str, Any], ...] = ()  # of the oracle, sorted; () where the record does not tell
+    cause: Optional[Cause] = None  # what a simulated world was given to fail with
+    truth: Optional[Truth] = None  # what a simulated world says of the end
+
+    @property
+    def replicate(self) -> str:
+        """The folder it was recorded in: trials that learn from each other share one."""
+        return os.path.dirname(self.bags[0]) if self.bags else ''
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the machine says so."""
+        return self.ending is Ending.SUCCESS
 
 
 class Trials(NamedTuple):
@@ -55,25 +70,46 @@ def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) 
     paths = find_bags(places)
     if not paths:
         raise BagError('{}: no bags'.format(', '.join(places)))
-    reader = EventReader()
+    gathered = _Gathered()
     skipped: List[Skipped] = []
-    events: Dict[str, Dict[int, Event]] = {}
-    bags: Dict[str, Dict[str, None]] = {}
+    reader = EventReader()
     for path in paths:
         try:
-            read = reader.read(path)
+            content = reader.read(path)
         except BagError as err:
             skipped.append(Skipped(path, str(err)))
             continue
-        for event in read:  # a trial may be spread over several bags, and be in more than one
-            events.setdefault(event.trial_id, {})[event.seq] = event
-            bags.setdefault(event.trial_id, {})[path] = None
-    if not events:
+        gathered.add(path, content.events, content.causes)
+    if not gathered.events:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
         raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(', '.join(places), len(paths), reasons))
-    trials = [summarise(list(by_number.values()), tuple(bags[trial_id]), failing)
-              for trial_id, by_number in events.items()]
+    trials = gathered.summaries(failing)
     return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
+
+
+class _Gathered:
+    """What was found of each trial: it may be spread over several bags, and be in more than one."""
+
+    def __init__(self) -> None:
+        self.events: Dict[str, Dict[int, Event]] = {}
+        self._bags: Dict[str, Dict[str, None]] = {}
+        self._causes: Dict[str, Cause] = {}
+
+    def add(self, path: str, events: Iterable[Event], causes: Mapping[str, Cause]) -> None:
+        for event in events:
+            self.events.setdefault(event.trial_id, {})[event.seq] = event
+            self._bags.setdefault(event.trial_id, {})[path] = None
+        self._causes.update(causes)
+
+    def summaries(self, failing: FailingNames) -> List[TrialSummary]:
+        truths = TruthFiles()
+        found = []
+        for trial_id, by_number in self.events.items():
+            trial = summarise(list(by_number.values()), tuple(self._bags[trial_id]), failing)
+            cause = self._causes.get(trial_id)
+            truth = truths.of(trial.replicate, cause.seed if cause else None)
+            found.append(trial._replace(cause=cause, truth=truth))
+        return found
 
 
 def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
@@ -93,7 +129,12 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
         ending=_ending(end, ordered, failing), outcome=end.outcome if end else '',
         failures=sum(failures.values()), recoveries=count_recoveries(ordered),
         questions=len(asked), answered=len(asked & answered), failures_by_state=tuple(sorted(failures.items())),
-        lost_events=last.seq + 1 - len(ordered), bags=bags)
+        lost_events=last.seq + 1 - len(ordered), bags=bags, settings=_settings(start))
+
+
+def _settings(start: Optional[Event]) -> Tuple[Tuple[str, Any], ...]:
+    stated = start.data.get('settings') if start and isinstance(start.data, Mapping) else None
+    return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
 
 def count_recoveries(ordered: Iterable[Event]) -> int:

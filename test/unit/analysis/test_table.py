@@ -7,8 +7,12 @@ import math
 import pytest
 
 from smach_oracle.analysis import table
-from smach_oracle.analysis.bag_events import Skipped
+from smach_oracle.analysis.bag_events import Cause, Skipped
+from smach_oracle.analysis.groups import (ANSWERED, NOT_ANSWERED, QUESTIONS, RECOVERIES, TRUE_SUCCESS, find_arms,
+                                          make_groups)
+from smach_oracle.analysis.intervals import replicate_interval, t_quantile, wilson_interval
 from smach_oracle.analysis.trials import Ending, TrialSummary
+from smach_oracle.analysis.truth import Truth
 
 
 def trial(number=0, **fields):
@@ -23,13 +27,13 @@ def trial(number=0, **fields):
     (39, 150, 0.196421, 0.335564), (6, 150, 0.018459, 0.084513), (0, 10, 0.0, 0.277533), (10, 10, 0.722467, 1.0),
     (1, 2, 0.094531, 0.905469)])
 def test_wilson_interval(successes, runs, low, high):
-    assert table.wilson_interval(successes, runs) == pytest.approx((low, high), abs=1e-6)
+    assert wilson_interval(successes, runs) == pytest.approx((low, high), abs=1e-6)
 
 
 def test_wilson_interval_holds_the_share_and_narrows_with_the_runs():
     widths = []
     for runs in (10, 100, 1000, 10_000):
-        low, high = table.wilson_interval(runs // 5, runs)
+        low, high = wilson_interval(runs // 5, runs)
         assert 0.0 <= low < 0.2 < high <= 1.0
         widths.append(high - low)
     assert widths == sorted(widths, reverse=True)
@@ -39,11 +43,26 @@ def test_wilson_interval_holds_the_share_and_narrows_with_the_runs():
 @pytest.mark.parametrize('successes, runs', [(-1, 10), (11, 10)])
 def test_impossible_counts_are_refused(successes, runs):
     with pytest.raises(ValueError, match='allowed: 0 to 10'):
-        table.wilson_interval(successes, runs)
+        wilson_interval(successes, runs)
 
 
 def test_no_runs_say_nothing():
-    assert table.wilson_interval(0, 0) == (0.0, 1.0)
+    assert wilson_interval(0, 0) == (0.0, 1.0)
+
+
+# scipy 1.10: stats.t.interval(0.95, len(shares) - 1, numpy.mean(shares), stats.sem(shares))
+@pytest.mark.parametrize('shares, low, high', [
+    ((0.1, 0.12, 0.15), 0.060817, 0.185849), ((0.02, 0.04, 0.06), 0.0, 0.089683),
+    ((0.0, 0.2), 0.0, 1.0), ((0.3, 0.3), 0.3, 0.3)])
+def test_the_interval_over_replicates(shares, low, high):
+    assert replicate_interval(shares) == pytest.approx((low, high), abs=1e-5)
+    assert replicate_interval(shares[:1]) is None
+
+
+# scipy 1.10: stats.t.ppf(0.975, freedom)
+@pytest.mark.parametrize('freedom, quantile', [(1, 12.7062), (9, 2.2622), (30, 2.0423), (40, 2.0211), (200, 1.9719)])
+def test_quantiles_of_students_distribution(freedom, quantile):
+    assert t_quantile(freedom) == pytest.approx(quantile, abs=0.002)
 
 
 def the_papers_first_experiment():
@@ -52,29 +71,29 @@ def the_papers_first_experiment():
 
 
 def test_the_papers_table_comes_out_of_the_papers_counts():
-    (group,) = table.make_groups(the_papers_first_experiment())
+    (group,) = make_groups(the_papers_first_experiment())
     assert group.runs == 150
-    assert (group.of(table.RECOVERIES).trials, group.of(table.RECOVERIES).events) == (39, 78)
-    assert (group.of(table.ANSWERED).trials, group.of(table.ANSWERED).events) == (6, 6)
+    assert (group.of(RECOVERIES).trials, group.of(RECOVERIES).events) == (39, 78)
+    assert (group.of(ANSWERED).trials, group.of(ANSWERED).events) == (6, 6)
     row = next(line for line in table.format_text([group]).splitlines() if line.startswith('PICK_AND_PLACE  with'))
     assert row.split() == ['PICK_AND_PLACE', 'with', 'oracle', '150', '39', '(26.0%)', '6', '(4.0%)', '0', '(0.0%)']
 
 
 def test_the_text_shows_intervals_and_events():
-    text = table.format_text(table.make_groups(the_papers_first_experiment()))
+    text = table.format_text(make_groups(the_papers_first_experiment()))
     line = next(line for line in text.splitlines() if line.startswith('  oracle recoveries'))
     assert line.split() == ['oracle', 'recoveries', '39', '26.0%', '19.6', 'to', '33.6%', '78']
 
 
 def test_answered_and_unanswered_questions_are_told_apart():
-    (group,) = table.make_groups([trial(0, questions=2, answered=1), trial(1, questions=1), trial(2)])
+    (group,) = make_groups([trial(0, questions=2, answered=1), trial(1, questions=1), trial(2)])
     counts = {name: (group.of(name).trials, group.of(name).events)
-              for name in (table.QUESTIONS, table.ANSWERED, table.NOT_ANSWERED)}
-    assert counts == {table.QUESTIONS: (2, 3), table.ANSWERED: (1, 1), table.NOT_ANSWERED: (2, 2)}
+              for name in (QUESTIONS, ANSWERED, NOT_ANSWERED)}
+    assert counts == {QUESTIONS: (2, 3), ANSWERED: (1, 1), NOT_ANSWERED: (2, 2)}
 
 
 def test_arms_and_experiments_have_rows_of_their_own():
-    groups = table.make_groups([
+    groups = make_groups([
         trial(0, recovers=False, ending=Ending.FAILURE), trial(1), trial(2, recovers=None, ending=Ending.UNFINISHED),
         trial(3, experiment='DRINK')])
     assert [(group.experiment, group.arm, group.runs) for group in groups] == [
@@ -85,14 +104,14 @@ def test_arms_and_experiments_have_rows_of_their_own():
 
 
 def test_every_trial_has_one_ending():
-    (group,) = table.make_groups([trial(number, ending=ending) for number, ending in enumerate(Ending)])
+    (group,) = make_groups([trial(number, ending=ending) for number, ending in enumerate(Ending)])
     endings = ('ended in success', 'ended in failure', 'preempted', 'unfinished')
     assert [group.of(name).trials for name in endings] == [1, 1, 1, 1]
 
 
 def test_missing_events_are_said_beside_the_figures():
-    whole = table.format_text(table.make_groups([trial(0)]))
-    gaps = table.format_text(table.make_groups([trial(0, lost_events=7), trial(1)]))
+    whole = table.format_text(make_groups([trial(0)]))
+    gaps = table.format_text(make_groups([trial(0, lost_events=7), trial(1)]))
     assert 'missing' not in whole
     assert '7 events are missing in 1 trials' in gaps
 
@@ -100,7 +119,7 @@ def test_missing_events_are_said_beside_the_figures():
 def test_json_holds_table_trials_and_skipped_bags():
     target = io.StringIO()
     trials = [trial(0, failures=1, failures_by_state=(('TOP/PICK', 1),))]
-    table.write_json(target, table.make_groups(trials), trials, [Skipped('/x.bag', 'damaged')])
+    table.write_json(target, make_groups(trials), trials, [Skipped('/x.bag', 'damaged')])
     data = json.loads(target.getvalue())
     assert data['trials'][0]['failures_by_state'] == {'TOP/PICK': 1}
     assert data['trials'][0]['ending'] == 'success'
@@ -115,3 +134,60 @@ def test_csv_has_one_line_a_trial():
     rows = list(csv.DictReader(io.StringIO(target.getvalue())))
     assert [(row['trial_id'], row['recovers'], row['recoveries'], row['ending']) for row in rows] == [
         ('0', 'True', '3', 'success'), ('1', '', '0', 'success')]
+
+
+def told(number, said, true, kinds=(), **fields):
+    """A trial of which the world has told how it ended."""
+    return trial(number, ending=Ending.SUCCESS if said else Ending.FAILURE,
+                 cause=Cause(number, 'pick_and_place', tuple(kinds), ('',) * len(kinds)),
+                 truth=Truth(number, 'pick_and_place', true, '', (), 30.0, 5.0, {}), **fields)
+
+
+def test_what_the_machine_says_is_held_against_what_the_world_says():
+    trials = [told(0, True, True), told(1, True, False), told(2, False, True), told(3, False, False), trial(4)]
+    (group,) = make_groups(trials)
+    counts = [group.of(name).trials for name in (TRUE_SUCCESS, 'false success', 'false failure')]
+    assert (counts, group.truth_known) == ([2, 1, 1], 4)
+    assert group.of(TRUE_SUCCESS).share == 0.5, 'of those in which it is known'
+    text = table.format_text([group], trials)
+    assert 'True success' in text and 'how a trial truly ended is known of 4 of 5' in text
+    assert 'True success' not in table.format_text(make_groups([trial(0)]))
+
+
+def test_trials_are_counted_by_what_the_world_was_given():
+    text = table.format_text(make_groups([]), [
+        told(0, True, True), told(1, True, True, ['noise'], failures=1, recoveries=1),
+        told(2, False, False, ['noise', 'slippery'], failures=2, questions=1)])
+    rows = {line.split()[0]: line.split()[1:] for line in text.splitlines() if line.startswith('  ')}
+    assert rows == {'cause': ['trials', 'failed', 'recovered', 'asked', 'succeeded', 'true', 'success'],
+                    '(none)': ['1', '0', '0', '0', '1', '1'], 'noise': ['2', '2', '1', '1', '1', '1'],
+                    'slippery': ['1', '1', '0', '1', '0', '0']}
+
+
+def test_replicates_are_the_folders_and_have_an_interval_of_their_own():
+    trials = [trial(number, bags=('/r{}/{}.bag'.format(number % 3, number),), failures=int(number < 5))
+              for number in range(30)]
+    (group,) = make_groups(trials)
+    count = group.of('failures of states')
+    assert group.replicates == 3 and count.share == pytest.approx(1 / 6)
+    assert count.over_replicates == pytest.approx(replicate_interval([0.2, 0.2, 0.1]))
+    line = next(line for line in table.format_text([group]).splitlines() if line.startswith('  failures of states'))
+    assert line.split()[-3:] == ['2.3', 'to', '31.0%']
+
+
+def test_oracles_of_other_settings_are_other_arms():
+    arms = find_arms([trial(number, settings=(('memory', memory), ('policy', 'prose')))
+                      for number, memory in enumerate((10, 2, 10))] + [trial(3, recovers=False)])
+    assert [(arm.name, len(arm.trials)) for arm in arms] == [
+        ('with oracle, memory 2', 1), ('with oracle, memory 10', 2), ('without oracle', 1)]
+
+
+def test_csv_and_json_tell_seed_cause_and_truth():
+    target = io.StringIO()
+    table.write_csv(target, [told(7, True, False, ['noise', 'slippery'])])
+    (row,) = csv.DictReader(io.StringIO(target.getvalue()))
+    assert (row['seed'], row['causes'], row['true_success']) == ('7', 'noise slippery', 'False')
+    target = io.StringIO()
+    table.write_json(target, [], [told(7, True, False, ['noise'])], [])
+    data = json.loads(target.getvalue())
+    assert data['trials'][0]['truth']['success'] is False and data['causes'][0]['kind'] == 'noise'

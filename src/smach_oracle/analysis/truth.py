@@ -1,0 +1,100 @@
+"""What a simulated world says of each trial, independently of the machine: `truth.jsonl` beside the bags.
+
+One JSON object a line: {"seed", "task", "success", "why", "causes": [{"kind", "text"}], "sim_s", "wall_s", "share"}.
+"""
+import json
+import os
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
+
+from .bag_events import BagError
+
+TRUTH_FILE = 'truth.jsonl'
+_NUMBER = (int, float)
+_FIELDS = {'seed': int, 'task': str, 'success': bool, 'why': str, 'causes': list, 'sim_s': _NUMBER, 'wall_s': _NUMBER,
+           'share': dict}
+
+
+class Truth(NamedTuple):
+    """How one trial truly ended."""
+
+    seed: int
+    task: str
+    success: bool
+    why: str
+    causes: Tuple[Tuple[str, str], ...]  # kind, in words
+    sim_s: float  # simulated time that the trial took
+    wall_s: float  # time that it took
+    share: Mapping[str, float]  # of wall_s, per part of the simulation
+
+
+def read_truth(path: str) -> Dict[int, Truth]:
+    """The lines of a truth file by seed; of two with the same seed the later counts.
+
+    A last line that was cut off in its writing is passed over. Raises BagError for any other that is wrong, and
+    OSError.
+    """
+    with open(path, encoding='utf-8') as source:
+        lines = source.read().split('\n')
+    torn = lines.pop()  # behind the last line's end: nothing, or what was being written
+    found = [_parse(line, '{} line {}'.format(path, number)) for number, line in enumerate(lines, 1) if line.strip()]
+    if torn.strip():
+        found += _whole(torn)
+    return {truth.seed: truth for truth in found}
+
+
+def _whole(line: str) -> List[Truth]:
+    """A line without an end, where nothing but its end is missing."""
+    try:
+        return [_parse(line, '')]
+    except BagError:
+        return []
+
+
+def _parse(line: str, where: str) -> Truth:
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError) as err:
+        raise BagError('{}: not JSON: {}'.format(where, err)) from err
+    if not isinstance(data, dict):
+        raise BagError('{}: not a JSON object'.format(where))
+    for name, kind in _FIELDS.items():
+        if not isinstance(data.get(name), kind) or (kind is not bool and isinstance(data.get(name), bool)):
+            raise BagError('{}: {}: {!r} is not allowed; allowed: {}'.format(
+                where, name, data.get(name), 'a number' if kind is _NUMBER else 'a {}'.format(kind.__name__)))
+    return Truth(data['seed'], data['task'], data['success'], data['why'], _causes(data['causes'], where),
+                 float(data['sim_s']), float(data['wall_s']), _shares(data['share'], where))
+
+
+def _causes(items: Iterable[Any], where: str) -> Tuple[Tuple[str, str], ...]:
+    try:
+        return tuple((str(item['kind']), str(item['text'])) for item in items)
+    except (TypeError, KeyError) as err:
+        raise BagError('{}: causes: each needs "kind" and "text"'.format(where)) from err
+
+
+def _shares(share: Mapping[str, Any], where: str) -> Mapping[str, float]:
+    try:
+        return {str(name): float(value) for name, value in share.items()}
+    except (TypeError, ValueError) as err:
+        raise BagError('{}: share: {!r} is not allowed; allowed: numbers by name'.format(where, share)) from err
+
+
+class TruthFiles:
+    """Truth files by the folder that they lie in, each read once."""
+
+    def __init__(self) -> None:
+        self._read: Dict[str, Dict[int, Truth]] = {}
+
+    def of(self, folder: str, seed: Optional[int]) -> Optional[Truth]:
+        """The truth of the trial with that seed recorded in that folder; None where nobody tells. Raises BagError."""
+        if seed is None:
+            return None
+        if folder not in self._read:
+            path = os.path.join(folder, TRUTH_FILE)
+            try:
+                self._read[folder] = read_truth(path)
+            except FileNotFoundError:
+                self._read[folder] = {}
+            except (OSError, UnicodeDecodeError) as err:
+                raise BagError('{}: cannot be read: {}'.format(path, err)) from err
+        return self._read[folder].get(seed)
