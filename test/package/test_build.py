@@ -2,9 +2,9 @@
 import pytest
 from workspace import PYTHON, copy_sources, fake_upstream, run
 
-NAMES = ('smach', 'smach_ros', 'smach_msgs')
-WHERE = 'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs; ' \
-        'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__)"'
+NAMES = ('smach', 'smach_ros', 'smach_msgs', 'control_msgs')
+WHERE = 'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs, control_msgs; ' \
+        'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__, control_msgs.__file__)"'
 SCRIPT = '''
 import smach
 
@@ -51,6 +51,7 @@ def test_the_install_space_runs_without_its_sources(installed):
 def test_installed_messages_are_found_by_rosmsg(installed):
     assert 'local_data' in in_installed(installed, 'rosmsg show smach_msgs/SmachContainerStatus')
     assert 'seq' in in_installed(installed, 'rosmsg show smach_oracle/OracleEvent')
+    assert 'max_effort' in in_installed(installed, 'rosmsg show control_msgs/GripperCommandActionGoal')
 
 
 def test_every_command_is_installed_for_rosrun(installed):

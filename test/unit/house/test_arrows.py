@@ -19,8 +19,9 @@ ARROWS = {
     'analysis': {'oracle'},
 }
 ROS = {'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros', 'smach_msgs'}
-ROS_PACKAGES = ROS - {'rospkg'} | {'smach', 'actionlib_msgs', 'geometry_msgs', 'rosgraph_msgs', 'roslaunch', 'rostest',
-                                   'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_ros', 'visualization_msgs'}
+ROS_PACKAGES = ROS - {'rospkg'} | {'smach', 'actionlib_msgs', 'control_msgs', 'geometry_msgs', 'move_base_msgs',
+                                   'rosgraph_msgs', 'roslaunch', 'rostest', 'sensor_msgs', 'std_msgs', 'std_srvs',
+                                   'tf2_msgs', 'tf2_ros', 'trajectory_msgs', 'visualization_msgs'}
 STDLIB = getattr(sys, 'stdlib_module_names', frozenset())
 
 without_stdlib_names = pytest.mark.skipif(not STDLIB, reason='Python before 3.10 cannot list its own modules')

@@ -5,7 +5,8 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from house import ROOT, shown
 
-INTERFACES = sorted(path for pattern in ('msg/*.msg', 'srv/*.srv', 'action/*.action', 'src/smach_msgs/msg/*.msg')
+INTERFACES = sorted(path for pattern in ('msg/*.msg', 'srv/*.srv', 'action/*.action', 'src/*_msgs/msg/*.msg',
+                                    'src/*_msgs/action/*.action')
                     for path in ROOT.glob(pattern))
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch'))
 FIELD = re.compile(r'^[\w/]+(\[\d*\])?\s+\w+\s*(=.*)?$')

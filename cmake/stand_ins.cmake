@@ -1,7 +1,8 @@
-# Stage smach, smach_ros and smach_msgs where upstream's are absent, each judged on its own. Where upstream's package is
-# there, nothing of ours gets in front of it, and what an earlier build staged is taken away again.
+# Stage smach, smach_ros, smach_msgs and control_msgs where upstream's are absent, each judged on its own. Where upstream's
+# package is there, nothing of ours gets in front of it, and what an earlier build staged is taken away again.
 #
 # Include after generate_messages(), which defines GENMSG_PY_BIN (from genpy) and MSG_I_FLAGS, and catkin_package().
+# GENACTION_BIN is from actionlib_msgs.
 
 set(STAND_IN_MARKER .${PROJECT_NAME}_stand_in)
 set(STAND_IN_FIND ${CMAKE_CURRENT_LIST_DIR}/find_upstream.py)
@@ -45,6 +46,7 @@ function(stand_in_remove name)
       file(REMOVE_RECURSE ${package})
     endif()
     file(REMOVE ${package}/${STAND_IN_MARKER} ${CATKIN_DEVEL_PREFIX}/share/${name}/package.xml)
+    file(REMOVE_RECURSE ${CATKIN_DEVEL_PREFIX}/share/${name}/msg ${CATKIN_DEVEL_PREFIX}/share/${name}/action)
   endif()
   install(CODE "
     set(prefix \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}\")
@@ -78,16 +80,40 @@ function(stand_in_add name)
     DESTINATION ${CATKIN_GLOBAL_SHARE_DESTINATION}/${name})
 endfunction()
 
-# stand_in_messages(NAME): generate the Python classes of src/NAME/msg under the package name NAME
+# stand_in_collect_messages(NAME): put the messages of src/NAME/msg, and those that src/NAME/action means, into the devel
+# space, where rosmsg finds them
+function(stand_in_collect_messages name)
+  set(source ${CMAKE_CURRENT_SOURCE_DIR}/src/${name})
+  set(share ${CATKIN_DEVEL_PREFIX}/share/${name})
+  file(REMOVE_RECURSE ${share}/msg ${share}/action)
+  file(GLOB messages ${source}/msg/*.msg)
+  file(COPY ${messages} DESTINATION ${share}/msg)
+  file(GLOB actions ${source}/action/*.action)
+  foreach(action ${actions})
+    file(COPY ${action} DESTINATION ${share}/action)
+    execute_process(COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE} ${GENACTION_BIN} ${action} -o ${share}/msg
+      RESULT_VARIABLE failed)
+    if(failed)
+      message(FATAL_ERROR "${GENACTION_BIN} cannot make messages of ${action}: ${failed}")
+    endif()
+  endforeach()
+  # a later change to one of them has CMake run again
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${messages} ${actions})
+  install(DIRECTORY ${share}/msg DESTINATION ${CATKIN_GLOBAL_SHARE_DESTINATION}/${name})
+  if(actions)
+    install(DIRECTORY ${share}/action DESTINATION ${CATKIN_GLOBAL_SHARE_DESTINATION}/${name})
+  endif()
+endfunction()
+
+# stand_in_messages(NAME): generate the Python classes of NAME's messages under the package name NAME
 function(stand_in_messages name)
-  set(source ${CMAKE_CURRENT_SOURCE_DIR}/src/${name}/msg)
+  stand_in_collect_messages(${name})
+  set(source ${CATKIN_DEVEL_PREFIX}/share/${name}/msg)
   set(python ${STAND_IN_DEVEL_PYTHON}/${name}/msg)
   set(classes)
   file(GLOB messages ${source}/*.msg)
   foreach(message ${messages})
     get_filename_component(type ${message} NAME_WE)
-    # so that rosmsg finds it in the devel space
-    configure_file(${message} ${CATKIN_DEVEL_PREFIX}/share/${name}/msg/${type}.msg COPYONLY)
     add_custom_command(OUTPUT ${python}/_${type}.py DEPENDS ${GENMSG_PY_BIN} ${message}
       COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE} ${GENMSG_PY_BIN} ${message}
               -I${name}:${source} ${MSG_I_FLAGS} -p ${name} -o ${python}
@@ -99,14 +125,14 @@ function(stand_in_messages name)
     COMMENT "Generating Python msg __init__.py for ${name}")
   add_custom_target(${PROJECT_NAME}_${name} ALL DEPENDS ${classes} ${python}/__init__.py)
   install(DIRECTORY ${python} DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name} PATTERN "__pycache__" EXCLUDE)
-  install(FILES ${messages} DESTINATION ${CATKIN_GLOBAL_SHARE_DESTINATION}/${name}/msg)
 endfunction()
 
 set(STAND_INS)
+set(control_msgs_depends actionlib_msgs geometry_msgs std_msgs trajectory_msgs)
 set(smach_depends)
 set(smach_msgs_depends std_msgs)
 set(smach_ros_depends actionlib rospy smach smach_msgs)
-foreach(name smach smach_msgs smach_ros)
+foreach(name control_msgs smach smach_msgs smach_ros)
   stand_in_find_upstream(${name} upstream)
   if(upstream)
     message(STATUS "${name}: upstream's is used, from ${upstream}")
@@ -115,20 +141,22 @@ foreach(name smach smach_msgs smach_ros)
     message(STATUS "${name}: upstream's is absent, ours stands in")
     stand_in_add(${name} ${${name}_depends})
     list(APPEND STAND_INS ${name})
+    if(name MATCHES "_msgs$")
+      stand_in_messages(${name})
+    endif()
   endif()
 endforeach()
 
-list(FIND STAND_INS smach_msgs index)
-if(NOT index EQUAL -1)
-  stand_in_messages(smach_msgs)
-endif()
-list(LENGTH STAND_INS count)
-if(count GREATER 0)
-  catkin_add_env_hooks(50.smach_stand_in SHELLS sh SKIP_INSTALL DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/env-hooks)
-  if(count LESS 3)
-    message(WARNING "Upstream's smach, smach_msgs and smach_ros are only partly there. Ours stand in for ${STAND_INS}, "
-      "beside upstream's others. Install the missing ones if you did not mean that.")
-  endif()
+if(STAND_INS)
+  catkin_add_env_hooks(50.stand_ins SHELLS sh SKIP_INSTALL DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/env-hooks)
 else()
-  file(REMOVE ${CATKIN_DEVEL_PREFIX}/etc/catkin/profile.d/50.smach_stand_in.sh)
+  file(REMOVE ${CATKIN_DEVEL_PREFIX}/etc/catkin/profile.d/50.stand_ins.sh)
+endif()
+
+set(SMACH_STAND_INS ${STAND_INS})
+list(REMOVE_ITEM SMACH_STAND_INS control_msgs)
+list(LENGTH SMACH_STAND_INS count)
+if(count GREATER 0 AND count LESS 3)
+  message(WARNING "Upstream's smach, smach_msgs and smach_ros are only partly there. Ours stand in for "
+    "${SMACH_STAND_INS}, beside upstream's others. Install the missing ones if you did not mean that.")
 endif()
