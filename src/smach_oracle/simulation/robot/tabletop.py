@@ -8,6 +8,7 @@ from ...geometry.plane import Plane, find_plane
 from .clusters import (Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, largest_patch, limb_beside,
                        view_of)
 from .interface import Frame
+from .touching import why_several
 
 GRASPABLE = 0.085  # m: what fits between the finger tips
 LARGEST = 0.35  # m: no object to be handled is wider or taller
@@ -75,6 +76,9 @@ def _check_nearest(view: View, cluster: Cluster) -> None:
     if box.narrow > GRASPABLE:
         raise NotSeen('what is nearest is too large for the gripper, {}: one thing, or several that touch'.format(
             extent))
+    several = why_several(view, cluster)
+    if several:
+        raise NotSeen('what is nearest, {}, seems to be several things that touch: {}'.format(extent, several))
 
 
 def _no_table(view: View) -> str:
