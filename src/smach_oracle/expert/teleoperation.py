@@ -5,7 +5,7 @@ ROS-free. Lengths in m, angles in rad, times in s; twists are (6,): linear, then
 base, about the tool's origin.
 """
 from functools import partial
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from typing_extensions import Protocol
@@ -36,7 +36,7 @@ class Clearance(NamedTuple):
     touchable: bool  # a thing of the world may be touched on purpose, if slowly; the robot's own body may not
 
 
-Near = Callable[[np.ndarray], Optional[Clearance]]
+Near = Callable[[np.ndarray], Sequence[Clearance]]
 
 
 class DriveLimits(NamedTuple):
@@ -71,7 +71,7 @@ class CartesianDrive:
     """Drives one arm's tool by velocities. Stateless: each step starts from the joints that it is given."""
 
     def __init__(self, arm: Arm, limits: Optional[DriveLimits] = None, near: Optional[Near] = None) -> None:
-        """`near` tells, for joint positions (n,), the nearest thing that the arm could hit, None where none is near."""
+        """`near` tells, for joint positions (n,), the nearest things that the arm could hit, one of a kind at most."""
         self.arm = arm
         self.limits = limits or DriveLimits()
         self._near = near
@@ -87,8 +87,8 @@ class CartesianDrive:
         :raises ValueError: for joints, a twist or a period that is not finite or has the wrong shape; a period of 0.
         """
         joints, twist = _checked(joints, twist, period, len(self.arm.names))
-        nearest = self._near(joints) if self._near is not None else None
-        clearance = nearest.distance if nearest is not None else float('inf')
+        nearest = self._near(joints) if self._near is not None else ()
+        clearance = min((each.distance for each in nearest), default=float('inf'))
         if not twist.any():
             return Step(joints, np.zeros(len(joints)), np.zeros(6), 1.0, '', clearance)
         wanted, limit, share = self._within_tool_limits(twist)
@@ -171,16 +171,19 @@ class CartesianDrive:
         nearest = int(np.argmin(shares))
         return min(1.0, float(shares[nearest])), 'end of the workspace in ' + 'xyz'[nearest]
 
-    def _obstacles(self, now: Optional[Clearance], joints: np.ndarray, velocities: np.ndarray, period: float
+    def _obstacles(self, now: Sequence[Clearance], joints: np.ndarray, velocities: np.ndarray, period: float
                    ) -> Tuple[float, str]:
-        if self._near is None or now is None or now.distance >= self.limits.slow_below:
+        near = [each for each in now if each.distance < self.limits.slow_below]
+        if self._near is None or not near:
             return 1.0, ''
-        then = self._near(joints + velocities * period)
-        if then is None or then.distance >= now.distance:
-            return 1.0, ''
-        share = (now.distance - self.limits.stop_below) / (self.limits.slow_below - self.limits.stop_below)
-        least = self.limits.creep if now.touchable else 0.0
-        return float(np.clip(share, least, 1.0)), 'near: ' + now.between
+        then = {each.touchable: each.distance for each in self._near(joints + velocities * period)}
+        shares = [(self._share_left(each), 'near: ' + each.between) for each in near
+                  if then.get(each.touchable, float('inf')) < each.distance]
+        return min(shares, default=(1.0, ''))
+
+    def _share_left(self, near: Clearance) -> float:
+        share = (near.distance - self.limits.stop_below) / (self.limits.slow_below - self.limits.stop_below)
+        return float(np.clip(share, self.limits.creep if near.touchable else 0.0, 1.0))
 
 
 def pulled_back(commanded: np.ndarray, measured: np.ndarray, lead: float) -> np.ndarray:

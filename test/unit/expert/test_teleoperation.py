@@ -117,7 +117,7 @@ def test_the_tool_stays_in_its_workspace(arm):
 
 
 def wall(arm, x, touchable):
-    return lambda joints: Clearance(x - arm.forward(joints)[0, 3], 'hand and wall', touchable)
+    return lambda joints: [Clearance(x - arm.forward(joints)[0, 3], 'hand and wall', touchable)]
 
 
 @pytest.mark.parametrize('touchable, comes_to', [(False, 0.01), (True, 0.0)])

@@ -1,0 +1,176 @@
+"""How near an arm is to what it could hit: the robot's own body, from its URDF, and boxes that it knows of.
+
+A PyBullet world of its own, without physics: it only measures distances between convex shapes.
+"""
+import os
+import tempfile
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
+import pybullet
+
+from ..geometry.chain import Chain, read_joints
+from ..geometry.transforms import quaternion
+from .teleoperation import Clearance
+
+_ALWAYS_NEAR = 0.5  # pairs of links that are as near in more than this share of all postures say nothing
+_SAMPLES = 40
+_OVERLAP = -0.02  # m; deeper than a robot can be in itself: its convex shapes say more than there is
+
+Pair = Tuple[int, int]  # links, by PyBullet's indices
+
+
+class ClearanceError(ValueError):
+    """The robot's model cannot be used; the text says why."""
+
+
+class Box(NamedTuple):
+    """Something in the robot's surroundings."""
+
+    name: str
+    base_from_box: np.ndarray  # 4x4, the robot's base frame from the box's centre
+    size: Tuple[float, float, float]  # m, full extents
+
+
+class ClearanceModel:
+    """The robot and the boxes around it. Not for several threads at once."""
+
+    def __init__(self, urdf: str, base: str) -> None:
+        """`urdf`: text of the model, with mesh file names that can be opened. `base`: frame in which boxes are given.
+
+        :raises ClearanceError: where PyBullet cannot load it, or the frame is not in it.
+        """
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._robot = self._load(urdf)
+        self._joint_of_link = read_joints(urdf)
+        self._links: Dict[str, int] = {}
+        self._joints: Dict[str, int] = {}
+        for index in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client)):
+            info = pybullet.getJointInfo(self._robot, index, physicsClientId=self._client)
+            self._joints[info[1].decode()] = index
+            self._links[info[12].decode()] = index
+        if base not in self._links and base not in {joint.parent for joint in self._joint_of_link.values()}:
+            raise ClearanceError('robot description: no link {!r}'.format(base))
+        self._names = {index: name for name, index in self._links.items()}
+        self._names[-1] = 'base'
+        self._base = base
+        self._boxes: List[Tuple[int, str]] = []
+
+    def set_joints(self, positions: Mapping[str, float]) -> None:
+        """Where the joints are (rad or m); names that the model does not have are left out."""
+        known = [(self._joints[name], [position]) for name, position in positions.items() if name in self._joints]
+        if known:
+            pybullet.resetJointStatesMultiDof(self._robot, *map(list, zip(*known)), physicsClientId=self._client)
+
+    def set_boxes(self, boxes: Sequence[Box]) -> None:
+        """Replace what stands around the robot."""
+        for body, _ in self._boxes:
+            pybullet.removeBody(body, physicsClientId=self._client)
+        self._boxes = [(self._box(box), box.name) for box in boxes]
+
+    def arm(self, chain: Chain, within: float) -> 'ArmClearance':
+        """Distances of one arm, as far as they are below `within` m."""
+        return ArmClearance(self, chain, within)
+
+    def carried_by(self, joints: Sequence[str]) -> Set[int]:
+        """Indices of the links that move with any of these joints."""
+        moving = set()
+        for link, index in self._links.items():
+            name: Optional[str] = link
+            while name in self._joint_of_link:
+                if self._joint_of_link[name].name in joints:
+                    moving.add(index)
+                    break
+                name = self._joint_of_link[name].parent
+        return moving
+
+    def own_pairs(self, moving: Set[int]) -> List[Pair]:
+        """Pairs of a moving link and another one of the robot that both have a shape."""
+        shaped = [index for index in self._names
+                  if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)]
+        return [(first, second) for first in shaped if first in moving for second in shaped if second not in moving]
+
+    def apart(self, pair: Pair, within: float) -> float:
+        """Distance (m) between two links, inf from `within` on."""
+        points = pybullet.getClosestPoints(self._robot, self._robot, within, *pair, physicsClientId=self._client)
+        return min((point[8] for point in points), default=float('inf'))
+
+    def near_boxes(self, moving: Set[int], within: float) -> Optional[Tuple[float, str]]:
+        """The least distance (m) between a moving link and a box, with the names of both."""
+        best: Optional[Tuple[float, str]] = None
+        for body, name in self._boxes:
+            for point in pybullet.getClosestPoints(self._robot, body, within, physicsClientId=self._client):
+                if point[3] in moving and (best is None or point[8] < best[0]):
+                    best = point[8], '{} and {}'.format(self._names[point[3]], name)
+        return best
+
+    def pair_name(self, pair: Pair) -> str:
+        """A pair of links, for people."""
+        return '{} and {}'.format(self._names[pair[0]], self._names[pair[1]])
+
+    def close(self) -> None:
+        """Let go of the PyBullet world."""
+        pybullet.disconnect(self._client)
+
+    def _load(self, urdf: str) -> int:
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'robot.urdf')
+            with open(path, 'w', encoding='utf-8') as file:
+                file.write(urdf)
+            try:
+                robot: int = pybullet.loadURDF(path, useFixedBase=True, physicsClientId=self._client)
+            except pybullet.error as err:
+                raise ClearanceError('robot description: PyBullet cannot load it ({}); are its meshes there?'.format(
+                    err)) from err
+        return robot
+
+    def _box(self, box: Box) -> int:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[side / 2 for side in box.size],
+                                              physicsClientId=self._client)
+        world_from_box = self._world_from_base() @ box.base_from_box
+        body: int = pybullet.createMultiBody(0, shape, -1, world_from_box[:3, 3].tolist(),
+                                             quaternion(world_from_box).tolist(), physicsClientId=self._client)
+        return body
+
+    def _world_from_base(self) -> np.ndarray:
+        result = np.eye(4)
+        if self._base in self._links:
+            state = pybullet.getLinkState(self._robot, self._links[self._base], computeForwardKinematics=True,
+                                          physicsClientId=self._client)
+            result[:3, 3] = state[4]
+            result[:3, :3] = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
+        return result
+
+
+class ArmClearance:
+    """Called with an arm's joint positions, tells what it is nearest to."""
+
+    def __init__(self, model: ClearanceModel, chain: Chain, within: float) -> None:
+        """See ClearanceModel.arm."""
+        self._model = model
+        self._chain = chain
+        self._within = within
+        self._moving = model.carried_by(chain.names)
+        self._pairs = self._meaningful(model.own_pairs(self._moving))
+
+    def __call__(self, joints: np.ndarray) -> List[Clearance]:
+        """At joint positions (n,): what of the robot itself is nearest, and what of its surroundings, where near."""
+        self._model.set_joints(dict(zip(self._chain.names, joints)))
+        apart = ((self._model.apart(pair, self._within), pair) for pair in self._pairs)
+        distance, pair = min((each for each in apart if each[0] > _OVERLAP), default=(float('inf'), (-1, -1)))
+        found = []
+        if distance < self._within:
+            found.append(Clearance(distance, self._model.pair_name(pair), False))
+        box = self._model.near_boxes(self._moving, self._within)
+        if box is not None:
+            found.append(Clearance(box[0], box[1], True))
+        return found
+
+    def _meaningful(self, pairs: List[Pair]) -> List[Pair]:
+        """Pairs of links without those that are near in most postures: neighbours, and what is built together."""
+        counts = dict.fromkeys(pairs, 0)
+        for joints in self._chain.random(np.random.default_rng(0), _SAMPLES):
+            self._model.set_joints(dict(zip(self._chain.names, joints)))
+            for pair in pairs:
+                counts[pair] += self._model.apart(pair, self._within) < self._within
+        return [pair for pair in pairs if counts[pair] <= _ALWAYS_NEAR * _SAMPLES]
