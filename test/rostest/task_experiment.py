@@ -14,7 +14,7 @@ from waiting import wait_for
 
 from smach_oracle.analysis.trials import load_trials
 
-RUN_TRIALS = 'import sys; from smach_oracle.simulation.experiment import main; sys.exit(main())'
+RUN_TRIALS = 'import sys; from smach_oracle.simulation.experiment.command import main; sys.exit(main())'
 
 
 def start(output: Path, trials: int) -> 'subprocess.Popen[str]':

@@ -3,7 +3,8 @@
 It moves nothing: it shows what the executive, the recorder and the statistics make of failures. The task knows only
 its actions, so that a simulated or a real robot can take its place.
 """
-from typing import Any, Callable, Dict, List, Tuple
+import json
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import actionlib
 import rospy
@@ -91,6 +92,10 @@ class StubWorld:
         self._action_time_s = _seconds('~action_time_s')
         self._settings = FaultSettings(rospy.get_param('~faults', {}))
         self._world = FaultyWorld()
+        self._seed: Optional[int] = None
+        self._placed = False
+        self._truth_file = rospy.get_param('~truth_file', 'none')
+        rospy.on_shutdown(self._tell_truth)
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
         self._servers = [self._serve(state) for state in CHAIN]
         self._hand = actionlib.SimpleActionServer('world/assist', SharedAutonomyAction, self._assist, auto_start=False)
@@ -105,10 +110,18 @@ class StubWorld:
         return server
 
     def _reset(self, request: ResetWorldRequest) -> ResetWorldResponse:
+        self._tell_truth()
+        self._seed, self._placed = request.seed, False
         faults = draw_faults(request.seed, self._settings)
         self._world = FaultyWorld(faults)
         self._cause.publish(cause_of(request.seed, faults))
         return ResetWorldResponse(ok=True)
+
+    def _tell_truth(self) -> None:
+        if self._seed is not None and self._truth_file != 'none':
+            with open(self._truth_file, 'a', encoding='utf-8') as file:
+                file.write(json.dumps({'seed': self._seed, 'task': 'pick_and_place', 'success': self._placed, 'why': '',
+                                       'causes': [], 'sim_s': 0.0, 'wall_s': 0.0, 'share': {}}) + '\n')
 
     def _act(self, state: str, server: actionlib.SimpleActionServer,
              answer: Callable[[Any], Tuple[str, Any]], goal: Any) -> None:
@@ -121,6 +134,7 @@ class StubWorld:
         if result.reason:
             server.set_aborted(result, result.reason)
         else:
+            self._placed = self._placed or state == 'PLACE'
             server.set_succeeded(result)
 
     def _preempted(self, server: actionlib.SimpleActionServer) -> bool:
@@ -137,6 +151,7 @@ class StubWorld:
             self._hand.set_aborted(SharedAutonomyResult(text=text), text)
             return
         self._world.assist(goal.state)
+        self._placed = self._placed or goal.state == 'PLACE'
         outputs = assisted_outputs(goal.state)
         items = [encode(key, outputs[key]) for key in goal.output_keys if key in outputs]
         self._hand.set_succeeded(SharedAutonomyResult(outcome='succeeded', outputs=items, text='done by hand'))

@@ -10,8 +10,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from smach_oracle.simulation.experiment import (ExperimentError, Interrupted, Interrupts, Progress, children_of,
-                                                describe, free_port, parse, prepare)
+from smach_oracle.analysis.trials import summarise
+from smach_oracle.oracle.events import Event, EventKind
+from smach_oracle.simulation.experiment.command import alone_in, parse
+from smach_oracle.simulation.experiment.interrupts import Interrupted, Interrupts
+from smach_oracle.simulation.experiment.launching import MARK, end_marked, free_port, marked
+from smach_oracle.simulation.experiment.plan import ExperimentError, enter_folder
+from smach_oracle.simulation.experiment.progress import ProgressLine, describe_trials, time_left
 
 
 class FakeTerminal(io.StringIO):
@@ -19,24 +24,15 @@ class FakeTerminal(io.StringIO):
         return True
 
 
-def fake_arm(done: int) -> SimpleNamespace:
-    return SimpleNamespace(name='with', trials=10, started=0.0, finished_trials=lambda: done)
-
-
-def test_recorded_trials_are_never_overwritten(tmp_path: Path) -> None:
-    (tmp_path / 'old.bag').touch()
-    with pytest.raises(ExperimentError, match='not empty'):
-        prepare(tmp_path)
-    assert prepare(tmp_path / 'new').is_dir()
-
-
-def test_a_free_port_can_be_bound() -> None:
-    with socket.socket() as server:
-        server.bind(('localhost', free_port()))
+def fake_job(done: int) -> SimpleNamespace:
+    return SimpleNamespace(arm=SimpleNamespace(name='with_oracle', recovers=True), trials=10, finished=done, lost={},
+                           summaries={}, messages=[])
 
 
 @pytest.mark.parametrize('argv', [['--trials', '0'], ['--jobs', '0'], ['--seed', '-1'], ['--answer-delay', 'nan'],
-                                  ['--task', 'dance'], ['--arms', 'three'], ['--policy', 'nonsense']])
+                                  ['--task', 'dance'], ['--arms', 'three'], ['--policy', 'nonsense'],
+                                  ['--replicates', '0'], ['--memory', '10', '0'], ['--moderate-from', '0.9'],
+                                  ['--hung-after', '0']])
 def test_wrong_arguments_end_with_usage(argv: list, capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(SystemExit) as caught:
         parse(argv)
@@ -44,26 +40,92 @@ def test_wrong_arguments_end_with_usage(argv: list, capsys: pytest.CaptureFixtur
     assert 'usage' in capsys.readouterr().err
 
 
-def test_the_default_experiment_is_the_papers() -> None:
-    args = parse([])
-    assert (args.task, args.trials, args.arms) == ('pick_and_place', 150, 'both')
+@pytest.mark.parametrize('task, trials', [('pick_and_place', 150), ('drink_retrieval', 100)])
+def test_the_default_experiment_is_the_papers(task: str, trials: int) -> None:
+    plan = parse(['--task', task]).plan
+    assert (plan.trials, plan.replicates, [arm.name for arm in plan.arms]) == (
+        trials, 1, ['with_oracle', 'without_oracle'])
+    assert plan.arms[0].settings == {}, "the task's own"
 
 
-def test_progress_names_the_arm_and_the_time_left_only_while_there_is_one() -> None:
-    assert describe(fake_arm(0)) == 'with oracle 0/10'
-    assert describe(fake_arm(4)).startswith('with oracle 4/10, ')
-    assert describe(fake_arm(10)) == 'with oracle 10/10'
+def test_replicates_have_seeds_of_their_own_and_arms_the_same() -> None:
+    plan = parse(['--trials', '20', '--seed', '7', '--replicates', '3']).plan
+    assert [plan.first_seed(replicate) for replicate in range(3)] == [7, 27, 47]
+
+
+def test_each_memory_and_policy_has_an_arm_of_its_own() -> None:
+    arms = parse(['--memory', '5', '10', '--policy', 'configured', 'algorithm1', '--high-from', '0.8']).plan.arms
+    assert [(arm.name, arm.settings) for arm in arms] == [
+        ('with_oracle_policy_configured_memory_5', {'high_from': 0.8, 'memory': 5}),
+        ('with_oracle_policy_configured_memory_10', {'high_from': 0.8, 'memory': 10}),
+        ('with_oracle_policy_algorithm1_memory_5', {'high_from': 0.8, 'memory': 5, 'policy': 'algorithm1'}),
+        ('with_oracle_policy_algorithm1_memory_10', {'high_from': 0.8, 'memory': 10, 'policy': 'algorithm1'}),
+        ('without_oracle', {})]
+    assert parse(['--memory', '5', '--arms', 'with']).plan.arms[0].name == 'with_oracle'
+
+
+def test_a_folder_goes_on_with_its_own_settings_alone(tmp_path: Path) -> None:
+    plan = parse(['--trials', '20', '--memory', '5']).plan
+    assert not enter_folder(tmp_path / 'new', plan)
+    assert enter_folder(tmp_path / 'new', parse(['--trials', '20', '--memory', '5', '--jobs', '1']).plan)
+    with pytest.raises(ExperimentError, match='trials: there 20, now 30'):
+        enter_folder(tmp_path / 'new', parse(['--trials', '30', '--memory', '5']).plan)
+    with pytest.raises(ExperimentError, match="there with_oracle {'memory': 5}, .*now with_oracle {'memory': 6}"):
+        enter_folder(tmp_path / 'new', parse(['--trials', '20', '--memory', '6']).plan)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / 'old.bag').touch()
+    with pytest.raises(ExperimentError, match='not empty'):
+        enter_folder(tmp_path, parse([]).plan)
+    (tmp_path / 'experiment.json').write_text('{"format": 1}')
+    with pytest.raises(ExperimentError, match='no settings of an experiment'):
+        enter_folder(tmp_path, parse([]).plan)
+
+
+def test_two_runs_do_not_work_in_one_folder(tmp_path: Path) -> None:
+    with alone_in(tmp_path), pytest.raises(ExperimentError, match='another run_trials'), alone_in(tmp_path):
+        pass
+    with alone_in(tmp_path):
+        pass
+
+
+def summary(*kinds: EventKind, outcome: str = 'succeeded'):
+    events = [EventKind.TRIAL_START, *kinds, EventKind.TRIAL_END]
+    return summarise([Event(kind, 'id', number, 0.0, 'TOP', outcome=outcome, query_id='q')
+                      for number, kind in enumerate(events)])
+
+
+def test_progress_tells_what_came_of_the_trials() -> None:
+    trials = [summary(), summary(EventKind.FAILURE, outcome='aborted'),
+              summary(EventKind.FAILURE, EventKind.QUERY_OPENED)]
+    assert describe_trials(trials, True) == '2 with failures, 0 recovered, 1 asked, 1 failed'
+    assert describe_trials(trials, False) == '1 failed'
+
+
+def test_time_left_is_told_only_while_there_is_some() -> None:
+    assert [time_left(10.0, 0, 5), time_left(10.0, 5, 0)] == ['', '']
+    assert [time_left(10.0, 5, 5), time_left(100.0, 5, 30)] == ['   10 s left', '   10 min left']
 
 
 def test_progress_rewrites_its_line_on_a_terminal_and_spares_a_log() -> None:
     terminal, log = FakeTerminal(), io.StringIO()
     for stream in (terminal, log):
-        progress = Progress(stream)
+        progress = ProgressLine(stream)
         for done in (0, 0, 10):
-            progress.show([fake_arm(done)])
+            progress.show([fake_job(done)])
         progress.end()
     assert terminal.getvalue().count('\r') == 2
     assert log.getvalue() == 'with oracle 0/10\n'
+
+
+def test_what_somebody_should_know_is_said_once_and_at_once() -> None:
+    log, job = io.StringIO(), fake_job(0)
+    job.messages.append('seed 5: hung')
+    progress = ProgressLine(log)
+    for _ in range(2):
+        progress.show([job])
+    assert log.getvalue() == 'seed 5: hung\nwith oracle 0/10\n'
 
 
 @pytest.mark.parametrize('signum', Interrupts.SIGNALS)
@@ -79,10 +141,28 @@ def test_signals_are_kept_for_a_moment_at_which_they_can_do_no_harm(signum: int)
     assert signal.getsignal(signum) == before
 
 
-def test_the_processes_that_a_process_started_are_found() -> None:
-    child = subprocess.Popen([sys.executable, '-c', 'input()'], stdin=subprocess.PIPE)
+def test_a_free_port_can_be_bound() -> None:
+    with socket.socket() as server:
+        server.bind(('localhost', free_port()))
+
+
+@pytest.mark.parametrize('grace_s, code', [(0.0, -signal.SIGKILL), (20.0, 3)])
+def test_the_processes_of_a_job_are_found_and_ended_and_no_others(grace_s: float, code: int) -> None:
+    program = '''
+import signal, sys
+signal.signal(signal.SIGINT, lambda *_: sys.exit(3))
+print('ready', flush=True)
+input()
+'''
+    jobs = [subprocess.Popen([sys.executable, '-c', program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                             start_new_session=True, env=dict(os.environ, **{MARK: mark})) for mark in ('/a', '/a b')]
     try:
-        assert child.pid in children_of(os.getpid())
+        assert all(process.stdout.readline() == b'ready\n' for process in jobs)
+        assert marked('/a') == [jobs[0].pid]
+        assert end_marked('/a', grace_s) == 1
+        assert jobs[0].wait(20) == code and jobs[1].poll() is None
     finally:
-        child.communicate(b'')
-    assert child.pid not in children_of(os.getpid())
+        for process in jobs:
+            process.kill()
+            process.communicate()
+    assert end_marked('/a') == 0

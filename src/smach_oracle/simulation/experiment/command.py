@@ -1,0 +1,180 @@
+"""Run an experiment: the same seeds with and without the oracle, every trial recorded, counted at the end.
+
+Each job is a replicate of an arm, and has its own ROS master on a free port, its own world and its own learned rates.
+What is started is stopped, also on Ctrl-C, pressed once or often. Started again with the same --output, an experiment
+goes on where it was.
+"""
+import argparse
+import fcntl
+import os
+import shutil
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Optional, Sequence
+
+from smach_oracle.analysis import bag_statistics
+from smach_oracle.oracle.config import Settings
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.failure_rate import ESTIMATORS
+from smach_oracle.oracle.policy import POLICIES
+
+from .interrupts import Interrupted, Interrupts
+from .job import Job
+from .plan import CONFIGURED, TASKS, ExperimentError, Plan, enter_folder, make_arms
+from .progress import ProgressLine
+
+POLL_S = 0.5
+FAILED, LOST = 1, 3  # exit codes
+# Settings of the oracle that go over those of the task: option, type, what it is.
+OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
+             ('high_from', float, 'failure rate from which a state is HIGH'),
+             ('prior', float, 'failure rate that a state starts with'),
+             ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'))
+
+
+def run(plan: Plan, output: Path, at_a_time: int, hung_after_s: float) -> List[Job]:
+    """Run the jobs that are not over, some at a time; returns them all.
+
+    :raises ExperimentError: naming the job and its folder.
+    :raises Interrupted: by Ctrl-C and the like, once everything is stopped.
+    """
+    jobs: List[Job] = []
+    progress = ProgressLine(sys.stdout)
+    with Interrupts() as interrupts:
+        try:
+            for replicate in range(plan.replicates):
+                jobs += [Job(plan, arm, replicate, output, hung_after_s) for arm in plan.arms]
+            run_jobs(jobs, at_a_time, interrupts, progress)
+        finally:
+            progress.end()
+            for job in jobs:
+                job.request_stop()
+            for job in jobs:
+                job.stop()
+    return jobs
+
+
+def run_jobs(jobs: Sequence[Job], at_a_time: int, interrupts: Interrupts, progress: ProgressLine) -> None:
+    """Start the jobs one after the other and wait for their ends."""
+    waiting = [job for job in jobs if not job.over]
+    active: List[Job] = []
+    progress.show(jobs)
+    while waiting or active:
+        while waiting and len(active) < at_a_time:
+            active.append(waiting.pop(0))
+            active[-1].start()
+        time.sleep(POLL_S)
+        interrupts.check()
+        for job in active:
+            job.watch()
+        active = [job for job in active if not job.over]
+        progress.show(jobs)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep a second run out of the folder. Raises ExperimentError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / '.lock').open('w') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as err:
+            raise ExperimentError('{}: another run_trials is at work there'.format(folder)) from err
+        yield
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)')
+    parser.add_argument('--trials', type=int, help='per arm and replicate (default: as in the paper, {})'.format(
+        ', '.join('{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items()))))
+    parser.add_argument('--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)')
+    parser.add_argument('--replicates', type=int, default=1,
+                        help='complete repetitions on further seeds, each learning anew (default: 1)')
+    parser.add_argument('--jobs', type=int, default=2, help='replicates of arms at a time (default: %(default)s)')
+    parser.add_argument('--arms', choices=['both', 'with', 'without'], default='both', help='(default: %(default)s)')
+    parser.add_argument('--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
+                        help="instead of the task's own, which is as configured (default); one arm for each")
+    parser.add_argument('--memory', nargs='+', type=int, metavar='N',
+                        help="how many of a state's latest results count; one arm for each")
+    parser.add_argument('--estimator', choices=sorted(ESTIMATORS), help='of failure rates')
+    for name, kind, what in OVERRIDES:
+        parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
+    parser.add_argument('--answer-delay', type=float, default=0.0, help='s that the scripted expert takes')
+    parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
+                        help='s without the end of a trial, after which it is run anew (default: 300)')
+    parser.add_argument('--output', type=Path,
+                        help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
+    return parser
+
+
+def parse(argv: Optional[List[str]]) -> argparse.Namespace:
+    """Understand the command line; `args.plan` is the experiment. Ends the process where it is wrong."""
+    parser = make_parser()
+    args = parser.parse_args(argv)
+    trials = TASKS[args.task][1] if args.trials is None else args.trials
+    if min(trials, args.jobs, args.replicates) < 1 or args.seed < 0 or not 0.0 <= args.answer_delay < 3600.0:
+        parser.error('--trials, --jobs and --replicates must be 1 or more, --seed and --answer-delay 0 or more')
+    if not args.hung_after > 0:
+        parser.error('--hung-after must be more than 0')
+    settings = {name: getattr(args, name) for name in ['estimator'] + [name for name, _, _ in OVERRIDES]
+                if getattr(args, name) is not None}
+    varied = varied_settings(args)
+    arms = make_arms(args.arms, settings, varied)
+    for arm in arms:
+        try:
+            Settings.from_dict(dict(arm.settings))
+        except ConfigError as err:
+            parser.error(str(err))
+    args.plan = Plan(args.task, trials, args.seed, args.replicates, arms, args.answer_delay)
+    return args
+
+
+def varied_settings(args: argparse.Namespace) -> Dict[str, Sequence[Any]]:
+    """The settings of which each value has an arm of its own."""
+    varied: Dict[str, Sequence[Any]] = {}
+    if args.policy != [CONFIGURED]:
+        varied['policy'] = list(dict.fromkeys(args.policy))
+    if args.memory:
+        varied['memory'] = list(dict.fromkeys(args.memory))
+    return varied
+
+
+def main(argv: Optional[List[str]] = None) -> int:
+    """Entry point.
+
+    :returns: 0, or 1 where a job failed, 3 where trials were lost, or 128 and the signal's number where one stopped
+        it: 130 on Ctrl-C.
+    """
+    args = parse(argv)
+    output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
+    try:
+        if shutil.which('roslaunch') is None:
+            raise ExperimentError('roslaunch not found; source the workspace first')
+        with alone_in(output):
+            if enter_folder(output, args.plan):
+                print('Going on in {}'.format(output))
+            jobs = run(args.plan, output, args.jobs, args.hung_after)
+    except (ExperimentError, OSError) as err:
+        print('run_trials: {}'.format(err), file=sys.stderr)
+        return FAILED
+    except Interrupted as err:
+        print('run_trials: stopped by {}; what was recorded stays in {}, and the same command with --output goes on '
+              'there'.format(err, output), file=sys.stderr)
+        return 128 + err.signum
+    return report(jobs, output)
+
+
+def report(jobs: Sequence[Job], output: Path) -> int:
+    """Print the tables, draw the figures, name what was lost; returns the exit code."""
+    places = [str(output / name) for name in dict.fromkeys(job.arm.name for job in jobs)]
+    code = bag_statistics.main(places + ['--figure', str(output / 'time_series'), '--csv', str(output / 'trials.csv'),
+                                         '--json', str(output / 'statistics.json')])
+    lost = ['{}: seed {}: {}'.format(job.name, seed, why) for job in jobs for seed, why in sorted(job.lost.items())]
+    if lost:
+        print('Lost trials:\n  {}'.format('\n  '.join(lost)))
+    print('Bags, logs and figures: {}'.format(os.fspath(output)))
+    return code or (LOST if lost else 0)

@@ -1,0 +1,42 @@
+"""Signals that ask to stop."""
+import signal
+from types import FrameType
+from typing import Any, Dict, Optional
+
+
+class Interrupted(Exception):
+    """A signal asked to stop."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signal.Signals(signum).name)
+        self.signum = signum
+
+
+class Interrupts:
+    """``with Interrupts() as interrupts:`` signals that ask to stop are noted there, for `check` to raise.
+
+    So they cannot tear apart the starting and the stopping of the jobs, and the second Ctrl-C of somebody impatient
+    does not leave robots running that the first one was about to stop.
+    """
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+    def __init__(self) -> None:
+        self._came: Optional[int] = None
+        self._before: Dict[int, Any] = {}
+
+    def __enter__(self) -> 'Interrupts':
+        self._before = {signum: signal.signal(signum, self._note) for signum in self.SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for signum, handler in self._before.items():
+            signal.signal(signum, handler)
+
+    def _note(self, signum: int, _: Optional[FrameType]) -> None:
+        self._came = self._came or signum
+
+    def check(self) -> None:
+        """Raise Interrupted if a signal came."""
+        if self._came:
+            raise Interrupted(self._came)

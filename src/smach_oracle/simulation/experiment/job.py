@@ -1,0 +1,136 @@
+"""One job: the trials of one replicate of one arm, in order, with a master, a world and learned rates of its own."""
+import json
+import time
+from pathlib import Path
+from typing import Any, Dict, List, Optional
+
+from smach_oracle.analysis.trials import TrialSummary
+
+from .launching import Launch, end_marked
+from .plan import TASKS, Arm, ExperimentError, Plan
+from .records import JobRecords
+
+LEFTOVER_GRACE_S = 15.0  # for what an earlier run left running
+ATTEMPTS = 2  # at a trial that hangs, or in which something dies
+LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a trial
+
+
+class Job:
+    """Runs until all its trials are complete or lost; a trial that fails is no failure of the job."""
+
+    def __init__(self, plan: Plan, arm: Arm, replicate: int, output: Path, hung_after_s: float) -> None:
+        """Look at what is there already. Raises ExperimentError and OSError."""
+        self.arm = arm
+        self.name = '{}/replicate_{}'.format(arm.name, replicate)
+        self.trials = plan.trials
+        self.summaries: Dict[str, TrialSummary] = {}  # of the trials that are over, by the path of their bags
+        self.messages: List[str] = []  # what somebody should be told
+        self.ran_s = 0.0  # time that this run spent on it
+        self.ran = 0  # trials that this run has added
+        self._plan = plan
+        self._seed = plan.first_seed(replicate)
+        self._hung_after_s = hung_after_s
+        self._records = JobRecords(output / arm.name / 'replicate_{}'.format(replicate), self._seed, plan.trials)
+        self._launch: Optional[Launch] = None
+        self._attempts: Dict[int, int] = {}
+        self._progress_at = 0.0
+        self._started_at = 0.0
+        left = end_marked(str(self._records.folder), LEFTOVER_GRACE_S)
+        if left:
+            self.messages.append('{}: ended {} processes that an earlier run had left'.format(self.name, left))
+        self._settle()
+
+    @property
+    def over(self) -> bool:
+        """Whether all trials are complete or lost."""
+        return self._next >= self.trials
+
+    @property
+    def lost(self) -> Dict[int, str]:
+        """Seeds of the trials that could not be run, and why."""
+        return {self._seed + number: why for number, why in self._lost.items()}
+
+    @property
+    def finished(self) -> int:
+        """How many trials are over, lost ones among them."""
+        return min(self.trials, len(self.summaries) + len(self._lost))
+
+    def _settle(self) -> None:
+        progress = self._records.settle(self.arm.recovers)
+        self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
+        self._next, self._lost = progress.next_trial, progress.lost
+        if progress.dropped:
+            self.messages.append('{}: trial {} was interrupted and is run anew'.format(self.name, self._next + 1))
+
+    def start(self) -> None:
+        """Launch the trials that are missing. Raises OSError."""
+        self._started_at = self._progress_at = time.monotonic()
+        self._done_at_start = len(self.summaries)
+        self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
+
+    def _arguments(self) -> Dict[str, Any]:
+        settings = dict(self.arm.settings)
+        if self.arm.recovers:
+            settings['rates_file'] = str(self._records.rates)
+        return {'trials': self.trials - self._next, 'seed': self._seed + self._next, 'record': self._records.folder,
+                'truth': self._records.truth, 'with_oracle': str(self.arm.recovers).lower(),
+                'answer_delay': self._plan.answer_delay, 'oracle': json.dumps(settings)}
+
+    def watch(self) -> None:
+        """See how it goes: take in new trials, start again after a trial in which something hung or died.
+
+        :raises ExperimentError: where this does not help.
+        """
+        if self._launch is None:
+            return
+        self._take_in()
+        if self._launch.running():
+            if time.monotonic() - self._progress_at > self._hung_after_s:
+                self._again('no trial has ended for {:.0f} s'.format(self._hung_after_s))
+        else:
+            self._again('it ended before its trials were over')
+
+    def _take_in(self) -> None:
+        for path in self._records.closed_bags():
+            if path not in self.summaries:
+                recorded = self._records.read(path)
+                if recorded is not None:
+                    self.summaries[path] = recorded.summary
+                    self._progress_at = time.monotonic()
+
+    def _again(self, why: str) -> None:
+        self.stop()
+        if self.over:
+            return
+        number = self._next
+        self._attempts[number] = self._attempts.get(number, 0) + 1
+        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why, self._records.folder)
+        if self._attempts[number] >= ATTEMPTS:
+            self._lose(number, why, text)
+        else:
+            self.messages.append(text + '; started again')
+        if not self.over:
+            self.start()
+
+    def _lose(self, number: int, why: str, text: str) -> None:
+        before = set(range(number - LOST_IN_A_ROW + 1, number))
+        if not self.summaries or before <= set(self._lost) and len(before) < number:
+            raise ExperimentError(text)
+        self._records.lose(number, why)
+        self.messages.append(text + '; LOST')
+        self._settle()
+
+    def request_stop(self) -> None:
+        """Ask what runs to end."""
+        if self._launch is not None:
+            self._launch.request_stop()
+
+    def stop(self) -> None:
+        """End what runs, and keep what is complete. Raises ExperimentError and OSError."""
+        if self._launch is None:
+            return
+        self._launch.stop()
+        self._launch = None
+        self._settle()
+        self.ran_s += time.monotonic() - self._started_at
+        self.ran += len(self.summaries) - self._done_at_start

@@ -1,0 +1,104 @@
+"""One roslaunch with a master of its own, whose last descendant is found again, also by the next run after a crash."""
+import ctypes
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+from typing import Any, IO, List, Mapping, Optional
+
+MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
+NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
+STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
+_PR_SET_PDEATHSIG = 1
+
+
+class Launch:
+    """A running roslaunch. Its output goes to the end of `launch.log` in the job's folder, ROS's logs to `log`."""
+
+    def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any]) -> None:
+        """Start it. Raises OSError."""
+        self.log = folder / 'launch.log'
+        self._mark = str(folder)
+        port = free_port()
+        command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
+        command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
+        environment = dict(os.environ, ROS_MASTER_URI='http://localhost:{}'.format(port), ROS_HOSTNAME='localhost',
+                           ROS_LOG_DIR=str(folder / 'log'), PYTHONUNBUFFERED='1')
+        self._log_file: IO[str] = self.log.open('a')
+        self._process = subprocess.Popen(command, env=dict(environment, **{MARK: self._mark}), stdout=self._log_file,
+                                         stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=end_with_parent)
+
+    def running(self) -> bool:
+        """Whether roslaunch has not ended."""
+        return self._process.poll() is None
+
+    def request_stop(self) -> None:
+        """Ask the launch to end with all its nodes."""
+        if self.running():
+            self._process.send_signal(signal.SIGINT)
+
+    def stop(self) -> None:
+        """End the launch and all its nodes."""
+        self.request_stop()
+        try:
+            self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            pass
+        end_marked(self._mark)
+        self._process.wait()
+        self._log_file.close()
+
+
+def end_with_parent() -> None:
+    """In a child before it becomes another program: be told to stop, as by Ctrl-C, when the parent is killed (Linux)."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+
+
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(('localhost', 0))
+        return int(probe.getsockname()[1])
+
+
+def marked(mark: str) -> List[int]:
+    """Processes of a job, by the mark in their environment."""
+    wanted = os.fsencode('{}={}'.format(MARK, mark))
+    found = []
+    for entry in Path('/proc').glob('[0-9]*'):
+        environment = _environment(entry)
+        if environment is not None and wanted in environment.split(b'\0'):
+            found.append(int(entry.name))
+    return found
+
+
+def _environment(entry: Path) -> Optional[bytes]:
+    try:
+        return (entry / 'environ').read_bytes()
+    except OSError:
+        return None  # it has ended meanwhile, or is somebody else's
+
+
+def end_marked(mark: str, grace_s: float = 0.0) -> int:
+    """End every process of a job: asked first where there is grace, killed after it.
+
+    :returns: how many there were.
+    """
+    found = marked(mark)
+    for number, until in ((signal.SIGINT, time.monotonic() + grace_s), (signal.SIGKILL, time.monotonic() + grace_s + 10)):
+        if number == signal.SIGINT and not grace_s:
+            continue
+        for pid in marked(mark):
+            _send(pid, number)
+        while marked(mark) and time.monotonic() < until:
+            time.sleep(0.05)
+    return len(found)
+
+
+def _send(pid: int, number: int) -> None:
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:
+        pass  # it has ended meanwhile

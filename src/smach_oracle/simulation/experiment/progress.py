@@ -1,0 +1,79 @@
+"""How far an experiment is: one line that is rewritten on a terminal, a line now and then elsewhere."""
+import time
+from typing import IO, List, Sequence
+
+from smach_oracle.analysis.trials import Ending, TrialSummary
+
+from .job import Job
+
+LOG_EVERY_S = 10.0
+
+
+class ProgressLine:
+    """The line, and messages above it."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+        self._terminal = stream.isatty()
+        self._last = ''
+        self._printed = 0.0
+        self._began = time.monotonic()
+        self._finished_before: List[int] = []
+
+    def show(self, jobs: Sequence[Job]) -> None:
+        """Trials so far, what came of them, and the time left."""
+        for job in jobs:
+            for message in job.messages:
+                self._write(message + '\n')
+            job.messages.clear()
+        finished = [job.finished for job in jobs]
+        self._finished_before = self._finished_before or finished
+        text = '   '.join(describe_arms(jobs))
+        now = time.monotonic()
+        if text == self._last or (not self._terminal and now - self._printed < LOG_EVERY_S):
+            return
+        self._last, self._printed = text, now
+        left = time_left(now - self._began, sum(finished) - sum(self._finished_before),
+                         sum(job.trials for job in jobs) - sum(finished))
+        self._write(text + left + ('' if self._terminal else '\n'))
+
+    def _write(self, text: str) -> None:
+        self._stream.write('\r\033[K' + text if self._terminal else text)
+        self._stream.flush()
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._terminal:
+            self._stream.write('\n')
+
+
+def time_left(elapsed_s: float, done: int, missing: int) -> str:
+    """E.g. "   12 min left"; nothing where nothing can be said yet."""
+    if not done or not missing:
+        return ''
+    left_s = elapsed_s / done * missing
+    return '   {:.0f} min left'.format(left_s / 60) if left_s >= 120 else '   {:.0f} s left'.format(left_s)
+
+
+def describe_arms(jobs: Sequence[Job]) -> List[str]:
+    """E.g. "with oracle 40/150: 11 with failures, 10 recovered, 2 asked, 0 failed"."""
+    texts = []
+    for name in dict.fromkeys(job.arm.name for job in jobs):
+        mine = [job for job in jobs if job.arm.name == name]
+        trials = [trial for job in mine for trial in job.summaries.values()]
+        lost = sum(len(job.lost) for job in mine)
+        texts.append('{} {}/{}{}{}'.format(
+            name.replace('_', ' '), sum(job.finished for job in mine), sum(job.trials for job in mine),
+            ': ' + describe_trials(trials, mine[0].arm.recovers) if trials else '',
+            ', {} lost'.format(lost) if lost else ''))
+    return texts
+
+
+def describe_trials(trials: Sequence[TrialSummary], recovers: bool) -> str:
+    """What came of some trials, in numbers of trials."""
+    failed = '{} failed'.format(sum(trial.ending is Ending.FAILURE for trial in trials))
+    if not recovers:
+        return failed
+    return '{} with failures, {} recovered, {} asked, {}'.format(
+        sum(trial.failures > 0 for trial in trials), sum(trial.recoveries > 0 for trial in trials),
+        sum(trial.questions > 0 for trial in trials), failed)

@@ -1,0 +1,161 @@
+"""What is on disk of one job, which is one replicate of one arm: complete trials, lost ones, and where to go on.
+
+The bag of a trial tells what had been learned at its end, so that a bag with its end in it is all that is needed to go
+on after it, whatever happened at whichever moment. Bags are in the order of their names, which is that of the trials.
+"""
+import json
+import os
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+
+from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
+from smach_oracle.analysis.trials import Ending, TrialSummary, summarise
+from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
+from smach_oracle.oracle.events import EventKind
+from smach_oracle.oracle.rates_file import write_learned
+
+from .plan import ExperimentError, write_json
+
+LOST_FILE = 'lost.json'
+RATES_FILE = 'rates.json'
+DROPPED = '.dropped'  # behind the name of a bag that does not count
+
+
+class Recorded(NamedTuple):
+    """One trial as its bag tells it."""
+
+    summary: TrialSummary
+    learned: Optional[Mapping[str, Any]]  # at its end; None where no rates are kept
+
+
+class Progress(NamedTuple):
+    """How far a job is."""
+
+    done: List[Recorded]
+    lost: Dict[int, str]  # number of the trial, from 0: why
+    dropped: Tuple[str, ...]  # names of the bags that were put aside
+    next_trial: int  # number of the first trial that is neither done nor lost
+
+
+class JobRecords:
+    """The folder of a job."""
+
+    def __init__(self, folder: Path, first_seed: int, trials: int) -> None:
+        """Make the folder. Raises OSError."""
+        self.folder = folder
+        self.rates = folder / RATES_FILE
+        self.truth = folder / TRUTH_FILE
+        self._first_seed = first_seed
+        self._trials = trials
+        self._reader = EventReader()
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def settle(self, keeps_rates: bool) -> Progress:
+        """Look through the folder while nothing runs: put aside what is not complete, and prepare to go on.
+
+        Afterwards there are the bags and the truth of complete trials, and the rates as the last one left them.
+
+        :raises ExperimentError: where a bag is of another seed than its place says.
+        :raises OSError: where a file cannot be moved or written.
+        """
+        lost, truths = self._lost(), self._truths()
+        numbers = [number for number in range(self._trials) if number not in lost]
+        paths = self._bags()
+        done: List[Recorded] = []
+        while len(done) < min(len(paths), len(numbers)):
+            recorded = self.read(paths[len(done)])
+            seed = self._first_seed + numbers[len(done)]
+            if recorded is None or not self._is_complete(recorded, seed, truths):
+                break
+            if keeps_rates and recorded.learned is None:
+                raise ExperimentError('{}: it does not tell what was learned'.format(paths[len(done)]))
+            done.append(recorded)
+        dropped = paths[len(done):]
+        for path in dropped:
+            os.replace(path, path + DROPPED)
+        next_trial = (numbers + [self._trials])[len(done)]
+        self._keep_lost({number: why for number, why in lost.items() if number < next_trial})
+        self._keep_truths({self._first_seed + number for number in numbers[:len(done)]})
+        self._restore_rates(done[-1].learned if done else None)
+        return Progress(done, self._lost(), tuple(os.path.basename(path) for path in dropped), next_trial)
+
+    def read(self, path: str) -> Optional[Recorded]:
+        """What a bag tells of its trial; None where it is not to be read, or is not of one trial."""
+        try:
+            content = self._reader.read(path)
+        except BagError:
+            return None
+        if len({event.trial_id for event in content.events}) != 1:
+            return None
+        summary = summarise(content.events, (path,))
+        end = next((event for event in content.events if event.kind == EventKind.TRIAL_END), None)
+        learned = end.data.get('learned') if end is not None and isinstance(end.data, Mapping) else None
+        return Recorded(summary._replace(cause=content.causes.get(summary.trial_id)), learned)
+
+    def _is_complete(self, recorded: Recorded, seed: int, truths: Mapping[int, Any]) -> bool:
+        summary = recorded.summary
+        if summary.ending in (Ending.UNFINISHED, Ending.PREEMPTED) or seed not in truths:
+            return False
+        if summary.cause is not None and summary.cause.seed != seed:
+            raise ExperimentError('{}: a trial of seed {} where seed {} is expected'.format(
+                summary.bags[0], summary.cause.seed, seed))
+        return True
+
+    def lose(self, number: int, why: str) -> None:
+        """Note that a trial could not be run. Raises OSError."""
+        self._keep_lost({**self._lost(), number: why})
+
+    def closed_bags(self) -> List[str]:
+        """Paths of the bags whose trials are over, in the order of the trials."""
+        return sorted(str(path) for path in self.folder.glob('*.bag'))
+
+    def _bags(self) -> List[str]:
+        return sorted(find_bags([str(self.folder)]))
+
+    def _keep_lost(self, lost: Mapping[int, str]) -> None:
+        if lost != self._lost():
+            write_json(self.folder / LOST_FILE, {str(number): why for number, why in lost.items()})
+
+    def _lost(self) -> Dict[int, str]:
+        path = self.folder / LOST_FILE
+        if not path.exists():
+            return {}
+        try:
+            return {int(key): str(why) for key, why in json.loads(path.read_text(encoding='utf-8')).items()}
+        except (ValueError, AttributeError) as err:
+            raise ExperimentError('{}: {}'.format(path, err)) from err
+
+    def _truths(self) -> Mapping[int, Any]:
+        try:
+            return read_truth(str(self.truth))
+        except FileNotFoundError:
+            return {}
+        except BagError as err:
+            raise ExperimentError(str(err)) from err
+
+    def _keep_truths(self, seeds: Any) -> None:
+        """Leave the lines of these seeds alone: that of an interrupted trial must not stand for its next run."""
+        if not self.truth.exists():
+            return
+        lines = self.truth.read_text(encoding='utf-8').split('\n')
+        kept = [line for line in lines if line.strip() and _seed_of(line) in seeds]
+        temporary = self.truth.with_name(TRUTH_FILE + '.tmp')
+        with temporary.open('w', encoding='utf-8') as stream:
+            stream.writelines(line + '\n' for line in kept)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(str(temporary), str(self.truth))
+
+    def _restore_rates(self, learned: Optional[Mapping[str, Any]]) -> None:
+        if learned is not None:
+            write_learned(str(self.rates), learned)
+        elif self.rates.exists():
+            self.rates.unlink()
+
+
+def _seed_of(line: str) -> Optional[int]:
+    try:
+        seed = json.loads(line).get('seed')
+    except (ValueError, AttributeError):
+        return None
+    return seed if isinstance(seed, int) else None
