@@ -1,0 +1,246 @@
+"""What an arm would touch: the robot at its encoder readings and a map of boxes, in a PyBullet client of its own.
+
+The client has nothing to do with the world's; it knows what the robot has measured. It is made anew for each skill,
+so that no answer depends on what was asked before. Lengths in m, angles in rad, frame: base_footprint.
+"""
+import contextlib
+import os
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from typing import Dict, FrozenSet, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
+import pybullet
+
+from ...geometry.chain import Chain, read_joints
+from ...geometry.transforms import quaternion
+from .interface import ARM_JOINTS, ARMS, BASE_FRAME, TOOL_FRAME
+from .kitchen import MapBox
+from .pr2_model import pr2_urdf, srdf_pairs
+
+TOUCH = 0.001  # m that hulls may overlap: they are somewhat larger than the links
+_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION
+_MOVING, _RESTING = 1, 64  # collision groups; 1 is what PyBullet gives to all that moves
+_FAR = (0.0, 0.0, -50.0)
+
+
+class RobotModel(NamedTuple):
+    """What the robot knows of its own body."""
+
+    urdf: str  # XML text with absolute names of mesh files
+    allowed: FrozenSet[FrozenSet[str]]  # pairs of links that may touch
+
+
+def installed_model() -> RobotModel:
+    """The PR2 as derived from the installed description. Raises ModelError, where there is none."""
+    return RobotModel(pr2_urdf().read_text(), srdf_pairs())
+
+
+def model_from(urdf: str, srdf: str) -> RobotModel:
+    """A model out of robot_description and robot_description_semantic.
+
+    :raises ValueError: for text that is not XML.
+    """
+    read_joints(urdf)
+    try:
+        pairs = ElementTree.fromstring(srdf).iter('disable_collisions')
+    except ElementTree.ParseError as err:
+        raise ValueError('robot_description_semantic: {}'.format(err)) from err
+    return RobotModel(urdf, frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs))
+
+
+class CollisionWorld:
+    """One arm of the robot among everything else: the rest of the robot, boxes, and what the hand holds."""
+
+    def __init__(self, model: RobotModel, arm: str, joints: Mapping[str, float]) -> None:
+        """
+        :param arm: the arm that moves, 'left' or 'right'; all other joints stay as in `joints`.
+        :param joints: encoder readings; joints that are missing stand at 0.
+        :raises ValueError: for an unknown arm.
+        """
+        if arm not in ARMS:
+            raise ValueError('arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+        lift = 'torso_lift_joint'
+        self.chain = Chain.from_urdf(model.urdf, BASE_FRAME, TOOL_FRAME[arm], fixed={lift: joints.get(lift, 0.0)})
+        self.checks = 0  # how often a configuration was looked at, the measure of planning effort
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._robot = self._load(model.urdf)
+        self._links = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[12].decode(): k
+                       for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
+        self._joints = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
+                        for k in range(len(self._links))}
+        self._arm = [self._joints[name] for name in ARM_JOINTS[arm]]
+        self._moving = _below(model.urdf, arm[0] + '_shoulder_pan_link')
+        self._moving_links = {self._links[name] for name in self._moving}
+        self._hand = {self._links[name] for name in self._moving if '_gripper_' in name}
+        self._pairs = self._filter(model.allowed)
+        self._boxes: Dict[str, int] = {}
+        self._held: Optional[Tuple[int, np.ndarray]] = None
+        self._touchable: Set[int] = set()
+        self.place_rest(joints)
+
+    def __enter__(self) -> 'CollisionWorld':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Drop the client. The object cannot be used afterwards."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def place_rest(self, joints: Mapping[str, float]) -> None:
+        """Set the joints of everything but the arm (and of the gripper) to encoder readings."""
+        known = [(self._joints[name], value) for name, value in sorted(joints.items()) if name in self._joints]
+        pybullet.resetJointStatesMultiDof(self._robot, [index for index, _ in known], [[value] for _, value in known],
+                                          physicsClientId=self._client)
+
+    def add_box(self, name: str, box: MapBox) -> None:
+        """An obstacle. A box of the same name is replaced."""
+        self.remove(name)
+        self._boxes[name] = self._body(box.half, 0.0, box.centre, (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)))
+
+    def remove(self, name: str) -> None:
+        """Drop an obstacle, if it is there."""
+        body = self._boxes.pop(name, None)
+        if body is not None:
+            self._touchable.discard(body)
+            pybullet.removeBody(body, physicsClientId=self._client)
+
+    def names(self) -> List[str]:
+        """Of all obstacles."""
+        return sorted(self._boxes)
+
+    def attach(self, half: Sequence[float], tool_from_object: np.ndarray) -> None:
+        """From now on the hand holds a box of these half extents (m); its own hand may touch it."""
+        self.detach()
+        self._held = (self._body(half, 0.1, _FAR, (0.0, 0.0, 0.0, 1.0)), tool_from_object)
+
+    def detach(self) -> None:
+        """The hand holds nothing any more."""
+        if self._held is not None:
+            pybullet.removeBody(self._held[0], physicsClientId=self._client)
+            self._held = None
+
+    @contextlib.contextmanager
+    def touchable(self, names: Iterable[str]) -> Iterator[None]:
+        """While this holds, hand and held object may touch these obstacles; the rest of the arm may not."""
+        before = self._touchable
+        self._touchable = before | {self._boxes[name] for name in names if name in self._boxes}
+        try:
+            yield
+        finally:
+            self._touchable = before
+
+    def is_free(self, q: np.ndarray) -> bool:
+        """Whether the arm (and what it holds) touches nothing at joint positions (7,)."""
+        return next(self._collisions(q), None) is None
+
+    def why_not(self, q: np.ndarray) -> str:
+        """What touches what at joint positions (7,), in words; '' where nothing does."""
+        names = {index: name for name, index in self._links.items()}
+        bodies = {body: name for name, body in self._boxes.items()}
+        found = set()
+        for one, other in self._collisions(q):
+            found.add(' touches '.join(
+                names.get(link, BASE_FRAME) if body == self._robot else bodies.get(body, 'the held object')
+                for body, link in (one, other)))
+        return '; '.join(sorted(found))
+
+    def distance(self, q: np.ndarray, reach: float = 0.1) -> float:
+        """The least distance (m, below 0 inside) of the arm to anything that it must not touch; at most `reach`."""
+        self._pose(q)
+        least = reach
+        for body in self._boxes.values():
+            if body not in self._touchable:
+                least = self._nearest(self._robot, body, least, moving_only=True)
+                if self._held is not None:
+                    least = self._nearest(self._held[0], body, least)
+        for one, other in self._pairs:
+            points = pybullet.getClosestPoints(self._robot, self._robot, least, one, other,
+                                               physicsClientId=self._client)
+            least = min([least] + [point[8] for point in points])
+        return least
+
+    def _nearest(self, one: int, other: int, least: float, moving_only: bool = False) -> float:
+        moving = self._moving_links if moving_only else None
+        points = pybullet.getClosestPoints(one, other, least, physicsClientId=self._client)
+        return min([least] + [point[8] for point in points if moving is None or point[3] in moving])
+
+    def _collisions(self, q: np.ndarray) -> Iterator[Tuple[Tuple[int, int], Tuple[int, int]]]:
+        """Pairs of (body, link) that touch and must not."""
+        self.checks += 1
+        self._pose(q)
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        held = -1 if self._held is None else self._held[0]
+        for contact in pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client):
+            if contact[8] > -TOUCH:
+                continue
+            one, other = (contact[1], contact[3]), (contact[2], contact[4])
+            if one[0] != self._robot:
+                one, other = other, one
+            by_hand = one[1] in self._hand
+            if by_hand and (other[0] == held or other[0] in self._touchable):
+                continue
+            yield one, other
+        if held >= 0:
+            for contact in pybullet.getContactPoints(bodyA=held, physicsClientId=self._client):
+                bodies = {contact[1], contact[2]} - {held}
+                if contact[8] <= -TOUCH and self._robot not in bodies and not bodies & self._touchable:
+                    yield (held, -1), (bodies.pop(), -1)
+
+    def _pose(self, q: np.ndarray) -> None:
+        pybullet.resetJointStatesMultiDof(self._robot, self._arm, [[float(value)] for value in q],
+                                          physicsClientId=self._client)
+        if self._held is not None:
+            body, tool_from_object = self._held
+            pose = self.chain.forward(q) @ tool_from_object
+            pybullet.resetBasePositionAndOrientation(body, pose[:3, 3].tolist(), quaternion(pose).tolist(),
+                                                     physicsClientId=self._client)
+
+    def _load(self, urdf: str) -> int:
+        """PyBullet reads robots from files only."""
+        handle, path = tempfile.mkstemp(suffix='.urdf')
+        try:
+            with os.fdopen(handle, 'w') as stream:
+                stream.write(urdf)
+            return int(pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS, physicsClientId=self._client))
+        finally:
+            os.remove(path)
+
+    def _filter(self, allowed: FrozenSet[FrozenSet[str]]) -> List[Tuple[int, int]]:
+        """Leave on the pairs with a moving link that must not touch; they are returned."""
+        solid = [(name, index) for name, index in self._links.items()
+                 if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)]
+        moving = [each for each in solid if each[0] in self._moving]
+        resting = [each for each in solid if each[0] not in self._moving]
+        for _, index in resting:  # they meet what moves, not each other, nor the boxes
+            pybullet.setCollisionFilterGroupMask(self._robot, index, _RESTING, _MOVING, physicsClientId=self._client)
+        pairs = []
+        for k, (one, first) in enumerate(moving):
+            for other, second in moving[k + 1:] + resting:
+                if frozenset((one, other)) not in allowed:
+                    pairs.append((first, second))
+                else:
+                    pybullet.setCollisionFilterPair(self._robot, self._robot, first, second, 0,
+                                                    physicsClientId=self._client)
+        return pairs
+
+    def _body(self, half: Sequence[float], mass: float, position: Sequence[float], xyzw: Sequence[float]) -> int:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[float(each) for each in half],
+                                              physicsClientId=self._client)
+        return int(pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
+                                            [float(each) for each in xyzw], physicsClientId=self._client))
+
+
+def _below(urdf: str, link: str) -> Set[str]:
+    """A link and all that hang on it."""
+    joints = read_joints(urdf).values()
+    found = {link}
+    while True:
+        more = {joint.child for joint in joints if joint.parent in found} - found
+        if not more:
+            return found
+        found |= more
