@@ -1,0 +1,34 @@
+"""Where the links of a robot are, from its URDF and its joint positions."""
+from typing import Dict, Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .chain import Joint
+from .transforms import transform
+
+
+def link_pose(joints: Dict[str, Joint], root: str, link: str, positions: Mapping[str, float]) -> np.ndarray:
+    """4x4: `root` from `link`.
+
+    :param joints: as `chain.read_joints` gives them, by the link that each carries.
+    :param positions: rad or m by joint; joints that are missing stand at zero.
+    :raises ValueError: where `link` does not hang below `root`.
+    """
+    result = np.eye(4)
+    at = link
+    while at != root:
+        joint = joints.get(at)
+        if joint is None:
+            raise ValueError('{!r} is no link below {!r}'.format(link, root))
+        result = joint.origin @ _moved(joint, positions.get(joint.name, 0.0)) @ result
+        at = joint.parent
+    return result
+
+
+def _moved(joint: Joint, position: float) -> np.ndarray:
+    if joint.kind == 'prismatic':
+        return transform(joint.axis * position)
+    if joint.kind in ('revolute', 'continuous'):
+        return transform(rotation=Rotation.from_rotvec(joint.axis * position).as_matrix())
+    return np.eye(4)
