@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""A whole experiment with run_trials, which starts masters of its own: to its end, and stopped in the middle."""
+"""Whole experiments with run_trials, which starts masters of its own: to the end, stopped, killed, and gone on with."""
+import io
 import os
 import signal
 import subprocess
@@ -7,20 +8,22 @@ import sys
 import tempfile
 import time
 import unittest
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import List
 
 from waiting import wait_for
 
+from smach_oracle.analysis import course
 from smach_oracle.analysis.trials import load_trials
 
 RUN_TRIALS = 'import sys; from smach_oracle.simulation.experiment.command import main; sys.exit(main())'
 
 
-def start(output: Path, trials: int) -> 'subprocess.Popen[str]':
+def start(output: Path, trials: int, *options: str) -> 'subprocess.Popen[str]':
     """Run run_trials as from a shell of its own, with the Python that has rosbags."""
-    return subprocess.Popen([sys.executable, '-c', RUN_TRIALS, '--trials', str(trials), '--output', str(output)],
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+    return subprocess.Popen([sys.executable, '-c', RUN_TRIALS, '--trials', str(trials), '--output', str(output),
+                             *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
 
 
 def processes_of(output: Path) -> List[int]:
@@ -40,36 +43,67 @@ class Experiment(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.output = Path(folder.name) / 'two words'
+        self.bags = self.output / 'with_oracle' / 'replicate_0'
 
-    def test_it_records_both_arms_counts_them_and_draws_also_in_a_folder_with_a_space(self) -> None:
-        process = start(self.output, 2)
-        text = process.communicate(timeout=100)[0]
+    def finish(self, process: 'subprocess.Popen[str]') -> str:
+        text = process.communicate(timeout=150)[0]
         self.assertEqual(process.returncode, 0, text)
-        self.assertEqual(sorted(trial.recovers for trial in load_trials([str(self.output)]).trials),
-                         [False, False, True, True])
-        self.assertIn('PICK_AND_PLACE  without oracle     2', text)
-        self.assertTrue((self.output / 'time_series.png').is_file() and (self.output / 'time_series.svg').is_file())
         self.assertEqual(processes_of(self.output), [])
+        return text
+
+    def some_trials(self, count: int) -> None:
+        self.assertTrue(wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 90.0), 'no trials')
+
+    def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_happened(self) -> None:
+        whole = Path(str(self.output) + ' of another run')
+        text = self.finish(start(whole, 8))
+        self.assertIn('PICK_AND_PLACE  without oracle     8', text)
+        self.assertTrue((whole / 'time_series.png').is_file() and (whole / 'time_series.svg').is_file())
+        killed = start(self.output, 8)
+        self.some_trials(2)
+        killed.kill()
+        killed.communicate()
+        self.assertIn('Going on in', self.finish(start(self.output, 8)))
+        trials = load_trials([str(self.output)]).trials
+        self.assertEqual(sorted(trial.cause.seed for trial in trials), sorted(2 * list(range(1, 9))))
+        self.assertTrue(all(trial.truth is not None for trial in trials))
+        with redirect_stdout(io.StringIO()) as told:
+            self.assertEqual(course.main([str(self.output), str(whole)]), course.SAME, told.getvalue())
+        self.assertIn('16 trials in both', told.getvalue())
+        refused = start(self.output, 9)
+        self.assertIn('trials: there 8, now 9', refused.communicate(timeout=60)[0])
+        self.assertEqual(refused.returncode, 1)
 
     def test_ctrl_c_pressed_twice_stops_everything_even_a_frozen_node_and_keeps_the_bags(self) -> None:
         process = start(self.output, 10000)
-        bags = self.output / 'with_oracle'
         try:
-            self.assertTrue(wait_for(lambda: len(list(bags.glob('*.bag'))) > 2, 60.0), 'no trials')
+            self.some_trials(2)
             frozen = next(pid for pid in processes_of(self.output)
                           if b'stub_world' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
             os.kill(frozen, signal.SIGSTOP)
             for _ in range(2):
                 process.send_signal(signal.SIGINT)
                 time.sleep(1.0)
-            text = process.communicate(timeout=60)[0]
+            text = process.communicate(timeout=90)[0]
         finally:
             process.kill()
         self.assertEqual(process.returncode, 130, text)
         self.assertIn('what was recorded stays', text)
         self.assertEqual(processes_of(self.output), [])
-        self.assertEqual(list(bags.glob('*.active')), [])
-        self.assertEqual(load_trials([str(bags)]).skipped, [])
+        self.assertEqual(list(self.bags.glob('*.active')), [])
+        self.assertEqual(load_trials([str(self.bags)]).skipped, [])
+
+    def test_a_trial_that_hangs_is_run_anew(self) -> None:
+        process = start(self.output, 40, '--arms', 'with', '--hung-after', '15')
+        self.some_trials(2)
+        frozen = next(pid for pid in processes_of(self.output)
+                      if b'pick_and_place.py' in Path('/proc/{}/cmdline'.format(pid)).read_bytes()
+                      and b'oracle_run' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
+        os.kill(frozen, signal.SIGSTOP)
+        text = self.finish(process)
+        self.assertIn('no trial has ended for 15 s', text)
+        self.assertNotIn('LOST', text)
+        self.assertEqual(len(load_trials([str(self.output)]).trials), 40)
 
 
 if __name__ == '__main__':

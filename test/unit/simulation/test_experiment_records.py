@@ -21,7 +21,7 @@ class RecordedJob:
         self.number = 0
 
     def settle(self):
-        return JobRecords(self.folder, FIRST_SEED, self._trials).settle(keeps_rates=True)
+        return JobRecords(self.folder, FIRST_SEED, self._trials).settle()
 
     def record(self, *outcomes: str, start: int = 0, truth: bool = True, end: bool = True) -> None:
         """One trial for each outcome, from trial `start` on; `end`: whether they come to their ends."""

@@ -56,7 +56,7 @@ class Job:
         return min(self.trials, len(self.summaries) + len(self._lost))
 
     def _settle(self) -> None:
-        progress = self._records.settle(self.arm.recovers)
+        progress = self._records.settle()
         self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
         self._next, self._lost = progress.next_trial, progress.lost
         if progress.dropped:
@@ -69,9 +69,7 @@ class Job:
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
-        settings = dict(self.arm.settings)
-        if self.arm.recovers:
-            settings['rates_file'] = str(self._records.rates)
+        settings = dict(self.arm.settings, rates_file=str(self._records.rates))
         return {'trials': self.trials - self._next, 'seed': self._seed + self._next, 'record': self._records.folder,
                 'truth': self._records.truth, 'with_oracle': str(self.arm.recovers).lower(),
                 'answer_delay': self._plan.answer_delay, 'oracle': json.dumps(settings)}

@@ -11,6 +11,7 @@ from typing import Any, IO, List, Mapping, Optional
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
 NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
 STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
+KILL_S = 10.0  # for the kernel to take away what was killed
 _PR_SET_PDEATHSIG = 1
 
 
@@ -52,7 +53,7 @@ class Launch:
 
 
 def end_with_parent() -> None:
-    """In a child before it becomes another program: be told to stop, as by Ctrl-C, when the parent is killed (Linux)."""
+    """In a child before it becomes another program: be told to stop when the parent is killed (Linux)."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
 
 
@@ -87,18 +88,18 @@ def end_marked(mark: str, grace_s: float = 0.0) -> int:
     :returns: how many there were.
     """
     found = marked(mark)
-    for number, until in ((signal.SIGINT, time.monotonic() + grace_s), (signal.SIGKILL, time.monotonic() + grace_s + 10)):
-        if number == signal.SIGINT and not grace_s:
-            continue
-        for pid in marked(mark):
-            _send(pid, number)
-        while marked(mark) and time.monotonic() < until:
-            time.sleep(0.05)
+    if found and grace_s:
+        _send_all(mark, signal.SIGINT, grace_s)
+    _send_all(mark, signal.SIGKILL, KILL_S)
     return len(found)
 
 
-def _send(pid: int, number: int) -> None:
-    try:
-        os.kill(pid, number)
-    except ProcessLookupError:
-        pass  # it has ended meanwhile
+def _send_all(mark: str, number: int, wait_s: float) -> None:
+    for pid in marked(mark):
+        try:
+            os.kill(pid, number)
+        except ProcessLookupError:
+            pass  # it has ended meanwhile
+    until = time.monotonic() + wait_s
+    while marked(mark) and time.monotonic() < until:
+        time.sleep(0.05)

@@ -25,7 +25,7 @@ class Recorded(NamedTuple):
     """One trial as its bag tells it."""
 
     summary: TrialSummary
-    learned: Optional[Mapping[str, Any]]  # at its end; None where no rates are kept
+    learned: Optional[Mapping[str, Any]]  # at its end; None where it does not tell
 
 
 class Progress(NamedTuple):
@@ -50,7 +50,7 @@ class JobRecords:
         self._reader = EventReader()
         folder.mkdir(parents=True, exist_ok=True)
 
-    def settle(self, keeps_rates: bool) -> Progress:
+    def settle(self) -> Progress:
         """Look through the folder while nothing runs: put aside what is not complete, and prepare to go on.
 
         Afterwards there are the bags and the truth of complete trials, and the rates as the last one left them.
@@ -67,7 +67,7 @@ class JobRecords:
             seed = self._first_seed + numbers[len(done)]
             if recorded is None or not self._is_complete(recorded, seed, truths):
                 break
-            if keeps_rates and recorded.learned is None:
+            if recorded.learned is None:
                 raise ExperimentError('{}: it does not tell what was learned'.format(paths[len(done)]))
             done.append(recorded)
         dropped = paths[len(done):]
