@@ -95,6 +95,9 @@ def _summarise(outcomes: List[Outcome], bench: Bench, seconds: float) -> int:
     print('--- {:.0f} s; results and logs in {}'.format(seconds, bench.results))
     if bad:
         print('failed: {}'.format(', '.join(bad)))
+    again = [outcome.name for outcome in outcomes if outcome.note]
+    if again:
+        print('passed at the second attempt: {}'.format(', '.join(again)))
     skipped = sum(outcome.skipped for outcome in outcomes)
     if skipped:
         print('{} skipped'.format(skipped))

@@ -97,6 +97,18 @@ def rostest_checks(root: Path) -> Dict[str, Check]:
 
 
 def _rostest(path: Path, bench: Bench) -> Outcome:
+    """One visible retry, as rostest's own attribute `retry` gives it: a machine busy with other tests is no failure."""
+    first = _run_rostest(path, bench)
+    if first.ok or bench.runner.stopped:
+        return first
+    second = _run_rostest(path, bench)
+    second.seconds += first.seconds
+    if second.ok:
+        second.note = 'passed at the second attempt; the first:\n' + first.detail
+    return second
+
+
+def _run_rostest(path: Path, bench: Bench) -> Outcome:
     command = ['rostest', '--package', PACKAGE, '--pkgdir', str(bench.root), str(path)]
     folder = bench.results / 'rostest' / path.stem
     # rostest hands the place of the results on unquoted: it must not have a space in it

@@ -15,6 +15,7 @@ class Outcome:
     skipped: int = 0
     seconds: float = 0.0
     detail: str = ''
+    note: str = ''  # what is to be seen of a check that passed
     log: str = ''
     junit: List[Path] = field(default_factory=list)
 
@@ -71,6 +72,8 @@ def show(outcome: Outcome) -> None:
         detail = outcome.detail.rstrip() or 'ran, but reported no case'
         detail += '\nlog: ' + outcome.log if outcome.log else ''
         print('\n'.join('     | ' + line for line in detail.splitlines()))
+    if outcome.note:
+        print('\n'.join('     . ' + line for line in outcome.note.rstrip().splitlines()))
 
 
 def write_junit(outcomes: Iterable[Outcome], path: Path) -> None:

@@ -9,6 +9,7 @@ from house import ROOT
 
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
+import checks  # noqa: E402
 from checks import Bench, benchmark_checks, rostest_checks  # noqa: E402
 from processes import Runner, kill_marked  # noqa: E402
 from report import Outcome, read_junit, show, write_junit  # noqa: E402
@@ -97,6 +98,30 @@ def test_a_mark_that_nobody_carries_kills_nobody():
 
 def test_every_rostest_is_run():
     assert len(rostest_checks(ROOT)) == len(list((ROOT / 'test/rostest').glob('*.test'))) > 0
+
+
+@pytest.mark.parametrize('results, ok, told', [
+    ([True], True, False), ([False, True], True, True), ([False, False], False, False)])
+def test_a_rostest_has_a_second_attempt_that_everybody_sees(bench, monkeypatch, capsys, results, ok, told):
+    left = list(results)
+
+    def run(path, bench):
+        passed = left.pop(0)
+        return Outcome(path.stem, passed=int(passed), failed=int(not passed), detail='' if passed else '1 is not 2')
+    monkeypatch.setattr(checks, '_run_rostest', run)
+    (bench.root / 'test/rostest').mkdir(parents=True)
+    (bench.root / 'test/rostest/one.test').touch()
+    outcome = rostest_checks(bench.root)['rostest/one'](bench)
+    show(outcome)
+    out = capsys.readouterr().out
+    assert outcome.ok is ok and not left
+    assert ('passed at the second attempt' in out) is told and ('1 is not 2' in out) is (False in results)
+
+
+def test_an_interrupt_is_no_reason_for_a_second_attempt(bench, monkeypatch):
+    monkeypatch.setattr(checks, '_run_rostest', lambda path, bench: Outcome(path.stem, failed=1, detail='interrupted'))
+    bench.runner.stop()
+    assert checks._rostest(bench.root / 'one.test', bench).failed == 1
 
 
 def test_benchmarks_without_limits_are_not_run(tmp_path):
