@@ -1,0 +1,182 @@
+"""One arm for the time of one skill: where it is, what it can reach, ways for it, and the motions themselves."""
+import zlib
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional
+
+import numpy as np
+
+from ...geometry.transforms import apply, from_rpy
+from .collision import CollisionWorld, RobotModel
+from .interface import ARM_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
+from .kitchen import MapBox
+from .planner import BUDGET, PlanningError, plan, straight, timed
+
+FAST, SLOW = 0.45, 0.2  # of the joints' velocity limits
+FEEL_EFFORT = 40.0  # N with which the gripper closes
+LEAST_GAP = 0.012  # m between the tips, below which there is nothing in the hand
+READY = {'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
+         'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])}  # rad, a posture for work in front of the robot
+ENOUGH = 3  # solutions of the inverse kinematics that are tried for one pose
+
+
+class SkillError(Exception):
+    """The robot could not do what it was asked to; the text is the reason, for people."""
+
+
+class Means(NamedTuple):
+    """What skills work with."""
+
+    robot: Robot
+    model: RobotModel
+
+
+def seed_of(*parts: Any) -> int:
+    """A seed made of what is asked and how things stand (arrays, numbers, text, dictionaries), never of the time."""
+    state = 0
+    for part in parts:
+        if isinstance(part, Mapping):
+            part = sorted(part.items())
+        data = part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode()
+        state = zlib.crc32(data, state)
+    return max(1, state & 0x7FFFFFFF)
+
+
+class Arm:
+    """An arm at work among boxes. Use it in a `with`; it then drops its collision world."""
+
+    def __init__(self, means: Means, arm: str, boxes: Mapping[str, MapBox], seed: int) -> None:
+        """
+        :param arm: 'left' or 'right'.
+        :param boxes: obstacles by name, in base_footprint.
+        :raises SkillError: for an unknown arm, or where the robot does not tell its joints.
+        """
+        self.name = arm
+        self._robot = means.robot
+        joints = read_joints(self._robot)
+        try:
+            self.space = CollisionWorld(means.model, arm, joints)
+        except ValueError as err:
+            raise SkillError(str(err)) from err
+        for name in sorted(boxes):
+            self.space.add_box(name, boxes[name])
+        self.chain = self.space.chain
+        self.generator = np.random.default_rng(seed)
+
+    def __enter__(self) -> 'Arm':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.space.close()
+
+    def now(self) -> np.ndarray:
+        """Joint positions (7,), by the encoders."""
+        return arm_positions(read_joints(self._robot), self.name)
+
+    def pose(self) -> np.ndarray:
+        """4x4, base_footprint from tool, by the encoders."""
+        return self.chain.forward(self.now())
+
+    def reach(self, pose: np.ndarray, near: Optional[np.ndarray] = None, restarts: int = 12) -> List[np.ndarray]:
+        """Joint positions free of collision that take the tool to `pose`, nearest to `near` first; [] for none.
+
+        :raises Unreachable: where no joint positions at all take it there.
+        """
+        seed = READY[self.name] if near is None else near
+        found = self.chain.solutions(pose, seed, self.generator, restarts=restarts)
+        if not len(found):
+            raise Unreachable('out of reach')
+        distinct: List[np.ndarray] = []
+        for q in found:
+            if all(np.abs(q - other).max() > 0.2 for other in distinct):
+                distinct.append(q)
+        return [q for q in distinct[:2 * ENOUGH] if self.space.is_free(q)][:ENOUGH]
+
+    def way(self, goal: np.ndarray, start: Optional[np.ndarray] = None, budget: int = BUDGET) -> np.ndarray:
+        """A way (m, 7) around the obstacles. Raises PlanningError."""
+        return plan(self.space, self.now() if start is None else start, goal, int(self.generator.integers(1, 2 ** 31)),
+                    budget)
+
+    def line(self, start: np.ndarray, goal: np.ndarray) -> Optional[np.ndarray]:
+        """A straight way (m, 7) of the tool from joint positions to a pose; None where there is none."""
+        return straight(self.space, start, goal)
+
+    def follow(self, way: np.ndarray, speed: float = FAST) -> None:
+        """Move along a way. Raises SkillError where the arm does not get there."""
+        positions, times = timed(self.chain, way, speed)
+        try:
+            self._robot.follow(ARM_JOINTS[self.name], positions, times)
+        except RobotError as err:
+            raise SkillError('the {} arm did not follow its way: {}'.format(self.name, err)) from err
+
+    def go(self, goal: np.ndarray, speed: float = FAST) -> None:
+        """Plan and move to joint positions. Raises SkillError."""
+        try:
+            way = self.way(goal)
+        except PlanningError as err:
+            raise SkillError(str(err)) from err
+        self.follow(way, speed)
+
+    def open(self, gap: float = GRIPPER_OPEN) -> None:
+        """Open the gripper. Raises SkillError where it does not open as far."""
+        state = self._gripper(gap)
+        if state.position < gap - 0.015:
+            raise SkillError('the {} gripper opened only {:.1f} of {:.1f} cm'.format(
+                self.name, 100 * state.position, 100 * gap))
+        self._set_fingers()
+
+    def close(self, effort: float = FEEL_EFFORT) -> float:
+        """Close the gripper; the gap (m) that something keeps open, 0 where there is nothing."""
+        state = self._gripper(0.0, effort)
+        self._set_fingers()
+        return state.position if state.stalled and state.position > LEAST_GAP else 0.0
+
+    def _gripper(self, gap: float, effort: float = 50.0) -> GripperState:
+        try:
+            return self._robot.gripper(self.name, gap, effort)
+        except RobotError as err:
+            raise SkillError('the {} gripper: {}'.format(self.name, err)) from err
+
+    def _set_fingers(self) -> None:
+        """The collision world's fingers go where the encoders say."""
+        joints = read_joints(self._robot)
+        self.space.place_rest({name: value for name, value in joints.items() if '_finger_joint' in name})
+
+
+class Unreachable(Exception):
+    """No joint positions take the tool to a pose."""
+
+
+def read_joints(robot: Robot) -> Dict[str, float]:
+    """Encoder readings. Raises SkillError where there are none."""
+    try:
+        return dict(robot.joints())
+    except RobotError as err:
+        raise SkillError('the joints cannot be read: {}'.format(err)) from err
+
+
+def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
+    """(7,) of an arm out of encoder readings. Raises SkillError where one is missing."""
+    missing = [name for name in ARM_JOINTS[arm] if name not in joints]
+    if missing:
+        raise SkillError('no encoder reading of {}'.format(', '.join(missing)))
+    return np.array([joints[name] for name in ARM_JOINTS[arm]])
+
+
+def lifted(pose: np.ndarray, height: float) -> np.ndarray:
+    """A pose moved upwards by `height` m."""
+    return from_rpy((0.0, 0.0, height)) @ pose
+
+
+def backed_off(pose: np.ndarray, distance: float) -> np.ndarray:
+    """A pose of the tool, moved back along its own x axis by `distance` m."""
+    moved = pose.copy()
+    moved[:3, 3] = apply(pose, np.array([-distance, 0.0, 0.0]))
+    return moved
+
+
+def summary(reasons: Iterable[str]) -> str:
+    """How often each reason came up, the most frequent first: '5 times out of reach, 2 times ...'."""
+    counted: Dict[str, int] = {}
+    for reason in reasons:
+        counted[reason] = counted.get(reason, 0) + 1
+    return ', '.join('{} times {}'.format(number, reason)
+                     for reason, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])))

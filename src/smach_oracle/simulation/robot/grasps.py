@@ -1,0 +1,59 @@
+"""From where a hand may take an upright thing: headings all round, and the hand level, inclined or from above."""
+from typing import Iterator, List, NamedTuple
+
+import numpy as np
+
+from ...geometry.box import UprightBox
+from ...geometry.transforms import from_rpy
+
+WIDEST = 0.085  # m between the tips that a thing may take up
+SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}  # x, y in base_footprint, m
+HEADINGS = np.linspace(-1.3, 1.3, 14)  # rad, beside the straight one from the shoulder
+PITCHES = (0.0, 0.4, 0.8, np.pi / 2)  # rad, of the hand downwards
+DEPTH = 0.012  # m that the tips go beyond the middle
+LOWEST = 0.035  # m of the tips above what the thing stands on, hand level
+BELOW_TOP = 0.02  # m, hand level
+
+
+class Grasp(NamedTuple):
+    """One way to take it."""
+
+    pose: np.ndarray  # 4x4, base_footprint from tool, when the gripper closes
+    heading: float  # rad, of the hand
+    pitch: float  # rad, downwards
+    width: float  # m between the tips that the thing takes up
+
+
+def grasps(box: UprightBox, arm: str) -> List[Grasp]:
+    """Ways to take a thing, the most natural first; [] where it is too wide from everywhere."""
+    straight = float(np.arctan2(*(box.centre[:2] - SHOULDER[arm])[::-1]))
+    found = [(cost, order, grasp) for order, (cost, grasp) in enumerate(_all(box, straight))]
+    return [grasp for _, _, grasp in sorted(found, key=lambda item: item[:2])]
+
+
+def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
+    for pitch in PITCHES:
+        for turn in HEADINGS:
+            heading = straight + turn
+            width = width_across(box, heading)
+            if width <= WIDEST:
+                pose = from_rpy(_middle(box, heading, pitch), pitch=pitch, yaw=heading)
+                yield abs(turn) + 0.8 * pitch + 8.0 * width, Grasp(pose, float(heading), float(pitch), width)
+
+
+def width_across(box: UprightBox, heading: float) -> float:
+    """How much (m) of the gap between the tips a thing takes up, for a hand that comes along `heading`."""
+    if box.wide - box.narrow < 0.012:  # as good as round, or square: its corners turn in between the tips
+        return box.wide
+    angle = heading - box.yaw
+    return float(box.size[0] * abs(np.sin(angle)) + box.size[1] * abs(np.cos(angle)))
+
+
+def _middle(box: UprightBox, heading: float, pitch: float) -> np.ndarray:
+    """Where the tool frame goes: somewhat beyond the middle, at a height where the fingers hold well."""
+    bottom, top = box.centre[2] - box.size[2] / 2, box.centre[2] + box.size[2] / 2
+    if pitch > 1.2:
+        return np.array([box.centre[0], box.centre[1], max(bottom + 0.02, top - 0.035)])
+    height = min(max(box.centre[2], bottom + LOWEST + 0.03 * np.sin(pitch)), top - BELOW_TOP)
+    ahead = min(DEPTH, box.narrow / 3)
+    return np.array([box.centre[0] + ahead * np.cos(heading), box.centre[1] + ahead * np.sin(heading), height])

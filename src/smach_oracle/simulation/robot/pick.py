@@ -1,0 +1,113 @@
+"""Pick an object: choose a grasp, go there, close, feel, lift, feel again."""
+from typing import List, Mapping, NamedTuple, Optional
+
+import numpy as np
+
+from ...geometry.box import UprightBox
+from ...geometry.transforms import inverse
+from .arm import FAST, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
+from .grasps import Grasp, grasps
+from .interface import GRIPPER_OPEN
+from .kitchen import MapBox
+from .planner import PlanningError
+
+APPROACH = 0.10  # m, straight, towards the object
+LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
+MISSES = 2  # grasps that may close on nothing before the robot says so
+TARGET = 'the object'
+
+
+class Held(NamedTuple):
+    """What a hand holds."""
+
+    grasp: np.ndarray  # 4x4, base_footprint from tool, when the gripper closed
+    tool_from_object: np.ndarray  # 4x4, of its centre, upright as it stood
+    half: np.ndarray  # (3,) m, half extents along its axes
+
+
+class _Way(NamedTuple):
+    """How to get at a grasp."""
+
+    grasp: Grasp
+    there: np.ndarray  # (m, 7) to the place in front of the object
+    approach: np.ndarray  # (k, 7) from there
+
+
+def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox]) -> Held:
+    """Grasp an object and lift it.
+
+    :param arm: 'left' or 'right'.
+    :param target: the object.
+    :param boxes: obstacles without the object, in base_footprint.
+    :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
+    """
+    ways = grasps(target, arm) if arm in ('left', 'right') else []
+    obstacles = dict(boxes)
+    obstacles[TARGET] = MapBox(target.centre, target.size / 2, target.yaw)
+    with Arm(means, arm, obstacles, seed_of(arm, target.centre, target.size, means.robot.joints())) as hand:
+        if not ways:
+            raise SkillError('the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
+                100 * target.size[0], 100 * target.size[1]))
+        hand.open()
+        return _pick(hand, target, ways)
+
+
+def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp]) -> Held:
+    reasons: List[str] = []
+    missed = 0
+    for grasp in candidates:
+        way = _way_to(hand, grasp, reasons)
+        if way is None:
+            continue
+        hand.follow(way.there, FAST)
+        hand.follow(way.approach, SLOW)
+        if hand.close() > 0:
+            return _lift(hand, target)
+        missed += 1
+        hand.open()
+        hand.follow(way.approach[::-1], SLOW)
+        if missed == MISSES:
+            raise SkillError('the gripper closed on nothing, {} times'.format(MISSES))
+    if missed:
+        raise SkillError('the gripper closed on nothing, and there is no other grasp')
+    raise SkillError('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
+
+
+def _way_to(hand: Arm, grasp: Grasp, reasons: List[str]) -> Optional[_Way]:
+    """A way to a grasp; None, with a reason more, where there is none."""
+    try:
+        starts = hand.reach(backed_off(grasp.pose, APPROACH))
+    except Unreachable:
+        reasons.append('out of reach')
+        return None
+    if not starts:
+        reasons.append('in collision before the object')
+        return None
+    for start in starts:
+        with hand.space.touchable([TARGET]):
+            approach = hand.line(start, grasp.pose)
+        if approach is None:
+            reasons.append('no straight way to the object')
+            continue
+        try:
+            return _Way(grasp, hand.way(start), approach)
+        except PlanningError as err:
+            reasons.append(str(err))
+    return None
+
+
+def _lift(hand: Arm, target: UprightBox) -> Held:
+    """Lift what the gripper has closed on, and feel whether it came along."""
+    grasp = hand.pose()
+    held = Held(grasp, inverse(grasp) @ target.matrix, target.size / 2)
+    hand.space.remove(TARGET)
+    with hand.space.touchable(hand.space.names()):
+        lines = (hand.line(hand.now(), lifted(grasp, height)) for height in LIFTS)
+        way = next((line for line in lines if line is not None), None)
+    if way is None:
+        hand.open(GRIPPER_OPEN)
+        raise SkillError('the arm cannot lift the object from where it grasped it')
+    hand.follow(way, SLOW)
+    if hand.close() == 0:
+        raise SkillError('the object slipped out of the gripper when it was lifted')
+    return held

@@ -1,0 +1,114 @@
+"""Put down what a hand holds: choose a heading, go above, lower, let go, back off, and see whether it stands there."""
+from typing import Iterator, List, Mapping, NamedTuple, Tuple
+
+import numpy as np
+
+from ...geometry.transforms import from_rpy, inverse, transform
+from .arm import FAST, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
+from .kitchen import MapBox
+from .pick import Held
+from .planner import PlanningError
+
+ABOVE = 0.10  # m over the place, from where the arm goes straight down
+DROP = 0.004  # m that the object falls when it is let go, more or less
+RETREAT = 0.12  # m straight back afterwards
+TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)  # rad, of the object about the vertical, against how it stood
+SHIFTS = ((0.0, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.0))  # m beside the place: near enough
+SLACK = 0.10  # m that the height asked for may differ from the one at which the object stands
+
+
+class _Way(NamedTuple):
+    """How to put it down."""
+
+    there: np.ndarray  # (m, 7), to above the place
+    down: np.ndarray  # (k, 7)
+    back: np.ndarray  # (j, 7), without the object
+
+
+def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping[str, MapBox],
+          support: str = 'table') -> np.ndarray:
+    """Put the held object down upright.
+
+    :param centre: (3,) m, where its centre shall be, in base_footprint.
+    :param boxes: obstacles, in base_footprint, without the held object.
+    :param support: name of the one among them on which it shall stand.
+    :returns: (3,) where its centre should be now.
+    :raises SkillError: where nothing is held, no way is found, or the object is lost.
+    """
+    with Arm(means, arm, boxes, seed_of(arm, centre, held.grasp, means.robot.joints())) as hand:
+        if support not in boxes:
+            raise SkillError('there is nothing to stand on: the collision map has no {}'.format(support))
+        if hand.close() == 0:
+            raise SkillError('the {} hand holds nothing'.format(arm))
+        centre = _on_support(centre, held, boxes[support])
+        hand.space.attach(held.half - 0.004, held.tool_from_object)
+        centre, way = _find_way(hand, centre, held, support)
+        hand.follow(way.there, FAST)
+        if hand.close() == 0:
+            raise SkillError('the object was lost on the way to its place')
+        hand.follow(way.down, SLOW)
+        hand.open()
+        hand.space.detach()
+        hand.follow(way.back, SLOW)
+        return centre
+
+
+def _on_support(centre: np.ndarray, held: Held, support: MapBox) -> np.ndarray:
+    """The place asked for, at the height at which the object stands."""
+    top = support.centre[2] + support.half[2]
+    inside = np.abs(transform(rotation=from_rpy((0, 0, 0), yaw=-support.yaw)[:3, :3])[:2, :2]
+                    @ (centre[:2] - support.centre[:2])) - support.half[:2]
+    height = top + held.half[2]
+    if max(inside) > 0 or abs(centre[2] - height) > SLACK:
+        raise SkillError('there is nothing to stand on at x {:.2f}, y {:.2f}, z {:.2f} m: the support is {:.2f} m high '
+                         'and the place is {:.0f} cm {} its edge'.format(
+                             *centre, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'))
+    return np.array([centre[0], centre[1], height + DROP])
+
+
+def _poses(centre: np.ndarray, held: Held) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """Places near enough, with poses of the tool that bring the object there, the natural ones first."""
+    stood = held.grasp @ held.tool_from_object
+    object_from_tool = inverse(held.tool_from_object)
+    for shift in SHIFTS:
+        there = centre + [shift[0], shift[1], 0.0]
+        for turn in sorted(TURNS, key=abs):
+            rotation = from_rpy((0, 0, 0), yaw=turn)[:3, :3] @ stood[:3, :3]
+            yield there, transform(there, rotation) @ object_from_tool
+
+
+def _find_way(hand: Arm, centre: np.ndarray, held: Held, support: str) -> Tuple[np.ndarray, _Way]:
+    reasons: List[str] = []
+    start = hand.now()
+    for there, pose in _poses(centre, held):
+        try:
+            above = hand.reach(lifted(pose, ABOVE), near=start)
+        except Unreachable:
+            reasons.append('out of reach')
+            continue
+        if not above:
+            reasons.append('in collision above the place')
+        for q in above:
+            with hand.space.touchable([support]):
+                down = hand.line(q, pose)
+            if down is None:
+                reasons.append('no straight way down')
+                continue
+            back = _way_back(hand, down[-1], pose, held)
+            if back is None:
+                reasons.append('no way back')
+                continue
+            try:
+                return there, _Way(hand.way(q, start), down, back)
+            except PlanningError as err:
+                reasons.append(str(err))
+    raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
+        centre[0], centre[1], summary(reasons)))
+
+
+def _way_back(hand: Arm, start: np.ndarray, pose: np.ndarray, held: Held):
+    hand.space.detach()
+    try:
+        return hand.line(start, backed_off(pose, RETREAT))
+    finally:
+        hand.space.attach(held.half - 0.004, held.tool_from_object)
