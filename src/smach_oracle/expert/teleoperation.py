@@ -67,6 +67,11 @@ class Step(NamedTuple):
     clearance: float  # m, inf where nothing is near
 
 
+def standing() -> Step:
+    """The step of an arm that nobody moves."""
+    return Step(np.zeros(0), np.zeros(0), np.zeros(6), 1.0, '', float('inf'))
+
+
 class CartesianDrive:
     """Drives one arm's tool by velocities. Stateless: each step starts from the joints that it is given."""
 

@@ -1,0 +1,137 @@
+"""A robot's arm on ROS: joint states in, joint targets out, a gripper action."""
+import threading
+import time
+from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
+
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import GripperCommandAction, GripperCommandGoal
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ..oracle.errors import ConfigError
+from ..ros.goal_link import GoalLink, SentGoal
+
+_FIELDS = ('base', 'tool', 'command', 'gripper')
+
+
+class ArmNames(NamedTuple):
+    """What an arm's parts are called on the robot."""
+
+    base: str  # link from which the arm's joints begin
+    tool: str  # link that commands move
+    command: str  # topic for trajectory_msgs/JointTrajectory
+    gripper: str  # control_msgs/GripperCommand action
+
+    @classmethod
+    def parse(cls, key: str, value: object) -> 'ArmNames':
+        """From a dictionary.
+
+        :raises ConfigError: naming the key, its value and what is allowed.
+        """
+        if not isinstance(value, Mapping) or sorted(value) != sorted(_FIELDS):
+            raise ConfigError(key, value, 'a mapping with the keys ' + ', '.join(_FIELDS))
+        for field in _FIELDS:
+            if not isinstance(value[field], str) or not value[field]:
+                raise ConfigError('{}.{}'.format(key, field), value[field], 'a name')
+        return cls(**value)
+
+
+class JointListener:
+    """The latest joint positions, from every publisher of joint_states together."""
+
+    def __init__(self, topic: str = 'joint_states') -> None:
+        self._changed = threading.Condition()
+        self._positions: Dict[str, float] = {}
+        self._stamp = rospy.Time()
+        self._subscriber = rospy.Subscriber(topic, JointState, self._heard, queue_size=100, tcp_nodelay=True)
+
+    def now(self) -> Tuple[Dict[str, float], rospy.Time]:
+        """Positions by joint (rad or m), and their time."""
+        with self._changed:
+            return dict(self._positions), self._stamp
+
+    def wait_for_motion(self, before: Mapping[str, float], since: rospy.Time, limit_s: float) -> bool:
+        """Wait until joints are reported later than `since` and elsewhere than `before`; whether they were.
+
+        A world that stands still while nobody commands it repeats its positions to the last bit; a later report of
+        others comes from after the command.
+        """
+        def moved() -> bool:
+            return self._stamp > since and any(self._positions.get(name) != value for name, value in before.items())
+        with self._changed:
+            return self._changed.wait_for(moved, limit_s)
+
+    def _heard(self, message: JointState) -> None:
+        with self._changed:
+            self._positions.update(zip(message.name, message.position))
+            self._stamp = message.header.stamp
+            self._changed.notify_all()
+
+
+class GripperReport(NamedTuple):
+    """How the last motion of a gripper ended."""
+
+    position: float = float('nan')  # m between the finger tips
+    stalled: bool = False
+    problem: str = ''
+
+
+class GripperPort:
+    """A gripper behind a GripperCommand action."""
+
+    def __init__(self, action: str) -> None:
+        self._link = GoalLink(rospy.resolve_name(action), GripperCommandAction)
+        self._sent: Optional[SentGoal] = None
+        self.report = GripperReport()
+
+    def why_not(self) -> str:
+        """Why it cannot be moved now, or ''."""
+        return '' if self._link.ready() else 'no gripper at {}'.format(self._link.name)
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motion has begun whose end is not known."""
+        return self._sent is not None
+
+    def move(self, position: float, effort: float) -> None:
+        """Begin to move to `position` m between the tips, with at most `effort` N."""
+        goal = GripperCommandGoal()
+        goal.command.position, goal.command.max_effort = position, effort
+        self._sent = self._link.send(goal, time.monotonic())
+
+    def poll(self, timeout_s: float) -> bool:
+        """Take notice of a motion's end; whether it has just ended."""
+        if self._sent is None:
+            return False
+        event = self._sent.poll(timeout_s)
+        gone = event is None and (not self._link.alive() or self._sent.unheard(time.monotonic()))
+        if not gone and (event is None or not event.status):
+            return False
+        self._sent = None
+        if gone or event.result is None or event.status in (GoalStatus.LOST, GoalStatus.REJECTED):
+            self.report = GripperReport(problem='gripper {}: its motion got lost'.format(self._link.name))
+        else:
+            self.report = GripperReport(event.result.position, event.result.stalled)
+        return True
+
+
+class ArmPort:
+    """Joint targets for one arm."""
+
+    def __init__(self, topic: str, joints: List[str]) -> None:
+        self._joints = joints
+        self._publisher = rospy.Publisher(topic, JointTrajectory, queue_size=1, tcp_nodelay=True)
+
+    def why_not(self) -> str:
+        """Why it cannot be moved now, or ''."""
+        if self._publisher.get_num_connections():
+            return ''
+        return 'no controller listens to {}'.format(self._publisher.resolved_name)
+
+    def send(self, positions: np.ndarray, velocities: np.ndarray, period_s: float) -> None:
+        """Be at `positions` (rad) `period_s` from now."""
+        point = JointTrajectoryPoint(positions=positions.tolist(), velocities=velocities.tolist(),
+                                     time_from_start=rospy.Duration(period_s))
+        self._publisher.publish(JointTrajectory(joint_names=self._joints, points=[point]))

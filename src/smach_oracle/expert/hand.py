@@ -1,0 +1,129 @@
+"""One arm that a person drives: commands in, one control period of motion out, and what is known of its tool."""
+from typing import Dict, Mapping, NamedTuple, Optional, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
+from std_msgs.msg import Header
+
+from smach_oracle.msg import TeleopCommand
+
+from ..geometry.chain import Chain, read_joints
+from ..geometry.links import link_pose
+from ..geometry.transforms import quaternion
+from .arm_port import ArmNames, ArmPort, GripperPort, JointListener
+from .teleoperation import CartesianDrive, DriveLimits, Near, Step, pulled_back
+
+
+class Robot(NamedTuple):
+    """What all arms share."""
+
+    urdf: str
+    base: str  # frame of poses, and of commands that are not in another one
+    listener: JointListener
+
+
+class Hand:
+    """One arm. Only one thread may move it."""
+
+    def __init__(self, robot: Robot, names: ArmNames, limits: DriveLimits, lead: float) -> None:
+        """`lead`: rad by which the targets may be ahead of the measured joints.
+
+        :raises ValueError: where the arm's links are not in the robot description.
+        """
+        self._robot = robot
+        self._names = names
+        self._tree = read_joints(robot.urdf)
+        self.chain = Chain.from_urdf(robot.urdf, names.base, names.tool)
+        self._limits = limits
+        self._drive = CartesianDrive(self.chain, limits)
+        self._port = ArmPort(names.command, self.chain.names)
+        self.gripper = GripperPort(names.gripper)
+        self._lead = lead
+        self._targets: Optional[np.ndarray] = None
+        self.grasp: Optional[PoseStamped] = None  # of the tool, when the gripper last closed on something
+        link_pose(self._tree, robot.base, names.tool, {})
+
+    def watch(self, near: Near) -> None:
+        """Slow down near what `near` tells."""
+        self._drive = CartesianDrive(self.chain, self._limits, near)
+
+    def forget(self) -> None:
+        """A new goal begins: what was grasped for another one does not count."""
+        self.grasp = None
+
+    def begin(self) -> None:
+        """A person takes hold: targets start from where the arm is measured to be."""
+        self._targets = None
+
+    def why_not(self, command: TeleopCommand) -> str:
+        """Why the command cannot be carried out, or ''."""
+        twist = _array(command.twist)
+        if not np.isfinite(twist).all():
+            return 'twist {} is not finite'.format(twist.tolist())
+        if command.move_gripper and not (0.0 <= command.gripper < np.inf and 0.0 <= command.gripper_effort < np.inf):
+            return 'gripper {} m with {} N: both must be finite and 0 or more'.format(
+                command.gripper, command.gripper_effort)
+        positions, _ = self._robot.listener.now()
+        missing = [name for name in self.chain.names if name not in positions]
+        if missing:
+            return 'no joint_states of {} yet'.format(', '.join(missing))
+        try:
+            self._axes(command.header.frame_id, positions)
+        except ValueError as err:
+            return 'frame {!r}: {}; allowed: {}, {} or another link of the robot'.format(
+                command.header.frame_id, err, self._names.tool, self._robot.base)
+        return self._port.why_not() or (self.gripper.why_not() if command.move_gripper else '')
+
+    def move(self, command: TeleopCommand, period_s: float) -> Step:
+        """Send the joints where the tool is one period later, if it moves as commanded."""
+        positions, _ = self._robot.listener.now()
+        measured = self.measured(positions)
+        targets = measured if self._targets is None else pulled_back(self._targets, measured, self._lead)
+        twist = _array(command.twist)
+        axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id, positions)
+        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]), period_s)
+        if step.velocities.any():
+            self._port.send(step.joints, step.velocities, period_s)
+        self._targets = step.joints
+        return step
+
+    def positions(self) -> Tuple[Dict[str, float], rospy.Time]:
+        """The arm's joint positions (rad), and their time."""
+        positions, stamp = self._robot.listener.now()
+        return {name: positions[name] for name in self.chain.names}, stamp
+
+    def wait_for_motion(self, before: Mapping[str, float], since: rospy.Time, limit_s: float) -> bool:
+        """Wait for joint states later than `since` that differ from `before`; whether they came."""
+        return self._robot.listener.wait_for_motion(before, since, limit_s)
+
+    def measured(self, positions: Mapping[str, float]) -> np.ndarray:
+        """(n,) rad, of this arm's joints."""
+        return np.array([positions[name] for name in self.chain.names])
+
+    def tool_pose(self) -> PoseStamped:
+        """Where the tool is now, in the robot's base frame."""
+        positions, stamp = self._robot.listener.now()
+        pose = link_pose(self._tree, self._robot.base, self._names.tool, positions)
+        return PoseStamped(Header(frame_id=self._robot.base, stamp=stamp),
+                           Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
+
+    def in_base(self, twist: np.ndarray) -> Twist:
+        """A twist along the axes of the arm's own base (6,), along those of the robot's."""
+        axes = self._axes(self._names.base, self._robot.listener.now()[0])
+        return Twist(Vector3(*(axes @ twist[:3])), Vector3(*(axes @ twist[3:])))
+
+    def note_gripper(self) -> None:
+        """The gripper's motion has ended: if it holds something, this is how it was grasped."""
+        if self.gripper.report.stalled:
+            self.grasp = self.tool_pose()
+
+    def _axes(self, frame: str, positions: Mapping[str, float]) -> np.ndarray:
+        """(3, 3): rotation of the robot's base frame from `frame`."""
+        return link_pose(self._tree, self._robot.base, frame, positions)[:3, :3]
+
+
+def _array(twist: Twist) -> np.ndarray:
+    return np.array([twist.linear.x, twist.linear.y, twist.linear.z,
+                     twist.angular.x, twist.angular.y, twist.angular.z])
+

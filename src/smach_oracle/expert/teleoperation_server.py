@@ -1,0 +1,219 @@
+"""The manipulation interface: a person drives the robot's hands, then says that the failed state's work is done.
+
+A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState), `~finish` and `~give_up`; for any
+robot with a robot_description, joint_states, arms that take joint trajectories and grippers of control_msgs.
+"""
+import queue
+import threading
+import time
+from typing import Any, Dict, Mapping, Optional
+
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Header
+
+from smach_oracle.msg import CollisionBoxes, SharedAutonomyGoal, TeleopCommand, TeleopState
+
+from ..oracle.errors import ConfigError
+from ..ros.command_line import parameters_only
+from ..ros.master_watch import start_master_watch
+from .dead_man import DeadMan
+from .hand import Hand
+from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
+from .surroundings import Surroundings
+from .teleoperation import Step, standing
+from .teleoperation_settings import GRASP_POSE, TeleoperationSettings
+
+_IDLE_S = 0.2  # how often the state is published while a goal is active and nothing moves
+_APPLIED_S = 2.0  # wall time that a world in lock-step has for one period
+_GRIPPER_S = 60.0  # the same, for a motion of the gripper
+
+
+class TeleoperationServer:
+    """Hosts the interface; one thread carries out the commands, one after the other.
+
+    :raises ConfigError: for a setting or a robot description that cannot be used.
+    """
+
+    def __init__(self, settings: TeleoperationSettings, hands: Dict[str, Hand],
+                 surroundings: Optional[Surroundings] = None) -> None:
+        """`hands` by the names of their arms."""
+        self._settings = settings
+        self._hands = hands
+        self._surroundings = surroundings
+        self._arm = next(iter(hands))  # the one moved last
+        # in lock-step nothing moves between commands; a slow sender must not change what its commands do
+        self._dead_man = DeadMan(float('inf') if settings.lock_step else settings.watchdog_s)
+        self._held: Optional[TeleopCommand] = None
+        self._commands: 'queue.Queue[TeleopCommand]' = queue.Queue()
+        self._told_s = 0.0
+        self._seq, self._refused, self._step = 0, '', standing()
+        self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True, tcp_nodelay=True)
+        self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
+        self._services = SettlingServices(self._goal, self.outputs)
+        self._boxes = rospy.Subscriber('collision_map', CollisionBoxes, self._on_boxes, queue_size=1)
+        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._commands.put, queue_size=10,
+                                            tcp_nodelay=True)
+        self._thread = threading.Thread(target=self._run, name='teleoperation', daemon=True)
+        self._thread.start()
+
+    def outputs(self, outcome: str) -> Mapping[str, Any]:
+        """What the interface can tell of the active state's outputs, as its settings for the state say."""
+        goal = self._goal.goal
+        known: Dict[str, Any] = {}
+        if goal is None or outcome not in self._settings.success:
+            return known
+        hand = self._hands[self._arm]
+        for key, what in self._settings.outputs_of(goal.state).items():
+            known[key] = hand.grasp if what == GRASP_POSE and hand.grasp is not None else hand.tool_pose()
+        return known
+
+    def _begun(self, goal: SharedAutonomyGoal) -> None:
+        self._seq, self._refused, self._step = 0, '', standing()
+        self._arm = self._settings.arm_of(goal.state, self._arm)
+        for hand in self._hands.values():
+            hand.forget()
+
+    def _ended(self) -> None:
+        self._dead_man.drop()
+
+    def _on_boxes(self, message: CollisionBoxes) -> None:
+        if self._surroundings is not None:
+            self._surroundings.replace(message)
+
+    def _run(self) -> None:
+        period_s = self._settings.period_s
+        due_s = time.monotonic()
+        while not rospy.is_shutdown():
+            moving = self._held is not None
+            command = self._next(max(0.0, due_s - time.monotonic()) if moving else _IDLE_S)
+            if command is not None:
+                self._take(command)
+            now_s = time.monotonic()
+            if self._held is not None and now_s >= due_s:
+                due_s = max(due_s + period_s, now_s)
+                self._move_on(now_s)
+            elif self._held is None:
+                due_s = now_s
+                self._idle(now_s)
+
+    def _next(self, timeout_s: float) -> Optional[TeleopCommand]:
+        try:
+            return self._commands.get(timeout=timeout_s) if timeout_s > 0 else self._commands.get_nowait()
+        except queue.Empty:
+            return None
+
+    def _take(self, command: TeleopCommand) -> None:
+        """Carry out a command, or say why not; a bad one of the person who drives stops the arm."""
+        self._seq, self._step = command.seq, standing()
+        self._refused = self._why_not(command)
+        hand = self._hands.get(command.arm)
+        if self._refused or hand is None:
+            self._let_go(command.operator)
+        elif not command.dead_man:
+            self._let_go(command.operator)
+        else:
+            self._hold(command, hand)
+            return
+        self._tell()
+
+    def _why_not(self, command: TeleopCommand) -> str:
+        if self._goal.goal is None:
+            return NO_GOAL
+        if command.arm not in self._hands:
+            return 'unknown arm {!r}; allowed: {}'.format(command.arm, ', '.join(sorted(self._hands)))
+        if not command.operator:
+            return 'a command needs the name of its operator'
+        if not command.dead_man:
+            return ''
+        why = self._hands[command.arm].why_not(command)
+        now_s = time.monotonic()
+        holder = self._dead_man.holder(now_s)
+        if not why and holder != command.operator:
+            self._hands[command.arm].begin()
+        return why or self._dead_man.press(command.operator, now_s)
+
+    def _let_go(self, operator: str) -> None:
+        self._dead_man.release(operator)
+        if self._held is not None and self._held.operator == operator:
+            self._held = None
+
+    def _hold(self, command: TeleopCommand, hand: Hand) -> None:
+        self._arm = command.arm
+        if command.move_gripper and not hand.gripper.moving:
+            hand.gripper.move(command.gripper, command.gripper_effort or self._settings.gripper_effort)
+        if self._settings.lock_step:
+            self._in_lock_step(command, hand)
+        else:
+            self._held = command
+
+    def _in_lock_step(self, command: TeleopCommand, hand: Hand) -> None:
+        """Carry the command out for one period, and tell when the world has done it."""
+        until_s = time.monotonic() + _GRIPPER_S
+        while hand.gripper.moving and time.monotonic() < until_s and not rospy.is_shutdown():
+            self._poll_gripper(hand, 0.02)
+        before, since = hand.positions()
+        self._step = self._moved(hand, command)
+        if self._step.velocities.any() and not hand.wait_for_motion(before, since, _APPLIED_S):
+            self._refused = 'the world has not carried it out within {:g} s'.format(_APPLIED_S)
+        self._tell()
+
+    def _move_on(self, now_s: float) -> None:
+        """One period of a command that is held."""
+        command = self._held
+        if command is None or self._dead_man.holder(now_s) != command.operator:
+            self._held, self._step = None, standing()
+        else:
+            hand = self._hands[command.arm]
+            self._step = self._moved(hand, command)
+            self._poll_gripper(hand, 0.0)
+        self._tell()
+
+    def _moved(self, hand: Hand, command: TeleopCommand) -> Step:
+        if self._surroundings is not None:
+            self._surroundings.update()
+        return hand.move(command, self._settings.period_s)
+
+    def _poll_gripper(self, hand: Hand, timeout_s: float) -> None:
+        if hand.gripper.poll(timeout_s):
+            hand.note_gripper()
+
+    def _idle(self, now_s: float) -> None:
+        for hand in self._hands.values():
+            if hand.gripper.moving:
+                self._poll_gripper(hand, 0.0)
+        self._goal.drop_if_asker_is_gone()
+        if self._goal.goal is not None and now_s - self._told_s >= _IDLE_S:
+            self._tell()
+
+    def _tell(self) -> None:
+        goal, hand, now_s = self._goal.goal, self._hands[self._arm], time.monotonic()
+        self._told_s = now_s
+        state = TeleopState(query_id=goal.query_id if goal is not None else '', arm=self._arm, seq=self._seq,
+                            operator=self._dead_man.holder(now_s), refused=self._refused,
+                            moving=bool(self._step.velocities.any()), speed=self._step.speed,
+                            limit=hand.gripper.report.problem or self._step.limit, clearance=self._step.clearance,
+                            gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled)
+        pose = hand.tool_pose()
+        state.header = Header(frame_id=pose.header.frame_id, stamp=pose.header.stamp)
+        state.tool_pose = pose.pose
+        state.achieved = hand.in_base(self._step.twist) if state.moving else Twist()
+        if not rospy.is_shutdown():
+            self._state.publish(state)
+
+
+def main() -> None:
+    """Entry point of the node `manipulation_interface`."""
+    parameters_only('Node: a person drives the robot\'s hands in place of a failed state. '
+                    'Parameters: ~arms, ~states, ~limits and more; see doc/shared_autonomy.md.')
+    rospy.init_node('manipulation_interface')
+    start_master_watch()
+    try:
+        settings = TeleoperationSettings.from_parameters()
+        hands, surroundings = settings.build()
+    except (ConfigError, ValueError) as err:
+        rospy.logfatal('manipulation_interface: %s', err)
+        raise SystemExit(2) from err
+    server = TeleoperationServer(settings, hands, surroundings)
+    rospy.loginfo('manipulation_interface: arms %s', ', '.join(sorted(server._hands)))
+    rospy.spin()

@@ -1,0 +1,149 @@
+"""The settings of the manipulation interface, from its node's parameters."""
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+
+import rospy
+
+from ..oracle.errors import ConfigError
+from .arm_port import ArmNames, JointListener
+from .hand import Hand, Robot
+from .surroundings import Surroundings
+from .teleoperation import DriveLimits
+
+GRASP_POSE = 'grasp_pose'  # of the tool, when the gripper last closed on something; else where it is now
+TOOL_POSE = 'tool_pose'  # of the tool, now
+_OUTPUTS = (GRASP_POSE, TOOL_POSE)
+
+
+class TeleoperationSettings(NamedTuple):
+    """See launch/manipulation_interface.yaml for what each means and what the PR2 has."""
+
+    arms: Dict[str, ArmNames]
+    base: str
+    limits: DriveLimits
+    states: Dict[str, Dict[str, Any]]
+    success: List[str]
+    rate_hz: float
+    watchdog_s: float
+    lead: float
+    gripper_effort: float
+    lock_step: bool
+    clearance: bool
+
+    @classmethod
+    def from_parameters(cls) -> 'TeleoperationSettings':
+        """From the node's private parameters.
+
+        :raises ConfigError: naming the parameter, its value and what is allowed.
+        """
+        arms = _mapping('~arms', rospy.get_param('~arms', {}))
+        if not arms:
+            raise ConfigError(rospy.resolve_name('~arms'), arms, 'one arm or more; see manipulation_interface.yaml')
+        names = {name: ArmNames.parse('~arms/' + name, value) for name, value in arms.items()}
+        states = {state: _state(state, value, names) for state, value in _mapping(
+            '~states', rospy.get_param('~states', {})).items()}
+        return cls(names, str(rospy.get_param('~base_frame', 'base_footprint')), _limits(), states,
+                   _names('~success', ['succeeded']), _number('~rate_hz', 60.0, 30.0, 500.0),
+                   _number('~watchdog_s', 0.06, 0.01, 0.5), _number('~lead', 0.12, 0.01, 1.0),
+                   _number('~gripper_effort', 60.0, 1.0, 500.0), _flag('~lock_step', False), _flag('~clearance', True))
+
+    @property
+    def period_s(self) -> float:
+        """One control period, s."""
+        return 1.0 / self.rate_hz
+
+    def outputs_of(self, state: str) -> Mapping[str, str]:
+        """Which outputs the interface tells for a state: by key, one of those above."""
+        outputs: Mapping[str, str] = self.states.get(state, {}).get('outputs', {})
+        return outputs
+
+    def arm_of(self, state: str, otherwise: str) -> str:
+        """The arm that does the state's work."""
+        arm: str = self.states.get(state, {}).get('arm', otherwise)
+        return arm
+
+    def build(self) -> Tuple[Dict[str, Hand], Optional[Surroundings]]:
+        """The arms, and what they could hit.
+
+        :raises ConfigError: where there is no robot description.
+        :raises ValueError: where it lacks a link that is named, or cannot be loaded.
+        """
+        urdf = rospy.get_param('robot_description', '')
+        if not isinstance(urdf, str) or not urdf:
+            raise ConfigError(rospy.resolve_name('robot_description'), urdf, 'the text of a URDF')
+        robot = Robot(urdf, self.base, JointListener())
+        hands = {name: Hand(robot, names, self.limits, self.lead) for name, names in self.arms.items()}
+        surroundings = Surroundings(robot, self.limits.slow_below) if self.clearance else None
+        if surroundings is not None:
+            for hand in hands.values():
+                surroundings.watch_over(hand)
+        return hands, surroundings
+
+
+def _limits() -> DriveLimits:
+    given = dict(_mapping('~limits', rospy.get_param('~limits', {})))
+    workspace = given.pop('workspace', None)
+    unknown = sorted(set(given) - set(DriveLimits._fields))
+    if unknown:
+        raise ConfigError('~limits/' + unknown[0], given[unknown[0]], 'the keys ' + ', '.join(DriveLimits._fields))
+    values = {key: _checked('~limits/' + key, value, 0.0, 100.0) for key, value in given.items()}
+    if workspace is not None:
+        values['workspace'] = _corners(workspace)
+    limits = DriveLimits(**values)
+    if not limits.stop_below < limits.slow_below:
+        raise ConfigError('~limits/stop_below', limits.stop_below, 'less than slow_below')
+    return limits
+
+
+def _corners(value: Any) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
+    allowed = 'two corners [[x, y, z], [x, y, z]] (m), the lower one first'
+    try:
+        low, high = ([float(part) for part in corner] for corner in value)
+    except (TypeError, ValueError) as err:
+        raise ConfigError('~limits/workspace', value, allowed) from err
+    if len(low) != 3 or len(high) != 3 or not all(a < b for a, b in zip(low, high)):
+        raise ConfigError('~limits/workspace', value, allowed)
+    return tuple(low), tuple(high)
+
+
+def _state(state: str, value: Any, arms: Mapping[str, ArmNames]) -> Dict[str, Any]:
+    key = '~states/' + state
+    found = dict(_mapping(key, value))
+    unknown = sorted(set(found) - {'arm', 'outputs'})
+    if unknown:
+        raise ConfigError('{}/{}'.format(key, unknown[0]), found[unknown[0]], 'the keys arm, outputs')
+    if found.get('arm', next(iter(arms))) not in arms:
+        raise ConfigError(key + '/arm', found['arm'], ', '.join(sorted(arms)))
+    for name, what in _mapping(key + '/outputs', found.get('outputs', {})).items():
+        if what not in _OUTPUTS:
+            raise ConfigError('{}/outputs/{}'.format(key, name), what, ', '.join(_OUTPUTS))
+    return found
+
+
+def _mapping(key: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(key, value, 'a mapping')
+    return value
+
+
+def _names(key: str, default: List[str]) -> List[str]:
+    value = rospy.get_param(key, default)
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise ConfigError(key, value, 'a list of names')
+    return value
+
+
+def _flag(key: str, default: bool) -> bool:
+    value = rospy.get_param(key, default)
+    if not isinstance(value, bool):
+        raise ConfigError(key, value, 'true or false')
+    return value
+
+
+def _number(key: str, default: float, low: float, high: float) -> float:
+    return _checked(key, rospy.get_param(key, default), low, high)
+
+
+def _checked(key: str, value: Any, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise ConfigError(key, value, 'a number from {:g} to {:g}'.format(low, high))
+    return float(value)
