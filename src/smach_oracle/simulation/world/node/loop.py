@@ -1,0 +1,147 @@
+"""The one thread that owns the physics: it carries out what others ask for, moves the robot, and keeps the time."""
+import queue
+import threading
+import time
+from concurrent.futures import Future, wait
+from typing import Any, Callable, Dict, Optional, TypeVar
+
+from .motion_table import MotionTable
+from .settings import WorldSettings
+from .sim_clock import SimClock
+
+PERIOD_S = 1.0 / 60.0  # of simulated time, that a control period takes
+IDLE_TICK_S = 0.05  # wall time between two looks while nothing happens
+LATE_S = 0.25  # wall time behind which a paced world no longer tries to catch up
+T = TypeVar('T')
+
+
+class WorldStopped(Exception):
+    """The world is no longer there to be asked."""
+
+
+class Stopwatch:
+    """Wall time (s) by what it went into."""
+
+    def __init__(self) -> None:
+        self.spent: Dict[str, float] = {}
+        self._since = time.monotonic()
+
+    def lap(self, what: str) -> None:
+        """The time since the last lap went into `what`."""
+        now = time.monotonic()
+        self.spent[what] = self.spent.get(what, 0.0) + now - self._since
+        self._since = now
+
+    def restart(self) -> None:
+        """Begin anew."""
+        self.spent = {}
+        self._since = time.monotonic()
+
+
+class WorldLoop:
+    """Runs `after_tick` after each control period and everything that is asked for in between, in one thread.
+
+    :param after_tick: publishes what is due.
+    """
+
+    def __init__(self, motions: MotionTable, clock: SimClock, settings: WorldSettings,
+                 after_tick: Callable[[], None]) -> None:
+        self._motions = motions
+        self._clock = clock
+        self._settings = settings
+        self._after_tick = after_tick
+        self._jobs: 'queue.Queue[Callable[[], None]]' = queue.Queue()
+        self._stopping = threading.Event()
+        self._thread: Optional[threading.Thread] = None
+        self._busy_until = time.monotonic()
+        self.watch = Stopwatch()
+
+    def ask(self, question: Callable[[], T]) -> T:
+        """What `question` returns, called in the world's thread; raises what it raises, or WorldStopped."""
+        answer: 'Future[T]' = Future()
+        self._jobs.put(lambda: _answer(answer, question))
+        while not answer.done():
+            if self._stopping.is_set():
+                raise WorldStopped('the world is shutting down')
+            wait([answer], timeout=0.1)
+        return answer.result()
+
+    def tell(self, job: Callable[[], None]) -> None:
+        """Have the world's thread call `job` soon; returns at once."""
+        self._jobs.put(job)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let motions and physics go on for so long at once; for the world's own thread."""
+        for _ in range(round(seconds / PERIOD_S)):
+            self._motions.tick()
+            self._clock.advance(PERIOD_S)
+
+    def run(self, closed: Callable[[], None]) -> None:
+        """Until stop(); `closed` is called at the end, in this thread. Raises what a motion or a job raises."""
+        self._thread = threading.current_thread()
+        try:
+            if self._settings.lock_step:
+                self._run_in_lock_step()
+            else:
+                self._run_paced()
+        finally:
+            self._stopping.set()
+            closed()
+
+    def stop(self, limit_s: float) -> None:
+        """End it, and wait at most so long for its last words."""
+        self._stopping.set()
+        self._jobs.put(lambda: None)
+        if self._thread and self._thread is not threading.current_thread():
+            self._thread.join(limit_s)
+
+    def _run_in_lock_step(self) -> None:
+        while not self._stopping.is_set():
+            if self._motions:
+                self._run_jobs()
+                self._tick()
+                self._busy_until = time.monotonic()
+            elif self._job_within(IDLE_TICK_S):
+                self._busy_until = time.monotonic()
+            elif time.monotonic() - self._busy_until > self._settings.idle_grace:
+                # nothing moves, and those who sleep in simulated time wake up
+                self._clock.advance(IDLE_TICK_S * self._settings.idle_speed)
+            self.watch.lap('idle')
+
+    def _run_paced(self) -> None:
+        due = time.monotonic()
+        while not self._stopping.is_set():
+            due = max(due + PERIOD_S / self._settings.real_time_factor, time.monotonic() - LATE_S)
+            self._tick()
+            while not self._stopping.is_set() and time.monotonic() < due:
+                self._job_within(due - time.monotonic())
+            self._run_jobs()
+            self.watch.lap('idle')
+
+    def _tick(self) -> None:
+        self.watch.lap('idle')
+        self._motions.tick()
+        self._clock.advance(PERIOD_S)
+        self.watch.lap('physics')
+        self._after_tick()
+        self.watch.lap('publish')
+
+    def _run_jobs(self) -> None:
+        while not self._stopping.is_set() and self._job_within(0.0):
+            pass
+
+    def _job_within(self, timeout_s: float) -> bool:
+        """Do one job that is there within the time; whether there was one."""
+        try:
+            job = self._jobs.get(block=timeout_s > 0, timeout=max(timeout_s, 1e-4))
+        except queue.Empty:
+            return False
+        job()
+        return True
+
+
+def _answer(answer: 'Future[Any]', question: Callable[[], Any]) -> None:
+    try:
+        answer.set_result(question())
+    except Exception as err:  # goes on to whoever asked
+        answer.set_exception(err)

@@ -1,0 +1,64 @@
+"""Joint states and transforms of the simulated PR2, and its description."""
+from typing import Any, List, Mapping
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from smach_oracle.simulation.robot.interface import BASE_FRAME, ODOM_FRAME
+from smach_oracle.simulation.robot.pr2_model import pr2_files
+
+from .transform_tree import Link, TransformTree, link_of
+
+
+def ros_time(nanoseconds: int) -> rospy.Time:
+    """As a message has it."""
+    return rospy.Time(*divmod(nanoseconds, 1_000_000_000))
+
+
+def publish_description() -> str:
+    """Set robot_description and robot_description_semantic; returns the URDF's text."""
+    files = pr2_files()
+    urdf = files.urdf.read_text(encoding='utf-8').replace('filename="/', 'filename="file:///')
+    rospy.set_param('robot_description', urdf)
+    rospy.set_param('robot_description_semantic', files.srdf.read_text(encoding='utf-8'))
+    return urdf
+
+
+class StatePublisher:
+    """Topics joint_states, /tf and, once, /tf_static."""
+
+    def __init__(self, urdf: str, joints: List[str]) -> None:
+        """`joints`: those that have encoders; the others of the URDF (the wheels') count as fixed."""
+        self._tree = TransformTree(urdf, joints)
+        self._states = rospy.Publisher('joint_states', JointState, queue_size=100, tcp_nodelay=True)
+        self._moving = rospy.Publisher('/tf', TFMessage, queue_size=100, tcp_nodelay=True)
+        self._fixed = rospy.Publisher('/tf_static', TFMessage, queue_size=10, latch=True)
+        self._fixed_told = False
+
+    def publish(self, world: Any, stamp: rospy.Time) -> None:
+        """All of it as it is now."""
+        if not self._fixed_told:
+            self._fixed_told = True
+            self._fixed.publish(TFMessage([_stamped(link, stamp) for link in self._tree.fixed]))
+        positions = world.joints()
+        self._moving.publish(transforms(self._tree, positions, world.odom_from_base(), stamp))
+        velocities, efforts = world.joint_velocities(), world.joint_efforts()
+        names = sorted(positions)
+        self._states.publish(JointState(Header(stamp=stamp), names, *(
+            [values[name] for name in names] for values in (positions, velocities, efforts))))
+
+
+def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_base: np.ndarray,
+               stamp: rospy.Time) -> TFMessage:
+    """What moves, as a message for /tf."""
+    links = [link_of(ODOM_FRAME, BASE_FRAME, odom_from_base)] + tree.moving(positions)
+    return TFMessage([_stamped(link, stamp) for link in links])
+
+
+def _stamped(link: Link, stamp: rospy.Time) -> TransformStamped:
+    return TransformStamped(Header(stamp=stamp, frame_id=link.parent), link.child,
+                            Transform(Vector3(*link.position), Quaternion(*link.turn)))
