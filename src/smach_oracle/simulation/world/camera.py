@@ -1,0 +1,93 @@
+"""The head camera: colour and depth from PyBullet's software renderer, with the errors of a depth camera."""
+import math
+from typing import Dict, Tuple
+
+import numpy as np
+import pybullet
+from scipy import ndimage
+
+from ...geometry.transforms import inverse
+from ..robot.interface import CAMERA_FRAME, Frame
+from .physics import World
+from .scene import Sensor
+
+WIDTH, HEIGHT = 640, 480
+FIELD_OF_VIEW = 45.0  # degrees, from top to bottom
+NEAR, FAR = 0.2, 5.0  # m
+FOCAL = HEIGHT / 2 / math.tan(math.radians(FIELD_OF_VIEW) / 2)  # pixels
+INTRINSICS = np.array([[FOCAL, 0.0, (WIDTH - 1) / 2], [0.0, FOCAL, (HEIGHT - 1) / 2], [0.0, 0.0, 1.0]])
+LIGHT = {'lightDirection': [1.0, 1.5, 3.0], 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.5,
+         'lightSpecularCoeff': 0.05, 'shadow': 0}
+FRAME_PERIODS = 2  # control periods that a frame takes
+BASELINE = 0.075  # m, between projector and sensor: gives the steps in which depth comes
+EDGE = 0.03  # m: a jump of depth between neighbours from which the edge is lost, mostly
+DIMMED = 0.6  # brightness below which depth suffers, too
+
+
+class View:
+    """What a camera that knows no noise sees."""
+
+    def __init__(self, world: World, world_from_camera: np.ndarray, size: Tuple[int, int] = (WIDTH, HEIGHT),
+                 field_of_view: float = FIELD_OF_VIEW, **light: object) -> None:
+        """
+        :param world_from_camera: 4x4, z forward, x right, y down.
+        :param size: width and height, pixels.
+        :param light: of pybullet.getCameraImage, over what is usual here.
+        """
+        width, height = size
+        eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3, 2], -world_from_camera[:3, 1]
+        matrix = pybullet.computeViewMatrix(eye.tolist(), (eye + forward).tolist(), up.tolist())
+        projection = pybullet.computeProjectionMatrixFOV(field_of_view, width / height, NEAR, FAR)
+        image = pybullet.getCameraImage(width, height, matrix, projection, renderer=pybullet.ER_TINY_RENDERER,
+                                        physicsClientId=world.client, **dict(LIGHT, **light))
+        self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
+        buffer = np.asarray(image[3], float).reshape(height, width)
+        self.depth = FAR * NEAR / (FAR - (FAR - NEAR) * buffer)  # m along the optical axis; FAR where there is nothing
+        self.bodies = np.asarray(image[4], int).reshape(height, width)  # numbers in the client, -1 for none
+
+
+def see(world: World) -> Frame:
+    """A frame of the head camera; the world goes on for the time that it takes."""
+    world.step(FRAME_PERIODS)
+    sensor = world.disturbances.sensor(world.scene.sensor)
+    pose = world.link_pose(CAMERA_FRAME)
+    view = View(world, pose)
+    generator = np.random.default_rng([world.scene.seed, 102, world.periods])
+    frame = Frame(world.time, noisy_colour(view.colour, sensor, generator), noisy_depth(view.depth, sensor, generator),
+                  INTRINSICS.copy(), inverse(world.true_base()) @ pose)
+    world.disturbances.frame_taken()
+    world.happened('see')
+    return frame
+
+
+def regions(world: World) -> Dict[str, Tuple[int, int, int, int]]:
+    """Of every body of the scene that the head camera sees now: left, top, width, height of its visible pixels."""
+    bodies = View(world, world.link_pose(CAMERA_FRAME)).bodies
+    found = {}
+    for index in np.unique(bodies[bodies >= 0]):
+        name = world.seen_as(int(index))
+        rows, columns = np.nonzero(bodies == index)
+        if name in world.body_names:
+            found[name] = (int(columns.min()), int(rows.min()), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1)
+    return found
+
+
+def noisy_colour(colour: np.ndarray, sensor: Sensor, generator: np.random.Generator) -> np.ndarray:
+    """(h, w, 3) uint8, as dark as the light is and with noise in every channel."""
+    noise = generator.standard_normal(colour.shape, np.float32) * np.float32(sensor.colour_noise)
+    return np.clip(colour * np.float32(sensor.brightness) + noise, 0, 255).astype(np.uint8)
+
+
+def noisy_depth(depth: np.ndarray, sensor: Sensor, generator: np.random.Generator) -> np.ndarray:
+    """(h, w) float32 m: a Kinect's noise and steps; lost edges, lost pixels; NaN beyond FAR. Dim light adds to all."""
+    known = np.asarray(depth, np.float32)
+    dark = max(0.0, 1.0 - sensor.brightness / DIMMED)
+    spread = (sensor.noise + 3.0 * dark) * (0.0012 + 0.0019 * (known - 0.4) ** 2)
+    found = known + spread * generator.standard_normal(depth.shape, np.float32)
+    steps = BASELINE * FOCAL * 8
+    found = steps / np.round(steps / np.maximum(found, NEAR))
+    chance = generator.random(depth.shape, np.float32)
+    jumps = ndimage.maximum_filter(known, 3) - ndimage.minimum_filter(known, 3) > EDGE
+    lost = (jumps & (chance < 0.7)) | (chance > 1.0 - min(1.0, sensor.dropout + 0.9 * dark ** 2))
+    found[lost | (known > 0.999 * FAR)] = np.nan
+    return found.astype(np.float32)

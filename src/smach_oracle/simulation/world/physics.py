@@ -1,0 +1,271 @@
+"""The world of a trial: the PR2, the things of the scene, physics. What is true, and the only place that knows it.
+
+The same scene and the same calls give the same states to the last bit: every reset begins in a fresh physics client,
+and nothing here reads a clock or shares a random generator.
+"""
+import math
+from typing import Dict, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+import pybullet
+
+from ...geometry.transforms import from_rpy, inverse
+from ..robot.interface import ARMS, TOOL_FRAME
+from .bodies import Placed, SceneError, add_body, add_floor, check_scene, pose_of
+from .disturbances import Disturbances
+from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
+from .scene import Body, Goal, Scene
+
+EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
+SETTLING = 30  # control periods after a reset, in which things come to rest
+
+
+class Contact(NamedTuple):
+    """Where a body touches something."""
+
+    other: str  # name of a body, 'robot' or 'floor'
+    link: str  # of the other
+    position: np.ndarray  # (3,) m, in the world
+    force: float  # N
+
+
+class World:
+    """One PyBullet client, owned by one thread."""
+
+    def __init__(self, scene: Scene = EMPTY) -> None:
+        self._client = -1
+        self._periods_before = 0
+        self.periods = 0  # control periods since the reset
+        self.reset(scene)
+
+    def reset(self, scene: Scene) -> None:
+        """Build a scene's world from nothing, and let it come to rest.
+
+        :raises SceneError: saying what is wrong with the scene; the world is as it was then.
+        """
+        check_scene(scene)
+        client = pybullet.connect(pybullet.DIRECT)
+        try:
+            robot, placed = self._build(client, scene)
+            disturbances = Disturbances(scene, robot)
+        except (SceneError, pybullet.error):
+            pybullet.disconnect(client)
+            raise
+        self.close()
+        self._client, self._robot, self._placed = client, robot, placed
+        self.scene, self._disturbances = scene, disturbances
+        self._names = {robot.index: 'robot', self._floor: 'floor'}
+        self._names.update({each.index: name for name, each in placed.items()})
+        self._periods_before += self.periods
+        self.periods = self.drives = self.frames = 0
+        self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
+        self.step(SETTLING)
+        self.happened('start')
+
+    def _build(self, client: int, scene: Scene) -> Tuple[Pr2Body, Dict[str, Placed]]:
+        pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=50, deterministicOverlappingPairs=1,
+                                           physicsClientId=client)
+        self._floor = add_floor(client)
+        robot = Pr2Body(client, scene.robot)
+        return robot, {body.name: add_body(client, body) for body in scene.bodies}
+
+    def close(self) -> None:
+        """Free the physics client; reset() makes another."""
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    # time
+
+    @property
+    def time(self) -> float:
+        """s of simulated time since the first reset began; it never goes back."""
+        return (self._periods_before + self.periods) * PERIOD
+
+    def step(self, count: int = 1) -> None:
+        """Let `count` control periods of 1/60 s pass."""
+        for _ in range(count):
+            self._disturbances.tick(self)
+            self._robot.advance()
+            self.periods += 1
+
+    def happened(self, *events: str) -> None:
+        """Tell what has come to its end, such as 'look_at'; it may set off a disturbance of the scene."""
+        for event in events:
+            self._disturbances.happened(event)
+
+    @property
+    def unrest(self) -> bool:
+        """A disturbance is on its way: motions should not be called done before it has had its course."""
+        return self._disturbances.moving
+
+    @property
+    def disturbances(self) -> Disturbances:
+        """What happens to this trial's world."""
+        return self._disturbances
+
+    # the robot
+
+    @property
+    def robot(self) -> Pr2Body:
+        """The PR2's body."""
+        return self._robot
+
+    @property
+    def client(self) -> int:
+        """PyBullet's number for this world; another one after each reset."""
+        return self._client
+
+    def joints(self) -> Dict[str, float]:
+        """Positions of the encoders, rad or m."""
+        return self._robot.states(0)
+
+    def joint_velocities(self) -> Dict[str, float]:
+        """Of the encoders, rad/s or m/s."""
+        return self._robot.states(1)
+
+    def joint_efforts(self) -> Dict[str, float]:
+        """What the motors give, N m or N."""
+        return self._robot.states(3)
+
+    def set_target(self, joint: str, position: float, velocity: float = 0.0,
+                   max_force: Optional[float] = None) -> None:
+        """Send a joint to where it shall be at the end of the coming control period; there it is held.
+
+        :param velocity: rad/s or m/s on the way; it holds for that one period.
+        :raises ValueError: for an unknown joint, a position outside its limits, or what is no finite number.
+        """
+        wrong = self._robot.refusal(joint, position)
+        if not wrong and not math.isfinite(velocity):
+            wrong = '{}: velocity is {}; allowed: finite numbers'.format(joint, velocity)
+        if wrong:
+            raise ValueError(wrong)
+        self._robot.set_target(joint, position, velocity, max_force)
+
+    def set_gripper(self, arm: str, gap: float, max_effort: float) -> None:
+        """Send a gripper to `gap` m between its tips; its fingers press with at most `max_effort` N each.
+
+        :raises ValueError: for an unknown arm, or a gap or effort that cannot be.
+        """
+        self._check_arm(arm)
+        if not 0.0 <= gap <= 0.0901 or not 0.0 < max_effort <= 200.0:
+            raise ValueError('{} gripper: gap {} m with {} N; allowed: 0 to 0.09 m, above 0 to 200 N'.format(
+                arm, gap, max_effort))
+        self._robot.set_grip(arm, min(gap, 0.09), max_effort)
+
+    def gap(self, arm: str) -> float:
+        """m between the finger tips of an arm."""
+        self._check_arm(arm)
+        return self._robot.gap(arm)
+
+    def true_base(self) -> np.ndarray:
+        """4x4, the world from base_footprint, in truth."""
+        return self._robot.base()
+
+    def odom_from_base(self) -> np.ndarray:
+        """4x4, where the robot believes to stand: odom_combined, which is the world's frame, from base_footprint."""
+        return self._robot.base() @ inverse(self.belief_error)
+
+    def drive_error(self) -> np.ndarray:
+        """4x4, by how much the next drive will miss its goal unknown to the robot; the same for the same trial."""
+        self.drives += 1
+        x, y, yaw = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(0.0, self.scene.robot.drive_error)
+        return from_rpy((x, y, 0.0), yaw=yaw)
+
+    def link_pose(self, link: str) -> np.ndarray:
+        """4x4, the world from a link of the PR2's URDF. Raises ValueError for an unknown one."""
+        return self._robot.link_pose(link)
+
+    def tool_pose(self, arm: str) -> np.ndarray:
+        """4x4, the world from the tool frame of an arm."""
+        self._check_arm(arm)
+        return self._robot.link_pose(TOOL_FRAME[arm])
+
+    # things
+
+    @property
+    def body_names(self) -> List[str]:
+        """The scene's bodies, in its order."""
+        return list(self._placed)
+
+    def body(self, name: str) -> Body:
+        """What the scene says of a body."""
+        return self._find(name).body
+
+    def body_pose(self, name: str, link: str = '') -> np.ndarray:
+        """4x4, the world from a body's frame (its centre), or from a link of it.
+
+        :raises ValueError: for a body or link that is not there, with those that are.
+        """
+        placed = self._find(name)
+        if link not in placed.links:
+            raise ValueError('no link {!r} in {!r}; there: {}'.format(link, name, ', '.join(filter(None, placed.links))))
+        if link:
+            state = pybullet.getLinkState(placed.index, placed.links[link], computeForwardKinematics=True,
+                                          physicsClientId=self._client)
+            return pose_of(state[4], state[5])
+        pose = pybullet.getBasePositionAndOrientation(placed.index, physicsClientId=self._client)
+        if placed.body.shape != 'urdf':
+            return pose_of(*pose)
+        inertial = pybullet.getDynamicsInfo(placed.index, -1, physicsClientId=self._client)
+        return pose_of(*pose) @ inverse(pose_of(inertial[3], inertial[4]))
+
+    def body_speed(self, name: str) -> Tuple[float, float]:
+        """m/s and rad/s of a body."""
+        linear, angular = pybullet.getBaseVelocity(self._find(name).index, physicsClientId=self._client)
+        return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
+
+    def body_joint(self, name: str, joint: str) -> float:
+        """rad or m of a joint of a body."""
+        placed = self._find(name)
+        if joint not in placed.joints:
+            raise ValueError('no joint {!r} in {!r}; there: {}'.format(joint, name, ', '.join(placed.joints) or 'none'))
+        position: float = pybullet.getJointState(placed.index, placed.joints[joint], physicsClientId=self._client)[0]
+        return position
+
+    def set_body_velocity(self, name: str, x: float, y: float) -> None:
+        """Push a body over what it stands on, at m/s; gravity and contacts go on."""
+        placed = self._find(name)
+        linear, angular = pybullet.getBaseVelocity(placed.index, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(placed.index, [x, y, linear[2]], angular, physicsClientId=self._client)
+
+    def contacts(self, name: str) -> List[Contact]:
+        """What touches a body ('robot' is one here, too), as of the last step."""
+        index = self._robot.index if name == 'robot' else self._find(name).index
+        found = []
+        for point in pybullet.getContactPoints(bodyA=index, physicsClientId=self._client):
+            if point[8] <= 0:
+                found.append(Contact(self._names[point[2]], self._link_name(point[2], point[4]), np.array(point[6]),
+                                     point[9]))
+        return found
+
+    def holding(self, name: str) -> str:
+        """The arm both of whose fingers touch a body, or ''."""
+        touching = {contact.link for contact in self.contacts(name) if contact.other == 'robot' and contact.force > 0}
+        return next((arm for arm in ARMS if touching.issuperset(FINGERS[arm])), '')
+
+    def movable(self) -> List[str]:
+        """The bodies that can be carried, in the scene's order."""
+        return [name for name, placed in self._placed.items() if placed.body.mass > 0 and placed.body.shape != 'urdf']
+
+    def seen_as(self, index: int) -> str:
+        """The name of a body by its number in the client: 'robot', 'floor', or a body of the scene."""
+        return self._names.get(index, '')
+
+    def _link_name(self, index: int, link: int) -> str:
+        links = self._robot.links if index == self._robot.index else {}
+        for placed in self._placed.values():
+            if placed.index == index:
+                links = placed.links
+        return next((name for name, number in links.items() if number == link), '')
+
+    def _find(self, name: str) -> Placed:
+        if name not in self._placed:
+            raise ValueError('no body {!r} in this scene; there: {}'.format(name, ', '.join(self._placed) or 'none'))
+        return self._placed[name]
+
+    @staticmethod
+    def _check_arm(arm: str) -> None:
+        if arm not in ARMS:
+            raise ValueError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))

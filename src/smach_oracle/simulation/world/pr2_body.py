@@ -1,0 +1,183 @@
+"""The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
+import math
+import xml.etree.ElementTree as ElementTree
+from typing import Dict, List, Optional
+
+import numpy as np
+import pybullet
+
+from ...geometry.transforms import from_rpy
+from ..robot.interface import ARM_JOINTS, ARMS
+from ..robot.pr2_model import BASE_JOINTS, JAW_OPEN, pr2_files
+from ..robot.rigid_links import fixed_frames
+from .bodies import SceneError, pose_of
+from .scene import RobotStart
+
+SUBSTEPS = 4  # steps of physics in a control period
+STEP = 1.0 / 240.0  # s
+PERIOD = SUBSTEPS * STEP
+JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
+FINGERS = {arm: [name.replace('_joint', '_link') for name in JAWS[arm]] for arm in ARMS}
+FORCE = 300.0  # N m; the effort limits of the URDF presume springs that carry the arms
+STRONG = dict({name: 5000.0 for name in BASE_JOINTS}, torso_lift_joint=10000.0)  # N
+GRIP = 20.0  # N, of each finger at the start
+LEAD = 0.003  # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep together
+STIFFNESS = 0.3  # share of an error that is taken back in one step of physics
+TIP_FRICTION = 1.2
+STAND = {  # how a PR2 stands unless the scene says otherwise
+    'torso_lift_joint': 0.20, 'head_tilt_joint': 0.0,
+    'l_shoulder_pan_joint': 1.6, 'l_shoulder_lift_joint': 0.2, 'l_upper_arm_roll_joint': 1.5,
+    'l_elbow_flex_joint': -1.5, 'l_forearm_roll_joint': -0.5, 'l_wrist_flex_joint': -0.6, 'l_wrist_roll_joint': 0.0,
+    'r_shoulder_pan_joint': -1.6, 'r_shoulder_lift_joint': 0.2, 'r_upper_arm_roll_joint': -1.5,
+    'r_elbow_flex_joint': -1.5, 'r_forearm_roll_joint': 0.5, 'r_wrist_flex_joint': -0.6, 'r_wrist_roll_joint': 0.0,
+    **{jaw: JAW_OPEN for jaws in JAWS.values() for jaw in jaws}}
+
+
+class Pr2Body:
+    """Loaded at its start, every joint held where it is."""
+
+    def __init__(self, client: int, start: RobotStart) -> None:
+        """Raises SceneError where the start names a joint that is not there, or a position out of its limits."""
+        self._client = client
+        files = pr2_files()
+        self.index: int = pybullet.loadURDF(str(files.mobile), useFixedBase=True,
+                                            flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
+        infos = [pybullet.getJointInfo(self.index, number, physicsClientId=client)
+                 for number in range(pybullet.getNumJoints(self.index, physicsClientId=client))]
+        self.numbers = {info[1].decode(): number for number, info in enumerate(infos)}
+        self.links = {info[12].decode(): number for number, info in enumerate(infos)}
+        self.limits = {info[1].decode(): (info[8], info[9]) if info[8] <= info[9] else (-math.inf, math.inf)
+                       for info in infos}
+        self.speeds = {info[1].decode(): info[11] for info in infos}
+        self.encoders = [name for name in self.numbers if name not in BASE_JOINTS]
+        self._frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
+        self._targets = np.zeros(len(infos))
+        self._rates = np.zeros(len(infos))
+        self._forces = np.array([STRONG.get(name, FORCE) for name in self.numbers])
+        self._moving: List[int] = []
+        self._changed = set(range(len(infos)))
+        self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
+        self._jaws = {arm: [self.numbers[name] for name in JAWS[arm]] for arm in ARMS}
+        self._stand(start)
+        for arm in ARMS:
+            for finger in FINGERS[arm]:
+                pybullet.changeDynamics(self.index, self.links[finger], lateralFriction=TIP_FRICTION,
+                                        spinningFriction=0.005, rollingFriction=0.0005, physicsClientId=client)
+
+    def _stand(self, start: RobotStart) -> None:
+        wanted = dict(STAND)
+        for name, position in start.joints:
+            if name not in self.encoders:
+                raise SceneError('robot: no joint {!r}; there: {}'.format(name, ', '.join(self.encoders)))
+            wanted[name] = position
+        wanted.update(zip(BASE_JOINTS, start.base))
+        for name, position in wanted.items():
+            wrong = self.refusal(name, position)
+            if wrong:
+                raise SceneError('robot: ' + wrong)
+            pybullet.resetJointState(self.index, self.numbers[name], position, physicsClientId=self._client)
+            self._targets[self.numbers[name]] = position
+        for arm in ARMS:
+            self._grips[arm] = (sum(wanted[jaw] for jaw in JAWS[arm]), GRIP)
+
+    def refusal(self, name: str, position: float) -> str:
+        """Why a joint cannot be sent to a position, or ''."""
+        if name not in self.numbers:
+            return 'no joint {!r}; there: {}'.format(name, ', '.join(self.numbers))
+        lower, upper = self.limits[name]
+        if not lower - 1e-3 <= position <= upper + 1e-3:
+            return '{} cannot be at {:.4g}; allowed: {:.4g} to {:.4g}'.format(name, position, lower, upper)
+        return ''
+
+    def states(self, field: int) -> Dict[str, float]:
+        """Of every encoder: 0 positions (rad or m), 1 velocities, 3 what its motor gives (N m or N)."""
+        states = pybullet.getJointStates(self.index, [self.numbers[name] for name in self.encoders],
+                                         physicsClientId=self._client)
+        return {name: state[field] for name, state in zip(self.encoders, states)}
+
+    def position(self, name: str) -> float:
+        """Of one joint, also of the base's."""
+        position: float = pybullet.getJointState(self.index, self.numbers[name], physicsClientId=self._client)[0]
+        return position
+
+    def base(self) -> np.ndarray:
+        """4x4, the world from base_footprint."""
+        x, y, theta = (self.position(name) for name in BASE_JOINTS)
+        return from_rpy((x, y, 0.0), yaw=theta)
+
+    def link_pose(self, link: str) -> np.ndarray:
+        """4x4, the world from a link of the URDF. Raises ValueError for one that is not there."""
+        if link not in self._frames:
+            raise ValueError('no link {!r} in the PR2; there: {}'.format(link, ', '.join(sorted(self._frames))))
+        holder, holder_from_link = self._frames[link]
+        state = pybullet.getLinkState(self.index, self.links[holder], computeForwardKinematics=True,
+                                      physicsClientId=self._client)
+        return pose_of(state[4], state[5]) @ holder_from_link
+
+    def set_target(self, name: str, position: float, velocity: float, force: Optional[float]) -> None:
+        """Where a joint shall be at the end of the coming period, moving at `velocity` until then."""
+        number = self.numbers[name]
+        self._targets[number], self._rates[number] = position, velocity
+        if force is not None:
+            self._forces[number] = force
+        self._changed.add(number)
+
+    def target(self, name: str) -> float:
+        """Where a joint was sent last."""
+        return float(self._targets[self.numbers[name]])
+
+    def set_grip(self, arm: str, gap: float, force: float) -> None:
+        """Send a gripper to a gap between the tips (m), each finger with at most `force` N."""
+        self._grips[arm] = (gap, force)
+
+    def gap(self, arm: str) -> float:
+        """m between the finger tips of an arm."""
+        return float(sum(self._jaw_positions(arm)))
+
+    def finger_force(self, arm: str) -> float:
+        """N, with which the weaker of the two fingers presses."""
+        states = pybullet.getJointStates(self.index, self._jaws[arm], physicsClientId=self._client)
+        return float(min(abs(state[3]) for state in states))
+
+    def advance(self) -> None:
+        """One control period of physics."""
+        for arm in ARMS:
+            self._drive_jaws(arm)
+        moving = [number for number in self._changed if self._rates[number]]
+        self._send(self._changed, SUBSTEPS)
+        pybullet.stepSimulation(physicsClientId=self._client)
+        for left in range(SUBSTEPS - 1, 0, -1):
+            self._send(moving, left)
+            pybullet.stepSimulation(physicsClientId=self._client)
+        self._rates[moving] = 0.0
+        self._changed = set(moving)
+
+    def _send(self, numbers: List[int], left: int) -> None:
+        """Give the motors their targets, with `left` steps of the period to go."""
+        if not numbers:
+            return
+        chosen = sorted(numbers)
+        rates = self._rates[chosen]
+        pybullet.setJointMotorControlArray(
+            self.index, chosen, pybullet.POSITION_CONTROL, targetPositions=self._targets[chosen] - left * STEP * rates,
+            targetVelocities=rates, forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
+            velocityGains=[1.0] * len(chosen), physicsClientId=self._client)
+
+    def _drive_jaws(self, arm: str) -> None:
+        """Both fingers go the same way: neither is sent further than LEAD from the middle of the two."""
+        gap, force = self._grips[arm]
+        middle = sum(self._jaw_positions(arm)) / 2
+        target = min(max(gap / 2, middle - LEAD), middle + LEAD)
+        for number in self._jaws[arm]:
+            if self._targets[number] != target or self._forces[number] != force:
+                self._targets[number], self._forces[number] = target, force
+                self._changed.add(number)
+
+    def _jaw_positions(self, arm: str) -> List[float]:
+        states = pybullet.getJointStates(self.index, self._jaws[arm], physicsClientId=self._client)
+        return [state[0] for state in states]
+
+
+def arm_of(joint: str) -> str:
+    """The arm that a joint belongs to, or ''."""
+    return next((arm for arm in ARMS if joint in ARM_JOINTS[arm]), '')
