@@ -8,14 +8,16 @@ import sys
 import tempfile
 import time
 import unittest
-from typing import Dict, List, Optional, Tuple
+from functools import partial
+from typing import Callable, Dict, List, Optional, Tuple
 
 import rospy
 
 from oracle_support import SIGNALS, FrontEnd, OwnMaster, Process, oracle_run, recorded_events, script
 from smach_oracle.msg import OracleEvent
 
-EXIT_LIMIT_S = 2.0 + 1.0  # two seconds are promised; the third is for a machine busy with other tests
+EXIT_LIMIT_S = 2.0 + 1.0  # two seconds are promised; the third is for starting and ending processes at all
+ATTEMPTS = 3  # a limit on time holds if it holds once: what else the machine does can only make a program slower
 TASK = '''
 import sys, time, rospy, smach, smach_ros
 rospy.init_node('task')
@@ -68,6 +70,10 @@ sm = OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'deadline_s': 0}, n
 '''
 
 
+class TooSlow(AssertionError):
+    """A process has not ended in time."""
+
+
 class SignalsTest(unittest.TestCase):
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
@@ -83,28 +89,50 @@ class SignalsTest(unittest.TestCase):
             self.assertTrue(task.says('THERE'), task.output())
         return task
 
-    def end(self, task: Process, number: int) -> Tuple[int, List[OracleEvent]]:
-        """Send the signal; check that it ends in time with its bag closed. Exit code and recorded events."""
+    def in_time(self, case: Callable[[], None]) -> None:
+        """Run a case in a folder of its own, again where a process in it was too slow; any other failure counts."""
+        for attempt in range(1, ATTEMPTS + 1):
+            self.setUp()
+            try:
+                return case()
+            except TooSlow as err:
+                if attempt == ATTEMPTS:
+                    raise
+                print('too slow, tried again: {}'.format(err), flush=True)
+
+    def signalled(self, task: Process, number: int) -> int:
+        """Send the signal; its exit code. Raises TooSlow."""
         sent = time.monotonic()
         task.signal(number)
-        code = task.wait(15.0)
-        self.assertLess(time.monotonic() - sent, EXIT_LIMIT_S, task.output())
+        code = task.wait(30.0)
+        took_s = time.monotonic() - sent
+        if took_s > EXIT_LIMIT_S:
+            raise TooSlow('{:.1f} s\n{}'.format(took_s, task.output()))
+        return code
+
+    def end(self, task: Process, number: int) -> Tuple[int, List[OracleEvent]]:
+        """Send the signal; check that it ends in time with its bag closed. Exit code and recorded events."""
+        code = self.signalled(task, number)
         self.assertEqual(glob.glob(os.path.join(self.bags, '*.active')), [], task.output())
         events, = recorded_events(self.bags)
         return code, events
 
+    def with_each_signal(self, case: Callable[[int], None]) -> None:
+        for number in SIGNALS:
+            with self.subTest(signal=signal.Signals(number).name):
+                self.in_time(partial(case, number))
+
     def check_preempted(self, place: str, text: str = TASK + RUN, expected: Optional[int] = None,
                         **settings: object) -> None:
-        for number in SIGNALS:
-            with self.subTest(place=place, signal=signal.Signals(number).name):
-                self.setUp()
-                task = self.start(place, text, settings)
-                code, events = self.end(task, number)
-                self.assertIn('OUTCOME preempted', task.output())
-                self.assertEqual(code, 0, task.output())
-                self.assertEqual((events[-1].kind, events[-1].outcome), (OracleEvent.TRIAL_END, 'preempted'))
-                if expected is not None:
-                    self.assertIn(expected, [event.kind for event in events])
+        def case(number: int) -> None:
+            task = self.start(place, text, settings)
+            code, events = self.end(task, number)
+            self.assertIn('OUTCOME preempted', task.output())
+            self.assertEqual(code, 0, task.output())
+            self.assertEqual((events[-1].kind, events[-1].outcome), (OracleEvent.TRIAL_END, 'preempted'))
+            if expected is not None:
+                self.assertIn(expected, [event.kind for event in events])
+        self.with_each_signal(case)
 
     def test_in_a_state(self) -> None:
         self.check_preempted('state')
@@ -120,24 +148,25 @@ class SignalsTest(unittest.TestCase):
         self.check_preempted('query', expected=OracleEvent.QUERY_CANCELLED, max_recoveries=0)
 
     def test_in_a_state_that_never_returns(self) -> None:
-        for number in SIGNALS:
-            with self.subTest(signal=signal.Signals(number).name):
-                self.setUp()
-                code, events = self.end(self.start('state_that_never_returns'), number)
-                self.assertEqual(code, 128 + number)
-                self.assertEqual(events[-1].kind, OracleEvent.STATE_START)
+        def case(number: int) -> None:
+            code, events = self.end(self.start('state_that_never_returns'), number)
+            self.assertEqual(code, 128 + number)
+            self.assertEqual(events[-1].kind, OracleEvent.STATE_START)
+        self.with_each_signal(case)
 
     def test_between_trials(self) -> None:
-        for number in SIGNALS:
-            with self.subTest(signal=signal.Signals(number).name):
-                self.setUp()
-                code, events = self.end(self.start('between_trials'), number)
-                self.assertEqual(code, 128 + number)
-                self.assertEqual(events[-1].kind, OracleEvent.TRIAL_END)
+        def case(number: int) -> None:
+            code, events = self.end(self.start('between_trials'), number)
+            self.assertEqual(code, 128 + number)
+            self.assertEqual(events[-1].kind, OracleEvent.TRIAL_END)
+        self.with_each_signal(case)
 
     def test_in_a_program_that_uses_the_library_itself(self) -> None:
+        self.in_time(self.library_case)
+
+    def library_case(self) -> None:
         rospy.set_param('/task/record', self.bags)
-        self.addCleanup(rospy.delete_param, '/task/record')
+        self.addCleanup(lambda: rospy.has_param('/task/record') and rospy.delete_param('/task/record'))
         program = Process([sys.executable, script(self, TASK + LIBRARY + RUN), 'query'])
         self.addCleanup(program.stop)
         front_end = FrontEnd(self, '/task/expert_query')
@@ -148,6 +177,9 @@ class SignalsTest(unittest.TestCase):
         self.assertIn(OracleEvent.QUERY_CANCELLED, [event.kind for event in events])
 
     def test_while_the_master_hangs(self) -> None:
+        self.in_time(self.hanging_master_case)
+
+    def hanging_master_case(self) -> None:
         master = OwnMaster(self)
         task = oracle_run(self, '--record', self.bags, script(self, TASK + RUN), 'state', env=master.env)
         self.assertTrue(task.says('THERE'), task.output())
@@ -156,12 +188,11 @@ class SignalsTest(unittest.TestCase):
         self.assertIn(OracleEvent.STATE_START, [event.kind for event in events])
 
     def test_before_the_script_has_a_node(self) -> None:
-        task = oracle_run(self, script(self, "import time; print('THERE', flush=True); time.sleep(60)"))
-        self.assertTrue(task.says('THERE'), task.output())
-        sent = time.monotonic()
-        task.signal(signal.SIGTERM)
-        self.assertEqual(task.wait(15.0), 128 + signal.SIGTERM)
-        self.assertLess(time.monotonic() - sent, EXIT_LIMIT_S)
+        def case() -> None:
+            task = oracle_run(self, script(self, "import time; print('THERE', flush=True); time.sleep(60)"))
+            self.assertTrue(task.says('THERE'), task.output())
+            self.assertEqual(self.signalled(task, signal.SIGTERM), 128 + signal.SIGTERM)
+        self.in_time(case)
 
 
 if __name__ == '__main__':
