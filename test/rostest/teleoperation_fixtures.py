@@ -1,0 +1,128 @@
+"""An arm that goes at once where it is told, and a person's front end, to test the manipulation interface."""
+import threading
+import time
+
+import actionlib
+import numpy as np
+import rospy
+from control_msgs.msg import GripperCommandAction, GripperCommandResult
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+from waiting import wait_for
+
+from smach_oracle.msg import SharedAutonomyAction, SharedAutonomyGoal, TeleopCommand, TeleopState
+from smach_oracle.ros.goal_link import GoalLink
+from smach_oracle.ros.userdata_codec import encode_all
+from smach_oracle.srv import FinishInterface, GiveUpInterface
+
+READY = (-0.4, 0.3, -1.2, -1.4, 0.3, -0.8, 0.2)
+NAMES = ['j{}'.format(number) for number in range(7)]
+
+
+class FakeArm:
+    """Takes every target at once, tells its joints 100 times a second; its gripper meets something at 5 cm."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._positions = np.array(READY)
+        self.moved_s = 0.0  # monotonic, of the last change
+        self._states = rospy.Publisher('joint_states', JointState, queue_size=10, tcp_nodelay=True)
+        self._gripper = actionlib.SimpleActionServer('gripper', GripperCommandAction, self._grip, auto_start=False)
+        self._gripper.start()
+        self._commands = rospy.Subscriber('arm/command', JointTrajectory, self._move, queue_size=10, tcp_nodelay=True)
+        threading.Thread(target=self._tell_on, daemon=True).start()
+
+    def reset(self):
+        with self._lock:
+            self._positions = np.array(READY)
+        self.tell()
+
+    def tell(self):
+        with self._lock:
+            positions = self._positions.tolist()
+        self._states.publish(JointState(Header(stamp=rospy.Time.now()), NAMES, positions, [], []))
+
+    def _tell_on(self):
+        try:
+            while not rospy.is_shutdown():
+                self.tell()
+                time.sleep(0.01)
+        except rospy.ROSException:
+            return  # the node goes down
+
+    def _move(self, message):
+        now_s = time.monotonic() + message.points[-1].time_from_start.to_sec()
+        with self._lock:
+            self._positions = np.array(message.points[-1].positions)
+        self.moved_s = now_s
+        self.tell()
+
+    def _grip(self, goal):
+        time.sleep(0.05)
+        met = goal.command.position < 0.05
+        self._gripper.set_succeeded(GripperCommandResult(max(0.05, goal.command.position), 10.0, met, not met))
+
+
+class Person:
+    """A front end of one operator for one interface."""
+
+    def __init__(self, server, operator='ann'):
+        self.server = server
+        self.operator = operator
+        self.states = []
+        self._seq = 0
+        self._publisher = rospy.Publisher(server + '/command', TeleopCommand, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber(server + '/state', TeleopState, self.states.append, queue_size=100, tcp_nodelay=True)
+        self._link = GoalLink(rospy.resolve_name(server), SharedAutonomyAction)
+        self.finish = rospy.ServiceProxy(server + '/finish', FinishInterface)
+        self.give_up = rospy.ServiceProxy(server + '/give_up', GiveUpInterface)
+        assert wait_for(lambda: self._link.ready() and self._publisher.get_num_connections())
+
+    def start(self, state='PICK', query_id='q1', userdata=None):
+        """Send a goal; the sent goal."""
+        return self._link.send(SharedAutonomyGoal(
+            query_id=query_id, container_path='SM', state=state, interface='manipulation',
+            userdata=encode_all(userdata or {}), outcomes=['succeeded', 'aborted'], output_keys=['grasp', 'note']),
+            time.monotonic())
+
+    def active(self, query_id='q1'):
+        return wait_for(lambda: self.states and self.states[-1].query_id == query_id)
+
+    def send(self, linear=(0, 0, 0), angular=(0, 0, 0), frame='base_footprint', arm='right', held=True, **more):
+        """Send one command; its seq."""
+        self._seq += 1
+        self._publisher.publish(TeleopCommand(
+            header=Header(frame_id=frame), operator=self.operator, seq=self._seq, arm=arm, dead_man=held,
+            twist=Twist(Vector3(*linear), Vector3(*angular)), **more))
+        return self._seq
+
+    def answer(self, seq):
+        """The first state that tells of a command."""
+        return wait_for(lambda: next((state for state in list(self.states) if state.seq == seq), None))
+
+    def hold(self, seconds, rate_hz=30.0, **command):
+        """Send a command again and again; monotonic times of the first and the last."""
+        begun_s = time.monotonic()
+        while time.monotonic() < begun_s + seconds:
+            sent_s = time.monotonic()
+            self.send(**command)
+            time.sleep(1.0 / rate_hz)
+        return begun_s, sent_s
+
+    def tool(self):
+        """(3,) m, where the tool was last said to be."""
+        at = self.states[-1].tool_pose.position
+        return np.array([at.x, at.y, at.z])
+
+
+def result_of(sent, limit_s=10.0):
+    """The end of a goal: (status, result)."""
+    event = wait_for(lambda: _ended(sent), limit_s)
+    return (event.status, event.result) if event else (None, None)
+
+
+def _ended(sent):
+    event = sent.poll()
+    return event if event is not None and event.status else None
