@@ -1,4 +1,4 @@
-"""Links of a URDF that cannot move against each other, made one: physics with a third of the bodies is twice as fast."""
+"""Links of a URDF that cannot move against each other, made one: physics is three times as fast then."""
 import xml.etree.ElementTree as ElementTree
 from typing import Dict, Tuple
 

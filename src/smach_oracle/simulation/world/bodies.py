@@ -3,7 +3,7 @@ import math
 import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Any, Dict, List, NamedTuple, Sequence
 
 import numpy as np
 import pybullet
@@ -24,7 +24,7 @@ class SceneError(ValueError):
 class Placed(NamedTuple):
     """A body that stands in the world."""
 
-    index: int  # in the physics client
+    number: int  # in the physics client
     body: Body
     links: Dict[str, int]  # by name; -1 is the root
     joints: Dict[str, int]  # by name
@@ -46,8 +46,9 @@ def check_scene(scene: Scene) -> None:
                          ('robot.drive_error', scene.robot.drive_error), ('sensor', scene.sensor)):
         if not _finite(values):
             raise SceneError('{} is {}; allowed: finite numbers'.format(name, tuple(values)))
-    if min(scene.sensor.noise, scene.sensor.brightness, scene.sensor.colour_noise, *scene.robot.drive_error) < 0 or not (
-            0 <= scene.sensor.dropout <= 1):
+    sensor = scene.sensor
+    least = min(sensor.noise, sensor.brightness, sensor.colour_noise, *scene.robot.drive_error)
+    if least < 0 or not 0 <= sensor.dropout <= 1:
         raise SceneError('sensor {} or drive_error {}: a negative value, or a dropout outside 0 to 1'.format(
             tuple(scene.sensor), scene.robot.drive_error))
 
@@ -95,6 +96,8 @@ def add_body(client: int, body: Body) -> Placed:
 
 
 def _create(client: int, body: Body, turn: Sequence[float]) -> int:
+    solid: Dict[str, Any] = {}
+    seen: Dict[str, Any] = {}
     if body.shape == 'box':
         half = [extent / 2 for extent in body.size]
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
@@ -134,10 +137,10 @@ def _set_joints(client: int, placed: Placed) -> None:
             raise SceneError('body {!r}: no joint {!r}; there: {}'.format(
                 placed.body.name, name, ', '.join(placed.joints) or 'none'))
     for name, joint in placed.joints.items():
-        pybullet.setJointMotorControl2(placed.index, joint, pybullet.VELOCITY_CONTROL, targetVelocity=0.0,
+        pybullet.setJointMotorControl2(placed.number, joint, pybullet.VELOCITY_CONTROL, targetVelocity=0.0,
                                        force=friction.get(name, 0.0), physicsClientId=client)
         if name in start:
-            pybullet.resetJointState(placed.index, joint, start[name], physicsClientId=client)
+            pybullet.resetJointState(placed.number, joint, start[name], physicsClientId=client)
 
 
 def _finite(values: Sequence[float]) -> bool:

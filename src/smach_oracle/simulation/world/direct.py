@@ -5,8 +5,9 @@ import numpy as np
 
 from ..robot.interface import Frame, GripperState, RobotError
 from .camera import see
-from .motions import Drive, Gripper, Head, Motion, Result, Torso, Trajectory, run
+from .motions import Drive, Gripper, Head, Torso
 from .physics import World
+from .trajectory import Motion, Result, Trajectory, run
 
 
 class DirectRobot:

@@ -46,7 +46,7 @@ class World:
         check_scene(scene)
         client = pybullet.connect(pybullet.DIRECT)
         try:
-            robot, placed = self._build(client, scene)
+            floor, robot, placed = self._build(client, scene)
             disturbances = Disturbances(scene, robot)
         except (SceneError, pybullet.error):
             pybullet.disconnect(client)
@@ -54,21 +54,21 @@ class World:
         self.close()
         self._client, self._robot, self._placed = client, robot, placed
         self.scene, self._disturbances = scene, disturbances
-        self._names = {robot.index: 'robot', self._floor: 'floor'}
-        self._names.update({each.index: name for name, each in placed.items()})
+        self._names = {robot.index: 'robot', floor: 'floor'}
+        self._names.update({each.number: name for name, each in placed.items()})
         self._periods_before += self.periods
         self.periods = self.drives = self.frames = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
         self.step(SETTLING)
         self.happened('start')
 
-    def _build(self, client: int, scene: Scene) -> Tuple[Pr2Body, Dict[str, Placed]]:
+    def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, Placed]]:
         pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=50, deterministicOverlappingPairs=1,
                                            physicsClientId=client)
-        self._floor = add_floor(client)
+        floor = add_floor(client)
         robot = Pr2Body(client, scene.robot)
-        return robot, {body.name: add_body(client, body) for body in scene.bodies}
+        return floor, robot, {body.name: add_body(client, body) for body in scene.bodies}
 
     def close(self) -> None:
         """Free the physics client; reset() makes another."""
@@ -200,20 +200,21 @@ class World:
         """
         placed = self._find(name)
         if link not in placed.links:
-            raise ValueError('no link {!r} in {!r}; there: {}'.format(link, name, ', '.join(filter(None, placed.links))))
+            raise ValueError('no link {!r} in {!r}; there: {}'.format(
+                link, name, ', '.join(filter(None, placed.links))))
         if link:
-            state = pybullet.getLinkState(placed.index, placed.links[link], computeForwardKinematics=True,
+            state = pybullet.getLinkState(placed.number, placed.links[link], computeForwardKinematics=True,
                                           physicsClientId=self._client)
             return pose_of(state[4], state[5])
-        pose = pybullet.getBasePositionAndOrientation(placed.index, physicsClientId=self._client)
+        pose = pybullet.getBasePositionAndOrientation(placed.number, physicsClientId=self._client)
         if placed.body.shape != 'urdf':
             return pose_of(*pose)
-        inertial = pybullet.getDynamicsInfo(placed.index, -1, physicsClientId=self._client)
+        inertial = pybullet.getDynamicsInfo(placed.number, -1, physicsClientId=self._client)
         return pose_of(*pose) @ inverse(pose_of(inertial[3], inertial[4]))
 
     def body_speed(self, name: str) -> Tuple[float, float]:
         """m/s and rad/s of a body."""
-        linear, angular = pybullet.getBaseVelocity(self._find(name).index, physicsClientId=self._client)
+        linear, angular = pybullet.getBaseVelocity(self._find(name).number, physicsClientId=self._client)
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
 
     def body_joint(self, name: str, joint: str) -> float:
@@ -221,18 +222,18 @@ class World:
         placed = self._find(name)
         if joint not in placed.joints:
             raise ValueError('no joint {!r} in {!r}; there: {}'.format(joint, name, ', '.join(placed.joints) or 'none'))
-        position: float = pybullet.getJointState(placed.index, placed.joints[joint], physicsClientId=self._client)[0]
+        position: float = pybullet.getJointState(placed.number, placed.joints[joint], physicsClientId=self._client)[0]
         return position
 
     def set_body_velocity(self, name: str, x: float, y: float) -> None:
         """Push a body over what it stands on, at m/s; gravity and contacts go on."""
         placed = self._find(name)
-        linear, angular = pybullet.getBaseVelocity(placed.index, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(placed.index, [x, y, linear[2]], angular, physicsClientId=self._client)
+        linear, angular = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], angular, physicsClientId=self._client)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""
-        index = self._robot.index if name == 'robot' else self._find(name).index
+        index = self._robot.index if name == 'robot' else self._find(name).number
         found = []
         for point in pybullet.getContactPoints(bodyA=index, physicsClientId=self._client):
             if point[8] <= 0:
@@ -256,7 +257,7 @@ class World:
     def _link_name(self, index: int, link: int) -> str:
         links = self._robot.links if index == self._robot.index else {}
         for placed in self._placed.values():
-            if placed.index == index:
+            if placed.number == index:
                 links = placed.links
         return next((name for name, number in links.items() if number == link), '')
 

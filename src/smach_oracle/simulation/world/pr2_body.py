@@ -1,7 +1,7 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
 import math
 import xml.etree.ElementTree as ElementTree
-from typing import Dict, List, Optional
+from typing import Collection, Dict, List, Optional
 
 import numpy as np
 import pybullet
@@ -152,7 +152,7 @@ class Pr2Body:
         self._rates[moving] = 0.0
         self._changed = set(moving)
 
-    def _send(self, numbers: List[int], left: int) -> None:
+    def _send(self, numbers: Collection[int], left: int) -> None:
         """Give the motors their targets, with `left` steps of the period to go."""
         if not numbers:
             return
