@@ -184,7 +184,7 @@ class InLockStep(unittest.TestCase):
         for step in range(1, 31):
             state = ann.answer(ann.send(linear=(0.0, 0.0, 0.06)))
             self.assertEqual((state.refused, state.limit), ('', ''))
-            self.assertLess(np.linalg.norm(ann.tool() - begin - [0.0, 0.0, 0.002 * step]), 5e-4)  # a quarter of a period
+            self.assertLess(np.linalg.norm(ann.tool() - begin - [0.0, 0.0, 0.002 * step]), 5e-4)
             if step % 10 == 0:
                 time.sleep(0.2)
         state = ann.answer(ann.send(move_gripper=True, gripper=0.0))
