@@ -21,6 +21,7 @@ from smach_oracle.oracle.question import AnswerKind  # noqa: E402
 from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
 
 SHARED = '/shared/expert_query'
+EXIT_S = 6.0  # in which a node ends after SIGINT; roslaunch would kill it after 15
 RULES = """
 PICK:
   - {kind: goto, state: DETECT, delay_s: 0.4, why: look again}
@@ -94,13 +95,13 @@ class TestExpertFaults(unittest.TestCase):
         client = self.client('/nowhere/expert_query')
         begun_s = time.monotonic()
         asked = self.ask(client, deadline_s=0.5)
-        self.assertTrue(asked.wait(5.0))
+        self.assertTrue(asked.wait(15.0))
         self.assertIsNone(asked.answer)
         self.assertGreater(asked.returned_s - begun_s, 0.45)
         taken_back = Asked(client, make_question('taken back'))
         self.assertFalse(taken_back.wait(0.2))
         taken_back.cancelled.set()
-        self.assertTrue(taken_back.wait(1.0))
+        self.assertTrue(taken_back.wait(5.0))
 
     def test_a_question_whose_server_dies_for_good_ends_by_its_deadline(self):
         server = self.server()
@@ -108,7 +109,7 @@ class TestExpertFaults(unittest.TestCase):
         asked = self.ask(self.client(), deadline_s=4.0)
         self.assertIsNotNone(wait_for_question(ann, 15.0))
         server.kill()
-        self.assertTrue(asked.wait(8.0))
+        self.assertTrue(asked.wait(20.0))
         self.assertIsNone(asked.answer)
         with self.assertRaisesRegex(ServerGoneError, '/shared/expert_query/answer cannot be reached'):
             ann._servers[SHARED].answer('q', goto())
@@ -127,7 +128,7 @@ class TestExpertFaults(unittest.TestCase):
         with self.assertRaisesRegex(ServerGoneError, 'does not answer'):
             ann.answer(listed, goto('PICK'))
         ann.stop()
-        self.assertLess(time.monotonic() - begun_s, 2.5)
+        self.assertLess(time.monotonic() - begun_s, 4.0)
         server.thaw()
         self.assertTrue(asked.wait(), 'the answer that hung arrives after all')
         self.assertEqual(asked.answer.state, 'DETECT')
@@ -144,7 +145,7 @@ class TestExpertFaults(unittest.TestCase):
             self.assertTrue(wait_for(lambda: any(each.holder for each in ann.questions()), 15.0))
         server.freeze()
         time.sleep(0.5)
-        self.assertLess(expert.interrupt(), 4.0)
+        self.assertLess(expert.interrupt(), EXIT_S)
 
     def test_the_question_of_a_killed_robot_is_closed(self):
         self.server()
@@ -166,7 +167,7 @@ class TestExpertFaults(unittest.TestCase):
         ann = self.front_end()
         self.ask(self.client())
         self.assertIsNotNone(wait_for_question(ann, 15.0))
-        self.assertLess(server.interrupt(), 3.0)
+        self.assertLess(server.interrupt(), EXIT_S)
 
     def test_a_robot_that_waits_for_an_answer_ends_quickly_on_ctrl_c(self):
         self.server()
@@ -174,7 +175,7 @@ class TestExpertFaults(unittest.TestCase):
         asker = Process.role('ask', SHARED, self.id())
         self.addCleanup(asker.kill)
         self.assertIsNotNone(wait_for_question(ann, 15.0))
-        self.assertLess(asker.interrupt(), 3.0)
+        self.assertLess(asker.interrupt(), EXIT_S)
 
     def test_a_scripted_expert_answers_by_its_rules(self):
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as rules:
@@ -194,7 +195,7 @@ class TestExpertFaults(unittest.TestCase):
         ignored = Asked(client, make_question('third', failed_state='PLACE', deadline_s=1.0))
         self.assertTrue(ignored.wait())
         self.assertIsNone(ignored.answer)
-        self.assertLess(expert.interrupt(), 3.0)
+        self.assertLess(expert.interrupt(), EXIT_S)
 
 
 if __name__ == '__main__':

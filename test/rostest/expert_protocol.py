@@ -151,7 +151,7 @@ class TestExpertProtocol(unittest.TestCase):
         asked.cancelled.set()
         self.assertTrue(asked.wait())
         self.assertIsNone(asked.answer)
-        self.assertLess(asked.returned_s - begun_s, 0.3)
+        self.assertLess(asked.returned_s - begun_s, 2.0)
         self.assertTrue(wait_for(lambda: self.listed(self.ann) is None))
         self.assertIn('taken back by the asker', self.ann.answer(listed, goto()).message)
 

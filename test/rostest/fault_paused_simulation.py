@@ -69,7 +69,7 @@ class PausedSimulationTest(unittest.TestCase):
         began = time.monotonic()
         task.signal(signal.SIGINT)
         task.wait()
-        self.assertLess(time.monotonic() - began, 4.0)  # 2 s, on a machine that has nothing else to do
+        self.assertLess(time.monotonic() - began, 6.0)  # 2 s, on a machine that has nothing else to do
         self.assertIn('OUTCOME preempted', task.output())
 
 
