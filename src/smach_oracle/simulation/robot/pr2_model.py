@@ -17,9 +17,10 @@ import numpy as np
 
 from .rigid_links import inertia_of, merge_rigid_links, set_inertia
 
-MENDED = 1  # raise it when what is derived here changes: it names the cache's folder
+MENDED = 2  # raise it when what is derived here changes: it names the cache's folder
 BASE_JOINTS = ('base_x', 'base_y', 'base_theta')  # of the mobile model: m, m, rad in the world
 JAW_OPEN = 0.045  # m, each finger from its closed place
+JAW_SHIFT = 0.00187  # m outwards, of each closed finger: as they are, the tips are within each other
 LIGHT = 1e-3  # kg, of a link that has no mass
 LEAST_INERTIA = 1e-6  # kg m2
 TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
@@ -157,7 +158,10 @@ def _mend_joint(joint: ElementTree.Element) -> None:
     name = joint.get('name', '')
     if name.endswith(('gripper_l_finger_joint', 'gripper_r_finger_joint')):
         joint.set('type', 'prismatic')
-        _child(joint, 'axis').set('xyz', '0 1 0' if 'l_finger' in name else '0 -1 0')
+        side = 1 if 'l_finger' in name else -1
+        x, y, z = (float(value) for value in _child(joint, 'origin').get('xyz', '0 0 0').split())
+        _child(joint, 'origin').set('xyz', '{} {} {}'.format(x, y + side * JAW_SHIFT, z))
+        _child(joint, 'axis').set('xyz', '0 {} 0'.format(side))
         _child(joint, 'limit').attrib.update(lower='0', upper=str(JAW_OPEN), effort='200', velocity='0.1')
         _child(joint, 'dynamics').set('damping', '10')
     elif name.endswith(('finger_tip_joint', 'parallel_root_joint')):

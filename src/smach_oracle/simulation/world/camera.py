@@ -1,6 +1,6 @@
 """The head camera: colour and depth from PyBullet's software renderer, with the errors of a depth camera."""
 import math
-from typing import Dict, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 import pybullet
@@ -37,13 +37,22 @@ class View:
         width, height = size
         eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3, 2], -world_from_camera[:3, 1]
         matrix = pybullet.computeViewMatrix(eye.tolist(), (eye + forward).tolist(), up.tolist())
-        projection = pybullet.computeProjectionMatrixFOV(field_of_view, width / height, NEAR, FAR)
+        projection = _projection(size, field_of_view)
         image = pybullet.getCameraImage(width, height, matrix, projection, renderer=pybullet.ER_TINY_RENDERER,
                                         physicsClientId=world.client, **dict(LIGHT, **light))
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
         self.depth = FAR * NEAR / (FAR - (FAR - NEAR) * buffer)  # m along the optical axis; FAR where there is nothing
         self.bodies = np.asarray(image[4], int).reshape(height, width)  # numbers in the client, -1 for none
+
+
+def _projection(size: Tuple[int, int], field_of_view: float) -> List[float]:
+    """So that the axis goes through the middle between the pixels' centres: the renderer takes corners for centres."""
+    width, height = size
+    pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
+    matrix: List[float] = pybullet.computeProjectionMatrix(
+        -(width - 1) / 2 * pixel, (width + 1) / 2 * pixel, -(height - 1) / 2 * pixel, (height + 1) / 2 * pixel, NEAR, FAR)
+    return matrix
 
 
 def see(world: World) -> Frame:
