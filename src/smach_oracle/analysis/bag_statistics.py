@@ -65,10 +65,9 @@ def _write_files(args: argparse.Namespace, found: Trials, groups: List[grouping.
 def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> None:
     from .figure import save_time_series  # matplotlib takes a second: only where it is wanted
     stem = re.sub(r'\.(svg|png)$', '', args.figure)
-    experiments = sorted({trial.experiment for trial in trials})
-    for experiment in experiments:
-        suffix = '' if len(experiments) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]', '_', experiment)
-        chosen = [trial for trial in trials if trial.experiment == experiment]
+    series = grouping.time_series(trials)
+    for told, chosen in series:
+        suffix = '' if len(series) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_', '_'.join(told)).strip('_')
         for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
 

@@ -92,6 +92,27 @@ def find_arms(trials: Sequence[TrialSummary]) -> List[Arm]:
     return arms
 
 
+def time_series(trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
+    """Trials for a figure each: one replicate of one oracle, with the trials without oracle of its place in order.
+
+    Returns with each what tells it from the others: experiment, oracle, replicate, as far as there are several.
+    """
+    series = []
+    arms = find_arms(trials)
+    for experiment in sorted({arm.experiment for arm in arms}):
+        mine = [arm for arm in arms if arm.experiment == experiment]
+        beside = [part for arm in mine if arm.recovers is False for part in arm.replicates()]
+        with_oracle = [(arm.name, arm.replicates()) for arm in mine if arm.recovers is not False]
+        for name, parts in with_oracle or [('', [()] * len(beside))]:
+            for number, part in enumerate(parts):
+                told = ((experiment,) if len({arm.experiment for arm in arms}) > 1 else ()) + (
+                    (name,) if len(with_oracle) > 1 else ()) + (
+                    ('replicate', str(number)) if len(parts) > 1 else ())
+                without = beside[number] if number < len(beside) else ()
+                series.append((told, tuple(part) + tuple(without)))
+    return series
+
+
 def _settings_key(trial: TrialSummary) -> Tuple[Tuple[str, float, str], ...]:
     """Numbers in the order of their size, everything else in that of the alphabet."""
     return tuple((key, value, '') if isinstance(value, (int, float)) else (key, 0.0, str(value))

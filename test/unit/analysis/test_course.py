@@ -38,7 +38,8 @@ def test_the_same_trials_at_other_times_are_the_same(tmp_path, capsys):
 def test_a_trial_that_went_another_way_is_named_with_its_first_difference(tmp_path, capsys):
     failing = next(seed for seed in range(100) if FakeMachine(lambda event: None, False).run(seed) == 'aborted')
     fine = next(seed for seed in range(100) if FakeMachine(lambda event: None, False).run(seed) == 'succeeded')
-    folders = [record(tmp_path / 'a', [7, 8], plays=[fine, fine]), record(tmp_path / 'b', [7, 8], plays=[fine, failing])]
+    folders = [record(tmp_path / name, [7, 8], plays=plays) for name, plays in (('a', [fine, fine]),
+                                                                                 ('b', [fine, failing]))]
     assert course.main(folders) == course.NOT_THE_SAME
     out = capsys.readouterr().out
     assert out.startswith('seed 8, with oracle: step ') and "'succeeded'" in out and "'aborted'" in out

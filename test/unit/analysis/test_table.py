@@ -9,7 +9,7 @@ import pytest
 from smach_oracle.analysis import table
 from smach_oracle.analysis.bag_events import Cause, Skipped
 from smach_oracle.analysis.groups import (ANSWERED, NOT_ANSWERED, QUESTIONS, RECOVERIES, TRUE_SUCCESS, find_arms,
-                                          make_groups)
+                                          make_groups, time_series)
 from smach_oracle.analysis.intervals import replicate_interval, t_quantile, wilson_interval
 from smach_oracle.analysis.trials import Ending, TrialSummary
 from smach_oracle.analysis.truth import Truth
@@ -180,6 +180,21 @@ def test_oracles_of_other_settings_are_other_arms():
                       for number, memory in enumerate((10, 2, 10))] + [trial(3, recovers=False)])
     assert [(arm.name, len(arm.trials)) for arm in arms] == [
         ('with oracle, memory 2', 1), ('with oracle, memory 10', 2), ('without oracle', 1)]
+
+
+def test_each_replicate_of_each_oracle_has_a_figure_with_the_arm_without_beside_it():
+    def place(arm, replicate, number, **fields):
+        return trial(number, bags=('/{}/replicate_{}/{}.bag'.format(arm, replicate, number),), **fields)
+    without = [place('without', replicate, 0, recovers=False) for replicate in range(2)]
+    one = [place('with', replicate, 1, settings=(('memory', 2),)) for replicate in range(2)]
+    other = [place('with_other', 0, 2, settings=(('memory', 10),))]
+    assert time_series(without + one + other) == [
+        (('with oracle, memory 2', 'replicate', '0'), (one[0], without[0])),
+        (('with oracle, memory 2', 'replicate', '1'), (one[1], without[1])),
+        (('with oracle, memory 10',), (other[0], without[0]))]
+    assert time_series([one[0], without[0]]) == [((), (one[0], without[0]))]
+    assert time_series(without[:1]) == [((), (without[0],))]
+    assert [told for told, _ in time_series([one[0], trial(3, experiment='DRINK')])] == [('DRINK',), ('PICK_AND_PLACE',)]
 
 
 def test_csv_and_json_tell_seed_cause_and_truth():
