@@ -6,5 +6,5 @@ from setuptools import find_packages, setup
 setup(**generate_distutils_setup(
     packages=find_packages('src', include=['smach_oracle', 'smach_oracle.*']),
     package_dir={'': 'src'},
-    package_data={'': ['*.yaml']},
+    package_data={'': ['*.yaml', 'static/*.*', 'static/js/*.js']},
 ))

@@ -73,7 +73,7 @@ class FrontEnd:
         :raises ServerGoneError: if its server cannot be reached.
         """
         action = ClaimQueryRequest.TAKE_OVER if take_over else ClaimQueryRequest.CLAIM
-        response = self._server(listed).claim(listed.goal.query_id, self.expert, action, self._lease_s)
+        response = self.server(listed).claim(listed.goal.query_id, self.expert, action, self._lease_s)
         if response.ok:
             self._held[listed.key] = listed
         return response
@@ -83,7 +83,7 @@ class FrontEnd:
         if self._held.pop(listed.key, None) is None:
             return
         try:
-            self._server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RELEASE)
+            self.server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RELEASE)
         except ServerGoneError as err:
             rospy.logdebug('A claim was not given back: %s', err)
 
@@ -93,7 +93,7 @@ class FrontEnd:
         :raises ServerGoneError: if its server cannot be reached; the same answer may be sent again.
         """
         decision.by = self.expert
-        response = self._server(listed).answer(listed.goal.query_id, decision)
+        response = self.server(listed).answer(listed.goal.query_id, decision)
         if response.ok:
             self._held.pop(listed.key, None)
         return response
@@ -112,7 +112,8 @@ class FrontEnd:
         for server in list(self._servers.values()):
             server.stop()
 
-    def _server(self, listed: Listed) -> FollowedServer:
+    def server(self, listed: Listed) -> FollowedServer:
+        """The server of a question, for front ends that serve several experts and keep their claims themselves."""
         return self._servers[listed.server]
 
     def _follow(self, name: str) -> None:
@@ -150,7 +151,7 @@ class FrontEnd:
     def _renew(self, listed: Listed) -> None:
         """Renew a claim; forget it where it is lost, keep trying where the server only cannot be reached."""
         try:
-            response = self._server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RENEW,
+            response = self.server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RENEW,
                                                   self._lease_s)
         except ServerGoneError as err:
             rospy.logdebug('A claim was not renewed: %s', err)

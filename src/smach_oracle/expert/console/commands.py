@@ -1,0 +1,171 @@
+"""The closed set of what a browser may say, and the check of every bit of it. Pure.
+
+A command is a JSON object {"id": number, "do": name, ...arguments}. No argument is ever the name of a topic, a service
+or a type to call: questions are named by their keys, and must be open ones.
+"""
+import json
+import math
+from typing import Any, Callable, Dict, List, NamedTuple, Tuple
+
+from ...oracle.errors import OracleError
+
+MOST_BYTES = 65536
+_MOST_OUTPUTS = 64
+_DEEPEST = 32
+KINDS = ('goto', 'supersede', 'give_up', 'interface')
+
+Check = Callable[[Any], Any]
+
+
+class BadCommand(OracleError):
+    """Something that is no command; the text says what is allowed. `number` is its id, 0 where it has none."""
+
+    def __init__(self, text: str, number: int = 0) -> None:
+        super().__init__(text)
+        self.number = number
+
+
+class Output(NamedTuple):
+    """A value for the userdata, as typed by a person."""
+
+    key: str
+    value: Any  # plain data
+    type: str  # '' for plain data, else the ROS message type that the value spells out
+
+
+class Command(NamedTuple):
+    """A command that has the right form."""
+
+    number: int
+    name: str
+    arguments: Dict[str, Any]
+
+
+def parse(text: Any) -> Command:
+    """Check one message of a browser.
+
+    :raises BadCommand: saying what is wrong, and what is allowed.
+    """
+    data = _decode(text)
+    number = data.pop('id', None)
+    if not _is_count(number):
+        raise BadCommand('"id" must be a whole number from 1')
+    name = data.pop('do', None)
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise BadCommand('there is no command {}; allowed: {}'.format(_shown(name), ', '.join(sorted(COMMANDS))),
+                         number)
+    checks = COMMANDS[name].checks
+    unknown = sorted(set(data) - set(checks))
+    if unknown:
+        raise BadCommand('{} takes no {}'.format(name, _shown(unknown[0])), number)
+    try:
+        return Command(number, name, {field: check(data.get(field)) for field, check in checks.items()})
+    except ValueError as err:
+        raise BadCommand('{}: {}'.format(name, err), number) from err
+
+
+def needed_role(name: str) -> str:
+    """The least role that may give a command."""
+    return COMMANDS[name].role
+
+
+def _decode(text: Any) -> Dict[str, Any]:
+    if not isinstance(text, str):
+        raise BadCommand('commands are text')
+    if len(text) > MOST_BYTES:
+        raise BadCommand('a command has at most {} bytes'.format(MOST_BYTES))
+    try:
+        data = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as err:
+        raise BadCommand('not JSON: {}'.format(err)) from err
+    if not isinstance(data, dict):
+        raise BadCommand('a command is a JSON object')
+    return data
+
+
+def _refuse(name: str) -> float:
+    raise ValueError('{} is not a JSON number'.format(name))
+
+
+def _text(longest: int, least: int = 0) -> Check:
+    def check(value: Any) -> str:
+        if value is None and not least:
+            return ''
+        if not isinstance(value, str) or not least <= len(value) <= longest:
+            raise ValueError('{} is not allowed; allowed: text of {} to {} characters'.format(
+                _shown(value), least, longest))
+        if any(ord(character) < 32 and character not in '\n\t' for character in value):
+            raise ValueError('control characters are not allowed')
+        return value.encode('utf-8', 'replace').decode('utf-8')
+    return check
+
+
+def _person(value: Any) -> str:
+    name = ' '.join(_text(60)(value).split())
+    if not name.isprintable():
+        raise ValueError('a name is made of printable characters')
+    return name
+
+
+def _one_of(allowed: Tuple[str, ...]) -> Check:
+    def check(value: Any) -> str:
+        if value not in allowed:
+            raise ValueError('{} is not allowed; allowed: {}'.format(_shown(value), ', '.join(allowed)))
+        return str(value)
+    return check
+
+
+def _outputs(value: Any) -> List[Output]:
+    if value is None:
+        return []
+    if not isinstance(value, list) or len(value) > _MOST_OUTPUTS:
+        raise ValueError('"outputs" is a list of at most {} values'.format(_MOST_OUTPUTS))
+    outputs = [_output(each) for each in value]
+    if len({output.key for output in outputs}) < len(outputs):
+        raise ValueError('an output comes twice')
+    return outputs
+
+
+def _output(value: Any) -> Output:
+    if not isinstance(value, dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
+        raise ValueError('an output is {"key": ..., "value": ..., "type": ...}')
+    _check_depth(value['value'])
+    return Output(_text(200, 1)(value['key']), value['value'], _text(200)(value.get('type')))
+
+
+def _check_depth(value: Any) -> None:
+    waiting = [(value, 0)]
+    while waiting:
+        item, depth = waiting.pop()
+        if depth > _DEEPEST:
+            raise ValueError('an output is nested deeper than {}'.format(_DEEPEST))
+        if isinstance(item, float) and not math.isfinite(item):
+            raise ValueError('an output holds a number that is too large')
+        children = item.values() if isinstance(item, dict) else item if isinstance(item, list) else ()
+        waiting += [(child, depth + 1) for child in children]
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 < value < 2 ** 53
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:60] + '…'
+
+
+class _Spec(NamedTuple):
+    role: str
+    checks: Dict[str, Check]
+
+
+_QUESTION = {'question': _text(1000, 1)}
+COMMANDS = {
+    'hello': _Spec('viewer', {'xsrf': _text(200, 1), 'expert': _person}),
+    'watch': _Spec('viewer', {'trial': _text(400)}),
+    'claim': _Spec('operator', _QUESTION),
+    'take_over': _Spec('operator', _QUESTION),
+    'release': _Spec('operator', _QUESTION),
+    'answer': _Spec('operator', dict(_QUESTION, kind=_one_of(KINDS), name=_text(400), outputs=_outputs,
+                                     why=_text(2000))),
+}

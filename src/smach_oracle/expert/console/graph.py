@@ -1,0 +1,161 @@
+"""The graph of one container: what it is made of, how dot is asked to lay it out, and the drawing for the page. Pure.
+
+ORACLE is left out of the layout: with one edge from and one to every state it would pull all others to itself. The page
+draws it beside the rest, and its edges as thin curves.
+"""
+import json
+from collections import Counter
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Tuple
+
+MOST_STATES = 500  # of a container; more are not drawn
+MOST_EDGES = 3000
+_CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 7.6, 34.0, 112.0, 300.0, 46.0  # of a state's box, in pixels
+_PIXELS_PER_INCH = 72.0
+
+
+class Edge(NamedTuple):
+    """One edge, by labels."""
+
+    source: str
+    outcome: str
+    target: str
+
+
+class Structure(NamedTuple):
+    """A container's states and edges."""
+
+    path: str
+    states: Tuple[str, ...]  # ORACLE not among them
+    outcomes: Tuple[str, ...]
+    edges: Tuple[Edge, ...]  # those of ORACLE not among them
+    oracle: str  # label of the meta state, '' where there is none
+
+
+class Layout(NamedTuple):
+    """Where things are, in pixels from the upper left corner."""
+
+    width: float
+    height: float
+    nodes: Dict[str, Tuple[float, float, float, float]]  # id -> centre x, y, width, height
+    edges: Dict[str, Tuple[List[Tuple[float, float]], Optional[Tuple[float, float]]]]  # id -> Bezier points, label
+
+
+def make_structure(path: str, children: Iterable[str], edges: Iterable[Edge], outcomes: Iterable[str]) -> Structure:
+    """From what an introspection server says of a container."""
+    labels = list(dict.fromkeys(children))[:MOST_STATES]
+    all_edges = list(dict.fromkeys(edges))[:MOST_EDGES]
+    oracle = find_oracle(labels, all_edges)
+    states = tuple(label for label in labels if label != oracle)
+    ends = tuple(dict.fromkeys(outcome for outcome in outcomes if outcome not in labels))
+    known = set(states) | set(ends)
+    own = tuple(edge for edge in all_edges if edge.source in states and edge.target in known)
+    return Structure(path, states, ends, own, oracle)
+
+
+def find_oracle(labels: List[str], edges: List[Edge]) -> str:
+    """The meta state: the one whose outcomes are named for where they lead, and that every other state leads to."""
+    others = set(labels)
+    for label in labels:
+        sources = {edge.source for edge in edges if edge.target == label}
+        targets = {edge.target for edge in edges if edge.source == label and edge.outcome == edge.target}
+        rest = others - {label}
+        if rest and rest <= sources and rest <= targets:
+            return label
+    return ''
+
+
+def dot_text(structure: Structure) -> str:
+    """The graph for dot. No text of a robot is in it: nodes and edges are numbered, labels are runs of x."""
+    names = _names(structure)
+    lines = ['digraph {', 'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
+             ' edge [fontsize=11];']
+    for label, name in names.items():
+        width, height = box(label) if label in structure.states else (box(label)[0] * 0.9, 30.0)
+        lines.append('{} [width={:.3f}, height={:.3f}];'.format(
+            name, width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH))
+    for number, edge in enumerate(structure.edges):
+        lines.append('{} -> {} [id=e{}, label="{}"];'.format(
+            names[edge.source], names[edge.target], number, 'x' * min(24, len(edge.outcome) + 5)))
+    return '\n'.join(lines + ['}'])
+
+
+def box(label: str) -> Tuple[float, float]:
+    """Width and height of a state's box, in pixels."""
+    return min(_WIDEST, max(_NARROWEST, len(label) * _CHARACTER + _PADDING)), _HEIGHT
+
+
+def read_layout(text: str) -> Layout:
+    """What `dot -Tjson0` says.
+
+    :raises ValueError: where it says something else.
+    """
+    try:
+        data = json.loads(text)
+        left, bottom, right, top = (float(number) for number in data['bb'].split(','))
+        nodes = {each['name']: _node(each, top) for each in data.get('objects', [])}
+        edges = {each['id']: _edge(each, top) for each in data.get('edges', [])}
+    except (KeyError, TypeError, AttributeError) as err:
+        raise ValueError('dot has written something unexpected: {!r}'.format(err)) from err
+    return Layout(right - left, top - bottom, nodes, edges)
+
+
+def drawing(structure: Structure, layout: Optional[Layout], nested: Iterable[str]) -> Dict[str, Any]:
+    """The section of a graph: plain data for the page; positions only where there is a layout.
+
+    :param nested: labels of the states that are containers themselves.
+    """
+    names = _names(structure)
+    inner = set(nested)
+    data: Dict[str, Any] = {
+        'path': structure.path, 'oracle': structure.oracle, 'drawn': layout is not None,
+        'size': [layout.width, layout.height] if layout else None,
+        'states': [{'label': label, 'nested': label in inner, 'at': _place(layout, names[label])}
+                   for label in structure.states],
+        'outcomes': [{'label': label, 'at': _place(layout, names[label])} for label in structure.outcomes],
+        'edges': []}
+    for number, edge in enumerate(structure.edges):
+        points, label = layout.edges.get('e{}'.format(number), ([], None)) if layout else ([], None)
+        data['edges'].append({'from': edge.source, 'outcome': edge.outcome, 'to': edge.target,
+                              'points': [coordinate for point in points for coordinate in point], 'label': label})
+    return data
+
+
+def _names(structure: Structure) -> Dict[str, str]:
+    labels = list(structure.states) + [outcome for outcome in structure.outcomes if outcome not in structure.states]
+    return {label: 'n{}'.format(number) for number, label in enumerate(labels)}
+
+
+def _place(layout: Optional[Layout], name: str) -> Optional[List[float]]:
+    return [round(number, 1) for number in layout.nodes[name]] if layout and name in layout.nodes else None
+
+
+def _node(data: Dict[str, Any], top: float) -> Tuple[float, float, float, float]:
+    x, y = (float(number) for number in data['pos'].split(','))
+    return x, top - y, float(data['width']) * _PIXELS_PER_INCH, float(data['height']) * _PIXELS_PER_INCH
+
+
+def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Tuple[float, float]], Optional[Tuple[float, float]]]:
+    """The spline's points, its arrow's tip at the end."""
+    tip: List[Tuple[float, float]] = []
+    points = []
+    for part in data['pos'].split():
+        if part.startswith('e,'):
+            tip = [_point(part[2:], top)]
+        elif not part.startswith('s,'):
+            points.append(_point(part, top))
+    return points + tip, _point(data['lp'], top) if 'lp' in data else None
+
+
+def _point(text: str, top: float) -> Tuple[float, float]:
+    x, y = (float(number) for number in text.split(','))
+    return round(x, 1), round(top - y, 1)
+
+
+def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
+    """Rows of [source, outcome, target, times, share of all that left the source], from times taken."""
+    rows = list(counts)
+    totals: 'Counter[str]' = Counter()
+    for source, _, _, times in rows:
+        totals[source] += times
+    return [[source, outcome, target, times, round(times / totals[source], 4)]
+            for source, outcome, target, times in rows if totals[source]]

@@ -1,0 +1,58 @@
+"""Runs dot, in a thread of its own, for graphs that have not been laid out yet."""
+import queue
+import shutil
+import subprocess
+import threading
+from collections import OrderedDict
+from typing import Callable, Optional
+
+import rospy
+
+from .graph import Layout, read_layout
+
+DOT_LIMIT_S = 20.0
+_REMEMBERED = 200
+
+Done = Callable[[], None]
+
+
+class Layouter:
+    """Layouts by the text that dot is given: the same graph is laid out once, however many robots have it."""
+
+    def __init__(self, command: str = 'dot', limit_s: float = DOT_LIMIT_S) -> None:
+        """`command`: found in PATH; without it there are no layouts, and the page shows lists."""
+        self._command = shutil.which(command)
+        self._limit_s = limit_s
+        self._layouts: 'OrderedDict[str, Optional[Layout]]' = OrderedDict()
+        self._waiting: 'queue.Queue[tuple]' = queue.Queue()
+        if self._command is None:
+            rospy.logwarn('Graphviz is not installed (no %s in PATH): state graphs are shown as lists.', command)
+        else:
+            threading.Thread(target=self._run, name='layout', daemon=True).start()
+
+    def find(self, text: str, done: Done) -> Optional[Layout]:
+        """The layout of a graph, or None where it cannot be had, or not yet: `done` is called when it is there."""
+        if text in self._layouts:
+            self._layouts.move_to_end(text)
+            return self._layouts[text]
+        if self._command is not None:
+            self._layouts[text] = None
+            self._waiting.put((text, done))
+        return None
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            text, done = self._waiting.get()
+            self._layouts[text] = self._lay_out(text)
+            while len(self._layouts) > _REMEMBERED:
+                self._layouts.popitem(last=False)
+            done()
+
+    def _lay_out(self, text: str) -> Optional[Layout]:
+        try:
+            result = subprocess.run([str(self._command), '-Tjson0'], input=text.encode(), stdout=subprocess.PIPE,
+                                    stderr=subprocess.PIPE, timeout=self._limit_s, check=True)
+            return read_layout(result.stdout.decode('utf-8', 'replace'))
+        except (OSError, ValueError, subprocess.SubprocessError) as err:
+            rospy.logwarn('dot could not lay a state graph out; it is shown as a list: %s', err)
+            return None

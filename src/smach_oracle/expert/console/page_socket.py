@@ -1,0 +1,194 @@
+"""The socket of one page: sections go out as they change, the newest version only; commands come in."""
+import asyncio
+import itertools
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Callable, Optional, Set
+
+import tornado.web
+import tornado.websocket
+
+from . import sessions
+from .access import Bucket, may
+from .audit import Person
+from .commands import BadCommand, Command, needed_role, parse
+from .desk import Desk, Reply
+from .handlers import Gate, Limits, guard
+from .sections import Sections
+from .trial_log import TrialLog
+
+MOST_SOCKETS = 64
+MOST_AT_WORK = 8
+MOST_EVENTS_AT_ONCE = 500
+RENAMED = 4001
+TOO_FAST = 4008
+FORGED = 4003
+
+
+class Office:
+    """What all sockets share."""
+
+    def __init__(self, sections: Sections, log: TrialLog, desk: Desk) -> None:
+        self.sections = sections
+        self.log = log
+        self.desk = desk
+        self.sockets: Set['Socket'] = set()
+        self.numbers = itertools.count(1)
+        self.workers = ThreadPoolExecutor(8, 'command')
+
+    def push(self) -> None:
+        """Let every page have what is new."""
+        for socket in list(self.sockets):
+            socket.push()
+
+
+class Socket(tornado.websocket.WebSocketHandler):
+    """One open page."""
+
+    def initialize(self, gate: Gate, office: Office) -> None:
+        """Called by Tornado."""
+        self._gate = gate
+        self._office = office
+        self._person: Optional[Person] = None
+        self._session: Optional[sessions.Session] = None
+        self._name = ''
+        self._number = next(office.numbers)
+        self._limits = Limits(Bucket(10.0, 40.0), Bucket(0.5, 20.0))
+        self._sent_version = 0
+        self._watched = ''
+        self._watched_from = 0
+        self._writing = False
+        self._at_work = 0
+
+    def set_default_headers(self) -> None:
+        """On every answer."""
+        guard(self)
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        """The status alone."""
+        self.finish('{} {}\n'.format(status_code, self._reason))
+
+    def prepare(self) -> None:
+        """The gate, and who it is, before the handshake."""
+        status = self._gate.refusal(self)
+        if not status and not self._gate.from_own_page(self, must_say=True):
+            status = 403
+        self._session = self._gate.session(self)
+        if not status and self._gate.identity(self._session) is None:
+            status = 401
+        if not status and len(self._office.sockets) >= MOST_SOCKETS:
+            status = 503
+        if status:
+            raise tornado.web.HTTPError(status)
+
+    def check_origin(self, origin: str) -> bool:
+        """Checked in `prepare` already."""
+        return self._gate.from_own_page(self, must_say=True)
+
+    def open(self, *_: str, **__: str) -> None:
+        """Nothing is told before the page has said hello."""
+        self.set_nodelay(True)
+
+    def on_close(self) -> None:
+        """Claims run out unless the page comes back."""
+        self._office.sockets.discard(self)
+        self._office.desk.leave(self._number)
+
+    async def on_message(self, message: Any) -> None:
+        """One command."""
+        if not self._limits.commands.take():
+            if not self._limits.unruly.take():
+                self.close(TOO_FAST, 'too many commands')
+            return
+        try:
+            command = parse(message)
+        except BadCommand as err:
+            self._note(None, Reply(False, str(err)))
+            self._reply(err.number, Reply(False, str(err)))
+            return
+        self._reply(command.number, await self._carry_out(command))
+
+    async def _carry_out(self, command: Command) -> Reply:
+        if command.name == 'hello':
+            return self._hello(command)
+        if self._person is None:
+            return Reply(False, 'say hello first')
+        if not may(self._person.role, needed_role(command.name)):
+            return self._note(command, Reply(False, 'a {} may not {}'.format(
+                self._person.role, command.name.replace('_', ' '))))
+        if command.name == 'watch':
+            self._watched, self._watched_from = command.arguments['trial'], 0
+            return self._note(command, Reply(True))
+        if self._at_work >= MOST_AT_WORK:
+            return self._note(command, Reply(False, 'too many commands at a time'))
+        return await self._work(self._person, command)
+
+    async def _work(self, person: Person, command: Command) -> Reply:
+        self._at_work += 1
+        try:
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(self._office.workers, self._office.desk.carry_out, command, person,
+                                              self._number)
+        finally:
+            self._at_work -= 1
+            if self.ws_connection is None or self.ws_connection.is_closing():  # gone while the robot was asked
+                self._office.desk.leave(self._number)
+
+    def _hello(self, command: Command) -> Reply:
+        session, identity = self._session, self._gate.identity(self._session)
+        if session is None or identity is None or not sessions.same(
+                command.arguments['xsrf'], sessions.xsrf_token(session, self._gate.secret)):
+            self._note(None, Reply(False, 'forged'))
+            self.close(FORGED, 'forged')
+            return Reply(False, 'forged')
+        name = identity.name or command.arguments['expert'] or 'operator'
+        self._person = Person(self.request.remote_ip or '', session.short, identity.role, name)
+        self._office.sockets.add(self)
+        self._note(command, Reply(True))
+        return Reply(True, name)
+
+    def _note(self, command: Optional[Command], reply: Reply) -> Reply:
+        """Tell the audit of what the desk has not seen."""
+        session = self._session.short if self._session else ''
+        person = self._person or Person(self.request.remote_ip or '', session, '', '')
+        arguments = {name: value for name, value in command.arguments.items() if name != 'xsrf'} if command else {}
+        self._gate.audit.tell(person, command.name if command else 'unknown', reply.ok, reply.message, arguments)
+        return reply
+
+    def _reply(self, number: int, reply: Reply) -> None:
+        self._send(json.dumps({'re': number, 'ok': reply.ok, 'message': reply.message}))
+
+    def push(self) -> None:
+        """Send what has changed, unless the last batch is still on its way: a slow link never builds up lag."""
+        if self._writing or self._person is None:
+            return
+        version, changed = self._office.sections.since(self._sent_version)
+        events = self._office.log.events(self._watched, self._watched_from) if self._watched else None
+        new = events.events[:MOST_EVENTS_AT_ONCE] if events else []
+        if not changed and not new:
+            return
+        parts = ['"now":{:.3f}'.format(time.time())]
+        if changed:
+            parts.append('"sections":{%s}' % ','.join('{}:{}'.format(json.dumps(name), text)
+                                                      for name, text in changed))
+        if new:
+            parts.append('"events":{}'.format(json.dumps(
+                {'trial': self._watched, 'from': self._watched_from, 'events': new}, allow_nan=False)))
+        self._sent_version = version
+        self._watched_from += len(new)
+        self._writing = True
+        self._send('{%s}' % ','.join(parts), self._written)
+
+    def _written(self) -> None:
+        self._writing = False
+
+    def _send(self, text: str, done: Optional[Callable[[], None]] = None) -> None:
+        async def send() -> None:
+            try:
+                await self.write_message(text)
+            except (tornado.websocket.WebSocketClosedError, tornado.iostream.StreamClosedError):
+                pass
+            if done is not None:
+                done()
+        asyncio.get_running_loop().create_task(send())

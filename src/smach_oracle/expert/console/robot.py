@@ -1,0 +1,134 @@
+"""One robot as its topics tell of it: containers, what is active, what was learned; drawn into sections."""
+import threading
+from typing import Any, Dict, List, Optional
+
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+
+from smach_oracle.msg import OracleEvent, OracleRates
+
+from .graph import Edge, Structure, dot_text, drawing, make_structure, shares
+from .layout import Layouter
+from .sections import Sections
+from .views import number, rates_view
+
+MOST_CONTAINERS = 200
+_LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP, OracleEvent.TRIAL_END)
+
+
+class Robot:
+    """Fed by ROS threads; `draw` is called by one thread."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.changed = True
+        self.alive = True
+        self._reshaped = True
+        self._lock = threading.Lock()
+        self._structures: Dict[str, Structure] = {}
+        self._active: Dict[str, List[str]] = {}
+        self._latest: Dict[str, List[str]] = {}  # path -> [source, target] of the transition made last
+        self._failed: Dict[str, Dict[str, Any]] = {}
+        self._rates: Dict[str, Dict[str, Dict[str, Any]]] = {}
+        self._counts: Dict[str, List[List[Any]]] = {}
+        self._trial = ''
+
+    def on_structure(self, message: SmachContainerStructure) -> None:
+        """A container's graph; most repeat what is known."""
+        path = message.path.lstrip('/')
+        edges = [Edge(*each) for each in zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)]
+        structure = make_structure(path, message.children, edges, message.container_outcomes)
+        with self._lock:
+            if self._structures.get(path) != structure and len(self._structures) < MOST_CONTAINERS:
+                self._structures[path] = structure
+                self.changed = self._reshaped = True
+
+    def on_status(self, message: SmachContainerStatus) -> None:
+        """What is active in a container."""
+        path = message.path.lstrip('/')
+        with self._lock:
+            if self._active.get(path) != message.active_states:
+                self._active[path] = list(message.active_states)
+                self.changed = True
+
+    def on_rates(self, message: OracleRates) -> None:
+        """What was learned; a message tells of one top machine."""
+        rates = rates_view(message)
+        rows: Dict[str, List[Any]] = {}
+        for row in message.transitions:
+            rows.setdefault(row.path, []).append((row.state, row.outcome, row.target, row.count))
+        with self._lock:
+            self._rates.update(rates)
+            self._counts.update({path: shares(counts) for path, counts in rows.items()})
+            self.changed = True
+            self._reshaped = self._reshaped or any(path not in self._structures for path in rates)
+
+    def on_event(self, message: OracleEvent) -> None:
+        """The path that is taken, and where it failed."""
+        with self._lock:
+            self._trial = message.trial_id
+            if message.kind == OracleEvent.TRIAL_START:
+                self._failed.clear()
+                self._latest.clear()
+            elif message.kind == OracleEvent.TRANSITION:
+                self._latest[message.path] = [message.state, message.target]
+            elif message.kind == OracleEvent.FAILURE:
+                self._failed[message.path] = {'state': message.state, 'rate': number(message.rate)}
+            elif message.kind == OracleEvent.JUMP:
+                self._latest[message.path] = ['', message.target]
+            if message.kind in _LEAVES_ORACLE or message.kind == OracleEvent.CONTAINER_END:
+                self._failed.pop(message.path, None)
+            self.changed = True
+
+    def draw(self, sections: Sections, layouter: Layouter) -> None:
+        """Write this robot's sections where something has changed."""
+        with self._lock:
+            if not self.changed:
+                return
+            self.changed = False
+            reshaped, self._reshaped = self._reshaped, False
+            structures = self._all_structures()
+            live = {'trial': self._trial, 'alive': self.alive, 'active': dict(self._active),
+                    'latest': dict(self._latest), 'failed': dict(self._failed), 'rates': dict(self._rates),
+                    'counts': dict(self._counts), 'paths': sorted(structures)}
+        sections.put('live ' + self.name, live)
+        if reshaped:
+            self._draw_graphs(structures, sections, layouter)
+
+    def _draw_graphs(self, structures: Dict[str, Structure], sections: Sections, layouter: Layouter) -> None:
+        for path, structure in structures.items():
+            nested = [label for label in structure.states if '{}/{}'.format(path, label) in structures]
+            layout = layouter.find(dot_text(structure), self._note_layout)
+            sections.put('graph {} {}'.format(self.name, path), drawing(structure, layout, nested))
+
+    def forget(self, sections: Sections) -> None:
+        """Take this robot's sections away."""
+        for path in self._all_structures():
+            sections.put('graph {} {}'.format(self.name, path), None)
+        sections.put('live ' + self.name, None)
+
+    def set_alive(self, alive: bool) -> None:
+        """Whether the master knows it now."""
+        if alive != self.alive:
+            self.alive = alive
+            self.changed = True
+
+    def _note_layout(self) -> None:
+        self.changed = self._reshaped = True
+
+    def _all_structures(self) -> Dict[str, Structure]:
+        """Those that introspection shows; without it what can be told from rates and transitions taken."""
+        found = dict(self._structures)
+        for path, rates in self._rates.items():
+            if path not in found:
+                found[path] = _guess(path, list(rates), self._counts.get(path, []))
+        return found
+
+
+def _guess(path: str, labels: List[str], counts: List[List[Any]]) -> Structure:
+    targets = {str(target) for _, _, target, _, _ in counts}
+    oracle: Optional[str] = next((str(source) for source, outcome, target, _, _ in counts
+                                  if outcome == target and source not in labels), None)
+    edges = tuple(Edge(source, outcome, target) for source, outcome, target, _, _ in counts
+                  if source in labels and target != oracle)
+    outcomes = tuple(sorted(targets - set(labels) - {oracle or ''}))
+    return Structure(path, tuple(labels), outcomes, edges, oracle or '')

@@ -1,0 +1,45 @@
+"""What the pages show, in named sections: each is sent whole, when it has changed, its newest version only. Pure."""
+import json
+import threading
+from typing import Any, Dict, List, NamedTuple, Tuple
+
+
+class _Section(NamedTuple):
+    version: int
+    text: str  # JSON; 'null' for one that is gone
+
+
+class Sections:
+    """Written by any thread, read by the one that serves the pages."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._sections: Dict[str, _Section] = {}
+        self._version = 0
+
+    @property
+    def version(self) -> int:
+        """Grows with every change."""
+        return self._version
+
+    def put(self, name: str, data: Any) -> None:
+        """Set a section to plain data without NaN; None takes it away."""
+        text = json.dumps(data, allow_nan=False, separators=(',', ':'))
+        with self._lock:
+            old = self._sections.get(name)
+            if text == (old.text if old else 'null'):
+                return
+            self._version += 1
+            self._sections[name] = _Section(self._version, text)
+
+    def get(self, name: str) -> Any:
+        """A section as it is now, None where there is none."""
+        section = self._sections.get(name)
+        return json.loads(section.text) if section else None
+
+    def since(self, version: int) -> Tuple[int, List[Tuple[str, str]]]:
+        """The version now, and name and JSON of every section that has changed since an earlier one (first: 0)."""
+        with self._lock:
+            changed = [(name, section.text) for name, section in self._sections.items() if section.version > version
+                       and (version or section.text != 'null')]
+            return self._version, changed

@@ -1,0 +1,54 @@
+"""Sessions of browsers: a signed cookie, and a token against forged requests that follows from it. No Tornado."""
+import hashlib
+import hmac
+import json
+import secrets
+from typing import NamedTuple, Optional
+
+from .access import ROLES, Identity
+
+HOURS = 12
+
+
+class Session(NamedTuple):
+    """What the cookie says."""
+
+    id: str
+    role: str = ''  # '' before signing in
+    name: str = ''
+
+    @property
+    def short(self) -> str:
+        """A name for it that gives nothing away."""
+        return hashlib.sha256(self.id.encode()).hexdigest()[:8]
+
+
+def new_session(identity: Optional[Identity] = None) -> Session:
+    """A session with an id of its own; also at signing in, so that nobody is given somebody else's."""
+    return Session(secrets.token_urlsafe(18), *(identity or Identity('')))
+
+
+def to_text(session: Session) -> str:
+    """For the cookie, which is signed by others."""
+    return json.dumps(list(session))
+
+
+def from_text(text: Optional[bytes]) -> Optional[Session]:
+    """What `to_text` has written; None for anything else."""
+    try:
+        values = json.loads(text or b'null')
+    except ValueError:
+        return None
+    if not isinstance(values, list) or len(values) != 3 or not all(isinstance(value, str) for value in values):
+        return None
+    return Session(*values) if values[1] in ROLES + ('',) else None
+
+
+def xsrf_token(session: Session, secret: str) -> str:
+    """What a page of ours knows and a page elsewhere does not."""
+    return hmac.new(secret.encode(), b'xsrf ' + session.id.encode(), hashlib.sha256).hexdigest()
+
+
+def same(one: str, other: str) -> bool:
+    """Compare in constant time."""
+    return hmac.compare_digest(one.encode('utf-8', 'backslashreplace'), other.encode('utf-8', 'backslashreplace'))

@@ -1,0 +1,147 @@
+// The connection: it comes back by itself; sections are kept while it is away.
+
+const LONGEST_PAUSE_S = 4;
+const REQUEST_LIMIT_S = 20;
+
+export class Lost extends Error {}
+
+export class Store {
+  constructor() {
+    this.sections = new Map();
+    this.listeners = [];
+    this.eventListeners = [];
+    this.offset = 0;
+  }
+
+  get(name) { return this.sections.get(name); }
+
+  // The server's clock, in seconds.
+  now() { return Date.now() / 1000 + this.offset; }
+
+  onChange(listener) { this.listeners.push(listener); }
+
+  onEvents(listener) { this.eventListeners.push(listener); }
+
+  take(message) {
+    this.offset = message.now - Date.now() / 1000;
+    const names = Object.keys(message.sections || {});
+    for (const name of names) {
+      if (message.sections[name] === null) this.sections.delete(name);
+      else this.sections.set(name, message.sections[name]);
+    }
+    if (names.length) this.listeners.forEach((listener) => listener(names));
+    if (message.events) this.eventListeners.forEach((listener) => listener(message.events));
+  }
+}
+
+// `onState` is told: connecting, signed-out, connected, lost; with what the server says of the session.
+export class Link {
+  constructor(store, onState) {
+    this.store = store;
+    this.onState = onState;
+    this.waiting = new Map();
+    this.number = 0;
+    this.pause = 0.3;
+    this.generation = 0;
+    this.session = null;
+    this.connected = false;
+    const hurry = () => { if (!this.connected && !document.hidden && this.timer) this.connect(); };
+    window.addEventListener('online', hurry);
+    document.addEventListener('visibilitychange', hurry);
+  }
+
+  async connect() {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    const generation = ++this.generation;
+    if (this.socket) this.socket.close();
+    this.onState('connecting', this.session);
+    try {
+      const answer = await fetch('session', { cache: 'no-store', signal: AbortSignal.timeout(8000) });
+      if (!answer.ok) throw new Lost();
+      const session = await answer.json();
+      if (generation !== this.generation) return;
+      this.session = session;
+    } catch (err) {
+      if (generation === this.generation) this.again();
+      return;
+    }
+    if (!this.session.signed_in) this.onState('signed-out', this.session);
+    else this.open(generation);
+  }
+
+  open(generation) {
+    const address = new URL('socket', location.href);
+    address.protocol = address.protocol.replace('http', 'ws');
+    const socket = this.socket = new WebSocket(address);
+    socket.onmessage = (event) => this.take(JSON.parse(event.data));
+    socket.onclose = () => {
+      if (generation !== this.generation) return;
+      this.fail();
+      this.again();
+    };
+    socket.onopen = async () => {
+      try {
+        const reply = await this.request('hello', { xsrf: this.session.xsrf, expert: this.expert || '' });
+        if (!reply.ok || generation !== this.generation) return;
+        this.pause = 0.3;
+        this.connected = true;
+        this.onState('connected', Object.assign(this.session, { expert: reply.message }));
+      } catch (err) {
+        if (!(err instanceof Lost)) throw err;
+      }
+    };
+  }
+
+  again() {
+    this.connected = false;
+    this.onState('lost', this.session);
+    this.timer = setTimeout(() => this.connect(), this.pause * 1000);
+    this.pause = Math.min(LONGEST_PAUSE_S, this.pause * 1.7);
+  }
+
+  fail() {
+    this.connected = false;
+    for (const waiting of this.waiting.values()) waiting.reject(new Lost('the connection was lost'));
+    this.waiting.clear();
+  }
+
+  take(message) {
+    if (message.re === undefined) {
+      this.store.take(message);
+      return;
+    }
+    const waiting = this.waiting.get(message.re);
+    this.waiting.delete(message.re);
+    if (waiting) waiting.resolve(message);
+  }
+
+  // One command; rejects with Lost where the connection goes before the reply is there.
+  request(name, args) {
+    if (!this.socket || this.socket.readyState !== WebSocket.OPEN) return Promise.reject(new Lost('not connected'));
+    const number = ++this.number;
+    return new Promise((resolve, reject) => {
+      this.waiting.set(number, { resolve, reject });
+      setTimeout(() => {
+        if (this.waiting.delete(number)) reject(new Lost('no reply within ' + REQUEST_LIMIT_S + ' s'));
+      }, REQUEST_LIMIT_S * 1000);
+      this.socket.send(JSON.stringify(Object.assign({ id: number, do: name }, args)));
+    });
+  }
+
+  async signIn(token) {
+    const answer = await this.change('POST', JSON.stringify({ token }));
+    if (answer.ok) this.connect();
+    return answer.status;
+  }
+
+  async signOut() {
+    await this.change('DELETE');
+    this.fail();
+    this.connect();
+  }
+
+  change(method, body) {
+    return fetch('session', { method, body, headers: { 'X-Xsrf': this.session.xsrf } });
+  }
+}
