@@ -35,7 +35,8 @@ def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
         reach = [[share - 100 * point.asked.interval[0] for share, point in zip(shares, points)],
                  [100 * point.asked.interval[1] - share for share, point in zip(shares, points)]]
         axes.errorbar([shift * point.memory for point in points], shares, yerr=reach, color=colour, marker=marker,
-                      linestyle=dashes, markersize=3.5, linewidth=1.2, elinewidth=0.8, capsize=2, label=label, clip_on=False)
+                      linestyle=dashes, markersize=3.5, linewidth=1.2, elinewidth=0.8, capsize=2, label=label,
+                      clip_on=False)
     memories = sorted({point.memory for points in series.values() for point in points})
     axes.set_xscale('log')
     axes.xaxis.set_major_locator(FixedLocator(memories))

@@ -194,7 +194,8 @@ def test_each_replicate_of_each_oracle_has_a_figure_with_the_arm_without_beside_
         (('with oracle, memory 10',), (other[0], without[0]))]
     assert time_series([one[0], without[0]]) == [((), (one[0], without[0]))]
     assert time_series(without[:1]) == [((), (without[0],))]
-    assert [told for told, _ in time_series([one[0], trial(3, experiment='DRINK')])] == [('DRINK',), ('PICK_AND_PLACE',)]
+    several = time_series([one[0], trial(3, experiment='DRINK')])
+    assert [told for told, _ in several] == [('DRINK',), ('PICK_AND_PLACE',)]
 
 
 def test_csv_and_json_tell_seed_cause_and_truth():
