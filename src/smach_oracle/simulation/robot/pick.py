@@ -14,6 +14,7 @@ from .planner import PlanningError
 APPROACH = 0.10  # m, straight, towards the object
 LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
 MISSES = 2  # grasps that may close on nothing before the robot says so
+EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 TARGET = 'the object'
 
 
@@ -56,7 +57,7 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp]) -> Held:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
-        way = _way_to(hand, grasp, reasons)
+        way = _way_to(hand, grasp, reasons) if hand.space.checks < EFFORT else None
         if way is None:
             continue
         hand.follow(way.there, FAST)

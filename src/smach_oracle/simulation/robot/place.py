@@ -1,20 +1,27 @@
 """Put down what a hand holds: choose a heading, go above, lower, let go, back off, and see whether it stands there."""
-from typing import Iterator, List, Mapping, NamedTuple, Tuple
+from typing import Iterator, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ...geometry.depth import points_of
 from ...geometry.transforms import from_rpy, inverse, transform
 from .arm import FAST, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
+from .interface import Frame
 from .kitchen import MapBox
 from .pick import Held
 from .planner import PlanningError
 
+EFFORT = 40000  # collision checks for the choice of a way, about 3 s
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)  # rad, of the object about the vertical, against how it stood
 SHIFTS = ((0.0, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.0))  # m beside the place: near enough
 SLACK = 0.10  # m that the height asked for may differ from the one at which the object stands
+
+NEAR = 0.05  # m around the place, within which a frame must show the object
+UPRIGHT = 0.75  # of its height at least: less, and it lies
+LEAST_POINTS = 40
 
 
 class _Way(NamedTuple):
@@ -53,6 +60,15 @@ def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping
         return centre
 
 
+def stands_there(frame: Frame, centre: np.ndarray, held: Held) -> bool:
+    """Whether a frame shows something as high as the object, where its centre (3,) should be."""
+    points = points_of(frame.depth[::2, ::2], frame.intrinsics, frame.base_from_camera, stride=2).reshape(-1, 3)
+    beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
+    bottom = centre[2] - held.half[2]
+    there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) & (points[:, 2] < bottom + 3 * held.half[2])]
+    return len(there) >= LEAST_POINTS and np.percentile(there[:, 2], 90) > bottom + UPRIGHT * 2 * held.half[2]
+
+
 def _on_support(centre: np.ndarray, held: Held, support: MapBox) -> np.ndarray:
     """The place asked for, at the height at which the object stands."""
     top = support.centre[2] + support.half[2]
@@ -81,6 +97,8 @@ def _find_way(hand: Arm, centre: np.ndarray, held: Held, support: str) -> Tuple[
     reasons: List[str] = []
     start = hand.now()
     for there, pose in _poses(centre, held):
+        if hand.space.checks > EFFORT:
+            break
         try:
             above = hand.reach(lifted(pose, ABOVE), near=start)
         except Unreachable:
@@ -106,7 +124,7 @@ def _find_way(hand: Arm, centre: np.ndarray, held: Held, support: str) -> Tuple[
         centre[0], centre[1], summary(reasons)))
 
 
-def _way_back(hand: Arm, start: np.ndarray, pose: np.ndarray, held: Held):
+def _way_back(hand: Arm, start: np.ndarray, pose: np.ndarray, held: Held) -> Optional[np.ndarray]:
     hand.space.detach()
     try:
         return hand.line(start, backed_off(pose, RETREAT))

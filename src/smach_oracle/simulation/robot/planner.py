@@ -14,7 +14,7 @@ from ...geometry.chain import Chain
 from ...geometry.transforms import inverse, rotation_vector, transform
 from .collision import CollisionWorld
 
-BUDGET = 12000  # collision checks for one way
+BUDGET = 6000  # collision checks for one way; most take less than 1000
 RESOLUTION = 0.05  # rad (norm over the joints) between checks along a way
 REACH = 0.6  # rad that a tree grows at once
 STRAIGHT_STEP = 0.01  # m between checks along a line

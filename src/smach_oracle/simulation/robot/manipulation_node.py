@@ -1,0 +1,45 @@
+"""Node: what the PR2's arms, hands and head can do, as actions."""
+import rospy
+
+from smach_oracle.msg import (BuildCollisionMapAction, MoveArmsAsideAction, PickAction, PlaceAction, PointHeadAction)
+from smach_oracle.ros.command_line import parameters_only
+
+from .arm import Means
+from .collision import RobotModel, installed_model, model_from
+from .manipulation import Manipulation
+from .pr2_model import ModelError
+from .ros_robot import RosRobot
+from .skill_server import SkillServer
+
+
+def robot_model() -> RobotModel:
+    """The model on the parameter server, where there is one with its semantics; else the installed PR2."""
+    urdf = rospy.get_param('robot_description', '')
+    srdf = rospy.get_param('robot_description_semantic', '')
+    return model_from(urdf.replace('file://', ''), srdf) if urdf and srdf else installed_model()
+
+
+def serve(skills: Manipulation, server: SkillServer) -> None:
+    """Offer all skills."""
+    server.offer('move_arms_aside', MoveArmsAsideAction, skills.move_arms_aside)
+    server.offer('point_head', PointHeadAction, skills.point_head)
+    server.offer('build_collision_map', BuildCollisionMapAction, skills.build_collision_map)
+    server.offer('pick', PickAction, skills.pick)
+    server.offer('place', PlaceAction, skills.place)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    parameters_only('Node: move_arms_aside, point_head, build_collision_map, pick and place as actions. '
+                    'Parameters: ~snapshot; see doc/simulation.md.')
+    rospy.init_node('pr2_manipulation')
+    robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
+    try:
+        model = robot_model()
+    except (ValueError, ModelError) as err:
+        rospy.logfatal('pr2_manipulation: %s', err)
+        raise SystemExit(2) from err
+    server = SkillServer(robot.abort)
+    serve(Manipulation(Means(robot, model)), server)
+    rospy.loginfo('pr2_manipulation: %d actions ready', server.names())
+    rospy.spin()

@@ -1,0 +1,77 @@
+"""Skills as actions: one at a time, each failure an aborted action with its reason."""
+import threading
+from typing import Any, Callable, List, Tuple, Type
+
+import actionlib
+import rospy
+
+from .arm import SkillError
+from .interface import RobotError
+from .planner import PlanningError
+
+Say = Callable[[str], None]
+Handler = Callable[[Any, Say], Any]
+
+
+class SkillServer:
+    """Action servers that share one robot, which does one thing at a time."""
+
+    def __init__(self, abort: Callable[[], None]) -> None:
+        """
+        :param abort: makes what the robot does now end with a RobotError; called from any thread.
+        """
+        self._abort = abort
+        self._busy = threading.Lock()
+        self._running = ''
+        self._servers: List[actionlib.SimpleActionServer] = []
+
+    def offer(self, name: str, spec: type, handler: Handler, errors: Tuple[Type[Exception], ...] = ()) -> None:
+        """Serve an action.
+
+        :param spec: the Action type; its feedback has a field `status`, its result a field `reason`.
+        :param handler: takes the goal and a function that tells people what is being done; returns the result, or
+            raises SkillError, RobotError, PlanningError or one of `errors`, whose text becomes the reason.
+        """
+        expected = (SkillError, RobotError, PlanningError) + errors
+        server = actionlib.SimpleActionServer(name, spec, lambda goal: self._serve(name, spec, server, handler, goal,
+                                                                                   expected), auto_start=False)
+        server.register_preempt_callback(lambda: self._abort() if self._running == name else None)
+        server.start()
+        self._servers.append(server)
+
+    def names(self) -> int:
+        """How many actions are served."""
+        return len(self._servers)
+
+    def _serve(self, name: str, spec: type, server: actionlib.SimpleActionServer, handler: Handler, goal: Any,
+               expected: Tuple[Type[Exception], ...]) -> None:
+        action = spec()
+        feedback, result = action.action_feedback.feedback, action.action_result.result
+
+        def say(text: str) -> None:
+            feedback.status = text
+            server.publish_feedback(feedback)
+
+        with self._busy:
+            if server.is_preempt_requested():
+                server.set_preempted(result)
+                return
+            self._running = name
+            try:
+                server_result = handler(goal, say)
+            except expected as err:
+                result.reason = str(err)
+                if server.is_preempt_requested():
+                    server.set_preempted(result, result.reason)
+                else:
+                    rospy.loginfo('%s: %s', name, result.reason)
+                    server.set_aborted(result, result.reason)
+                return
+            except Exception as err:  # a goal must not stay open, whatever went wrong
+                rospy.logerr('%s: %r', name, err)
+                result.reason = 'error in {}: {!r}'.format(name, err)
+                server.set_aborted(result, result.reason)
+                raise
+            finally:
+                self._running = ''
+            server.set_succeeded(server_result)

@@ -1,0 +1,102 @@
+"""The first use case in one process, without ROS nodes: for tuning scenes, and for tests.
+
+The steps are those of tasks/pick_and_place.py, done by the same code as behind the actions.
+"""
+import time
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from std_msgs.msg import Header
+
+from smach_oracle.msg import (BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal)
+
+from ...geometry.chain import read_joints
+from ..robot.arm import Means, SkillError
+from ..robot.clusters import NotSeen
+from ..robot.collision import installed_model
+from ..robot.frames import box_messages
+from ..robot.interface import RobotError
+from ..robot.manipulation import Manipulation
+from ..robot.own_limbs import limbs_of
+from ..robot.planner import PlanningError
+from ..robot.tabletop import find_tabletop
+from .direct import DirectRobot
+from .judge import judge
+from .physics import World
+from .scene import Scene
+
+BASE = 'base_link'
+HEAD = PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75))
+PLACE = PoseStamped(Header(frame_id=BASE), Pose(Point(0.6, -0.35, 0.73), Quaternion(0.0, 0.0, 0.0, 1.0)))
+FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
+
+
+class Rehearsed(NamedTuple):
+    """How a trial went."""
+
+    seed: int
+    failed: str  # the state that failed, '' for none
+    reason: str
+    success: bool  # in truth
+    why: str
+    causes: Tuple[str, ...]
+    wall_s: Dict[str, float]  # by state
+    sim_s: float
+
+
+class Trial:
+    """The states of the task over one world."""
+
+    def __init__(self, world: World) -> None:
+        self.robot = DirectRobot(world)
+        self.skills = Manipulation(Means(self.robot, installed_model()))
+        self._links = read_joints(self.skills.means.model.urdf)
+        self.data: Dict[str, Any] = {}
+        self.states: List[Tuple[str, Callable[[], None]]] = [
+            ('MOVE_ARMS_ASIDE', lambda: self._do('move_arms_aside', MoveArmsAsideGoal())),
+            ('POINT_HEAD', lambda: self._do('point_head', PointHeadGoal(HEAD))),
+            ('DETECT_TABLETOP', self._detect), ('BUILD_COLLISION_MAP', self._map), ('PICK', self._pick),
+            ('PLACE', lambda: self._do('place', PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])))]
+
+    def _do(self, skill: str, goal: Any) -> Any:
+        return getattr(self.skills, skill)(goal, lambda status: None)
+
+    def _detect(self) -> None:
+        limbs = limbs_of(self._links, self.robot.joints())
+        found = find_tabletop(self.robot.see(), limbs=limbs)
+        messages = [box_messages(box) for box in found.objects]
+        self.data.update(table=box_messages(found.table)[0], objects=[pose for pose, _ in messages],
+                         sizes=[size for _, size in messages])
+
+    def _map(self) -> None:
+        goal = BuildCollisionMapGoal(self.data['table'], self.data['objects'], self.data['sizes'])
+        self.data['map_id'] = self._do('build_collision_map', goal).map_id
+
+    def _pick(self) -> None:
+        goal = PickGoal('right', self.data['objects'][0], self.data['sizes'][0], self.data['map_id'])
+        self.data['grasp'] = self._do('pick', goal).grasp
+
+
+def rehearse(scene: Scene, world: Optional[World] = None) -> Rehearsed:
+    """One trial up to its first failure."""
+    begun = time.perf_counter()
+    world = World() if world is None else world
+    world.reset(scene)
+    trial = Trial(world)
+    wall = {'reset': time.perf_counter() - begun}
+    start = world.time
+    failed = reason = ''
+    for name, work in trial.states:
+        begun = time.perf_counter()
+        try:
+            work()
+        except FAILURES as err:
+            failed, reason = name, str(err)
+        wall[name] = time.perf_counter() - begun
+        if failed:
+            break
+    elapsed = world.time - start
+    world.step(60)
+    verdict = judge(world, scene.goal)
+    return Rehearsed(scene.seed, failed, reason, verdict.success, verdict.why,
+                     tuple(cause.kind for cause in scene.causes), wall, elapsed)

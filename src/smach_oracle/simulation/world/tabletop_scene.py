@@ -1,0 +1,86 @@
+"""The world of the first use case: a table, things on it, and reasons to fail, all drawn from the trial's seed."""
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+
+from .scene import Body, Cause, Disturbance, Goal, RobotStart, Scene, Sensor
+
+TASK = 'pick_and_place'
+TABLE_TOP = 0.72  # m
+TABLE_X = 0.82  # m, of its middle
+TABLE_SIZE = (0.70, 1.40, 0.04)
+GOAL = (0.60, -0.35)  # m, where the task puts the object
+TOLERANCE = 0.06
+NEAREST_X, NEAREST_Y = (0.53, 0.62), (-0.12, 0.22)  # m, where the object to be picked stands
+OTHERS_X, OTHERS_Y = (0.62, 0.86), (-0.45, 0.40)
+CLEAR = 0.13  # m between the middles of things, where nothing is crowded
+FREE_GOAL = 0.17  # m around the goal
+TORSO = 0.22
+MASS = (0.15, 0.40)  # kg
+COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15), (0.55, 0.20, 0.60),
+           (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
+WOOD = (0.58, 0.42, 0.27)
+
+
+class _Draft(NamedTuple):
+    """A scene in the making."""
+
+    things: List[Body]
+    disturbances: List[Disturbance]
+    causes: List[Cause]
+    sensor: Sensor
+
+
+def draw(seed: int, benign: bool = False) -> Scene:
+    """The trial's world.
+
+    :param seed: 0 or more.
+    :param benign: without any reason to fail.
+    """
+    generator = np.random.default_rng([seed, 61])
+    draft = _Draft(_things(generator), [], [], Sensor())
+    height = TABLE_TOP + draft.things[0].size[2] / 2
+    goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
+    return Scene(TASK, seed, tuple(_table() + draft.things), goal, RobotStart((('torso_lift_joint', TORSO),)),
+                 draft.sensor, tuple(draft.disturbances), tuple(draft.causes))
+
+
+def _table() -> List[Body]:
+    top = Body('table', 'box', TABLE_SIZE, (TABLE_X, 0.0, TABLE_TOP - TABLE_SIZE[2] / 2), colour=WOOD)
+    tall = TABLE_TOP - TABLE_SIZE[2]
+    legs = [Body('leg_{}'.format(2 * i + j), 'box', (0.06, 0.06, tall),
+                 (TABLE_X + x * (TABLE_SIZE[0] / 2 - 0.06), y * (TABLE_SIZE[1] / 2 - 0.06), tall / 2),
+                 colour=(0.35, 0.25, 0.17)) for i, x in enumerate((-1, 1)) for j, y in enumerate((-1, 1))]
+    return [top] + legs
+
+
+def _things(generator: np.random.Generator) -> List[Body]:
+    """The object to be picked, which stands nearest, and two to four others beyond it."""
+    colours = generator.permutation(len(COLOURS))
+    spots = [(generator.uniform(*NEAREST_X), generator.uniform(*NEAREST_Y))]
+    wanted = 1 + int(generator.integers(2, 5))
+    for _ in range(300):
+        x, y = generator.uniform(*OTHERS_X), generator.uniform(*OTHERS_Y)
+        beyond = np.hypot(x, y) > np.hypot(*spots[0]) + 0.05
+        if len(spots) < wanted and beyond and _clear((x, y), spots):
+            spots.append((x, y))
+    return [_thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]]) for k, spot in enumerate(spots)]
+
+
+def _clear(spot: Tuple[float, float], spots: List[Tuple[float, float]]) -> bool:
+    away = [np.hypot(spot[0] - x, spot[1] - y) for x, y in spots]
+    return min(away) > CLEAR and np.hypot(spot[0] - GOAL[0], spot[1] - GOAL[1]) > FREE_GOAL
+
+
+def _thing(generator: np.random.Generator, name: str, spot: Tuple[float, float],
+           colour: Tuple[float, float, float]) -> Body:
+    """A can or a carton."""
+    tall = float(generator.uniform(0.10, 0.16))
+    wide = float(generator.uniform(0.024, 0.036))
+    mass = float(generator.uniform(*MASS))
+    position = (float(spot[0]), float(spot[1]), TABLE_TOP + tall / 2 + 0.001)
+    if generator.random() < 0.55:
+        return Body(name, 'cylinder', (wide, wide, tall), position, mass=mass, colour=colour)
+    deep = float(generator.uniform(0.6, 1.0)) * wide
+    return Body(name, 'box', (2 * wide, 2 * deep, tall), position, yaw=float(generator.uniform(-1.5, 1.5)), mass=mass,
+                colour=colour)
