@@ -28,44 +28,55 @@ class View:
     """What a camera that knows no noise sees."""
 
     def __init__(self, world: World, world_from_camera: np.ndarray, size: Tuple[int, int] = (WIDTH, HEIGHT),
-                 field_of_view: float = FIELD_OF_VIEW, **light: object) -> None:
+                 field_of_view: float = FIELD_OF_VIEW, far: float = FAR, **light: object) -> None:
         """
         :param world_from_camera: 4x4, z forward, x right, y down.
         :param size: width and height, pixels.
+        :param field_of_view: degrees, from top to bottom.
+        :param far: m, how far it sees.
         :param light: of pybullet.getCameraImage, over what is usual here.
         """
         width, height = size
         eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3, 2], -world_from_camera[:3, 1]
         matrix = pybullet.computeViewMatrix(eye.tolist(), (eye + forward).tolist(), up.tolist())
-        projection = _projection(size, field_of_view)
+        projection = _projection(size, field_of_view, far)
         image = pybullet.getCameraImage(width, height, matrix, projection, renderer=pybullet.ER_TINY_RENDERER,
                                         physicsClientId=world.client, **dict(LIGHT, **light))
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
-        self.depth = FAR * NEAR / (FAR - (FAR - NEAR) * buffer)  # m along the optical axis; FAR where there is nothing
+        self.depth = far * NEAR / (far - (far - NEAR) * buffer)  # m along the optical axis; `far` where there is nothing
         self.bodies = np.asarray(image[4], int).reshape(height, width)  # numbers in the client, -1 for none
 
 
-def _projection(size: Tuple[int, int], field_of_view: float) -> List[float]:
+def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List[float]:
     """So that the axis goes through the middle between the pixels' centres: the renderer takes corners for centres."""
     width, height = size
     pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
     matrix: List[float] = pybullet.computeProjectionMatrix(
-        -(width - 1) / 2 * pixel, (width + 1) / 2 * pixel, -(height - 1) / 2 * pixel, (height + 1) / 2 * pixel, NEAR, FAR)
+        -(width - 1) / 2 * pixel, (width + 1) / 2 * pixel, -(height - 1) / 2 * pixel, (height + 1) / 2 * pixel, NEAR, far)
     return matrix
 
 
 def see(world: World) -> Frame:
     """A frame of the head camera; the world goes on for the time that it takes."""
     world.step(FRAME_PERIODS)
+    return shoot(world)
+
+
+def shoot(world: World, counted: bool = True) -> Frame:
+    """A frame of what the head camera sees just now.
+
+    :param counted: False: a look that sets off nothing, and that no disturbance is used up by.
+    """
     sensor = world.disturbances.sensor(world.scene.sensor)
     pose = world.link_pose(CAMERA_FRAME)
     view = View(world, pose)
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
     frame = Frame(world.time, noisy_colour(view.colour, sensor, generator), noisy_depth(view.depth, sensor, generator),
                   INTRINSICS.copy(), inverse(world.true_base()) @ pose)
-    world.disturbances.frame_taken()
-    world.happened('see')
+    if counted:
+        world.disturbances.frame_taken()
+        world.happened('see')
     return frame
 
 

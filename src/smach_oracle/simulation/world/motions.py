@@ -65,6 +65,7 @@ class Torso(Trajectory):
         """Raises ValueError for a height (m) that is no number."""
         if not math.isfinite(height):
             raise ValueError('torso: height is {}; allowed: 0 to 0.31 m'.format(height))
+        self.height = height
         way = abs(height - world.robot.position('torso_lift_joint'))
         super().__init__(['torso_lift_joint'], np.array([[height]]), np.array([max(way / TORSO_SPEED, PERIOD)]))
 
@@ -78,6 +79,7 @@ class Head(Trajectory):
     def __init__(self, world: World, point: Sequence[float]) -> None:
         """Raises ValueError for a point (m, in BASE_FRAME) that is not finite, or that the head cannot turn to."""
         turn = head_angles(world.robot.position('torso_lift_joint'), point)
+        self.point = np.asarray(point, float)
         here = [world.robot.position(name) for name in ('head_pan_joint', 'head_tilt_joint')]
         for name, angle in zip(('head_pan_joint', 'head_tilt_joint'), turn):
             if world.robot.refusal(name, angle):

@@ -5,7 +5,7 @@
 A motion is ticked before each control period and says None until it has ended. Several may be ticked side by side.
 """
 import math
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -28,6 +28,15 @@ class Result(NamedTuple):
     ok: bool
     text: str = ''  # why not
     gripper: Optional[GripperState] = None
+    missed: str = ''  # a trajectory's tolerance that was missed: 'path' or 'goal'
+
+
+class Tolerances(NamedTuple):
+    """How far joints may be off (rad or m, inf: any), where that is not the usual."""
+
+    path: Mapping[str, float] = {}
+    goal: Mapping[str, float] = {}
+    late_s: float = 0.0  # how much more than usual it may take to arrive
 
 
 class Motion(Protocol):
@@ -59,7 +68,8 @@ class Trajectory:
     """Joints through points in time: straight between two, or cubic where velocities are given, as a PR2's do."""
 
     def __init__(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray,
-                 velocities: Optional[np.ndarray] = None, check_speed: bool = True) -> None:
+                 velocities: Optional[np.ndarray] = None, check_speed: bool = True,
+                 tolerances: Tolerances = Tolerances()) -> None:
         """
         :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to the first point.
         :param times: (n,) s from the start, increasing; the first may be 0.
@@ -67,6 +77,7 @@ class Trajectory:
         :raises ValueError: for shapes that do not fit, values that are not finite, times that do not increase.
         """
         self._joints = list(joints)
+        self._tolerances = tolerances
         self._positions = np.array(positions, float)
         self._times = np.array(times, float)
         self._velocities = None if velocities is None else np.array(velocities, float)
@@ -74,6 +85,11 @@ class Trajectory:
         self._begun = -1
         self._settled = 0
         _check_points(self._joints, self._positions, self._times, self._velocities)
+
+    @property
+    def joints(self) -> List[str]:
+        """Those that it moves."""
+        return self._joints
 
     def refusal(self, world: World) -> str:
         """Why this robot cannot do it, from where it is now; or ''."""
@@ -120,7 +136,7 @@ class Trajectory:
         behind = self._behind(world, done)
         if behind:
             self.stop(world)
-            return Result(False, behind)
+            return Result(False, behind, missed='path')
         if done >= len(self._way) - 1:
             return self._settle(world)
         for name, before, after in zip(self._joints, self._way[done], self._way[done + 1]):
@@ -142,7 +158,7 @@ class Trajectory:
     def _behind(self, world: World, done: int) -> str:
         for name, wanted in zip(self._joints, self._way[min(done, len(self._way) - 1)]):
             error = abs(world.robot.position(name) - wanted)
-            if error > PATH_TOLERANCE:
+            if error > self._tolerances.path.get(name, PATH_TOLERANCE):
                 return '{} is {:.2f} off its path after {:.1f} s: something is in its way'.format(
                     name, error, done * PERIOD)
         return ''
@@ -155,13 +171,14 @@ class Trajectory:
                 world.robot.set_target(name, position, 0.0, None)
         waited = (world.periods - self._settled) * PERIOD
         errors = [abs(world.robot.position(name) - end) for name, end in zip(self._joints, goal)]
-        if waited >= SETTLE_S[0] and max(errors) < GOAL_TOLERANCE:
+        shares = [error / self._tolerances.goal.get(name, GOAL_TOLERANCE) for name, error in zip(self._joints, errors)]
+        if waited >= SETTLE_S[0] and max(shares) < 1.0:
             return Result(True)
-        if waited < SETTLE_S[1]:
+        if waited < SETTLE_S[1] + self._tolerances.late_s:
             return None
-        worst = int(np.argmax(errors))
+        worst = int(np.argmax(shares))
         self.stop(world)
-        return Result(False, '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]))
+        return Result(False, '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]), missed='goal')
 
     def events(self) -> Sequence[str]:
         arms = sorted({arm_of(name) for name in self._joints} - {''})
