@@ -3,7 +3,7 @@
 Works on any frame that has colour, depth, intrinsics and the camera's pose; knows no ROS. The same frame and drawing
 give the same object.
 """
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -59,6 +59,7 @@ class Cutting(NamedTuple):
     box: UprightBox  # in the frame of the base
     points: np.ndarray  # (n, 3) m, in the frame of the base
     colours: np.ndarray  # (n, 3) uint8
+    surface: Optional[Plane]  # what it stands on; None where that cannot be told from the frame
 
 
 def rectangle(left: float, top: float, width: float, height: float) -> np.ndarray:
@@ -189,7 +190,7 @@ def _with_depth(picture: Picture, mask: np.ndarray, surface: Optional[Plane]) ->
     if found is None or int(found.chosen.sum()) < LEAST_DEPTH:
         raise SegmentationError('nothing under the mask stands out from the surface around it', mask)
     return Cutting(mask, found.box, points[chosen][found.chosen],
-                   picture.colour[top:bottom, left:right][chosen][found.chosen])
+                   picture.colour[top:bottom, left:right][chosen][found.chosen], found.surface)
 
 
 def _pixels(points: np.ndarray) -> np.ndarray:

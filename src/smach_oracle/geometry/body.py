@@ -2,9 +2,9 @@
 from typing import NamedTuple, Optional
 
 import numpy as np
-from scipy import ndimage
 
 from .box import UprightBox, upright_box
+from .pieces import largest_piece
 from .plane import Plane
 
 CELL = 0.015  # m: points further from each other do not hang together
@@ -15,6 +15,7 @@ class Body(NamedTuple):
 
     box: UprightBox
     chosen: np.ndarray  # (n,) bool: the points that belong to it
+    surface: Optional[Plane]  # the one it stands on
 
 
 def body_above(points: np.ndarray, surface: Optional[Plane], clearance: float) -> Optional[Body]:
@@ -31,18 +32,8 @@ def body_above(points: np.ndarray, surface: Optional[Plane], clearance: float) -
         surface = None
     if not chosen.any():
         return None
-    chosen[np.flatnonzero(chosen)[~largest_piece(points[chosen])]] = False
+    chosen[np.flatnonzero(chosen)[~largest_piece(points[chosen], CELL)]] = False
     own = points[chosen]
     floor = (surface.z_at(*own[:, :2].mean(axis=0)) if surface is not None
              else float(np.percentile(own[:, 2], 2)))
-    return Body(upright_box(own, floor), chosen)
-
-
-def largest_piece(points: np.ndarray, cell: float = CELL) -> np.ndarray:
-    """(n,) bool: which of the points (n, 3), n >= 1, belong to the piece with the most of them."""
-    cells = np.floor((points - points.min(axis=0)) / cell).astype(int)
-    span = np.minimum(cells, 400)  # 6 m: whatever is further off is not the object
-    grid = np.zeros(span.max(axis=0) + 1, bool)
-    grid[tuple(span.T)] = True
-    labels = ndimage.label(grid, np.ones((3, 3, 3)))[0][tuple(span.T)]
-    return labels == np.bincount(labels).argmax()
+    return Body(upright_box(own, floor), chosen, surface)

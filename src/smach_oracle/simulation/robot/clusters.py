@@ -4,17 +4,14 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import ConvexHull, QhullError
 
 from ...geometry.box import UprightBox, upright_box
 from ...geometry.depth import points_of
+from ...geometry.pieces import standing_on
 from ...geometry.plane import Plane
 from .interface import Frame
 
 STRIDE = 2  # every second row and column: a quarter of the work, and objects still have hundreds of points
-CELL = 0.01  # m: things closer than this to each other are one cluster
-PATCH_CELL = 0.02  # m, of the grid in which the surface is connected
-LEAST_POINTS = 60  # of a cluster
 MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
@@ -68,20 +65,6 @@ def generator_of(frame: Frame) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(np.ascontiguousarray(frame.depth).tobytes()))
 
 
-def largest_patch(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 3) of a level surface that belong to its largest connected piece, seen from above."""
-    cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / PATCH_CELL).astype(int)
-    grid = np.zeros(cells.max(axis=0) + 1, bool)
-    grid[tuple(cells.T)] = True
-    labels, count = ndimage.label(ndimage.binary_closing(np.pad(grid, 2), iterations=2)[2:-2, 2:-2], np.ones((3, 3)))
-    if count == 0:
-        return points[:0]
-    of_point = labels[tuple(cells.T)]
-    sizes = np.bincount(of_point, minlength=count + 1)
-    sizes[0] = 0
-    return points[of_point == np.argmax(sizes)]
-
-
 def clusters_on(view: View, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
                 margin: float = MARGIN) -> List[Cluster]:
     """The clusters above a surface, in no order; a small one is taken for noise.
@@ -89,23 +72,12 @@ def clusters_on(view: View, plane: Plane, patch: np.ndarray, lowest: float, high
     :param patch: (n, 3) points of the surface; clusters stand within its convex hull.
     :param lowest: m above the surface from which points count, up to `highest`.
     """
-    edges = _edges(patch)
-    if edges is None:
-        return []
     seen = np.isfinite(view.points[..., 2])
     points, pixels = view.points[seen], np.argwhere(seen)
-    height = plane.height(points)
-    inside = (points[:, :2] @ edges[:, :2].T + edges[:, 2] < -margin).all(axis=1)
-    above = inside & (height > lowest) & (height < highest)
-    points, pixels = points[above], pixels[above]
-    if not len(points):
-        return []
-    labels = _labels(points)
     found = []
-    for label in np.flatnonzero(np.bincount(labels) >= LEAST_POINTS):
-        own = points[labels == label]
-        floor = plane.z_at(*own[:, :2].mean(axis=0))
-        found.append(Cluster(own, pixels[labels == label], upright_box(own, floor)))
+    for chosen in standing_on(points, plane, patch, lowest, highest, margin):
+        own = points[chosen]
+        found.append(Cluster(own, pixels[chosen], upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))))
     return found
 
 
@@ -131,19 +103,3 @@ def _distance(points: np.ndarray, limb: Capsule) -> np.ndarray:
     along = np.clip((points - limb.start) @ axis / length, 0.0, 1.0) if length > 1e-9 else np.zeros(points.shape[:-1])
     distance = np.linalg.norm(points - limb.start - along[..., None] * axis, axis=-1)
     return np.where(np.isfinite(distance), distance, np.inf)
-
-
-def _edges(patch: np.ndarray) -> Optional[np.ndarray]:
-    """(n, 3): lines around a patch seen from above, as normal (outwards) and offset."""
-    try:
-        return ConvexHull(patch[:, :2]).equations
-    except (QhullError, ValueError):
-        return None
-
-
-def _labels(points: np.ndarray) -> np.ndarray:
-    """For each point the number of its cluster, from 1."""
-    cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
-    grid = np.zeros(cells.max(axis=0) + 1, bool)
-    grid[tuple(cells.T)] = True
-    return ndimage.label(grid, np.ones((3, 3, 3)))[0][tuple(cells.T)]

@@ -5,10 +5,10 @@ import numpy as np
 
 from ...geometry.box import UprightBox
 from ...geometry.depth import pixels_of
+from ...geometry.pieces import largest_patch
 from ...geometry.plane import Plane, find_plane
 from ...geometry.transforms import apply, inverse
-from .clusters import (Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, largest_patch, limb_beside,
-                       view_of)
+from .clusters import Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, limb_beside, view_of
 from .interface import Frame
 from .kitchen import Kitchen, shelf_region
 from .touching import why_several

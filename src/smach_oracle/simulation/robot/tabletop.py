@@ -4,9 +4,9 @@ from typing import List, NamedTuple, Sequence
 import numpy as np
 
 from ...geometry.box import UprightBox, upright_box
+from ...geometry.pieces import largest_patch
 from ...geometry.plane import Plane, find_plane
-from .clusters import (Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, largest_patch, limb_beside,
-                       view_of)
+from .clusters import Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, limb_beside, view_of
 from .interface import Frame
 from .touching import why_several
 

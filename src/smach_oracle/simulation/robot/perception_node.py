@@ -1,0 +1,126 @@
+"""The node of the PR2's eyes: what stands on the table, and where a drink is in the open refrigerator."""
+from typing import Any, Dict, List, Mapping, Optional
+
+import numpy as np
+import rospy
+import yaml
+
+from smach_oracle.msg import (DetectDrinkAction, DetectDrinkGoal, DetectDrinkResult, DetectTabletopAction,
+                              DetectTabletopGoal, DetectTabletopResult)
+from smach_oracle.ros.command_line import parameters_only
+
+from ...geometry.chain import Joint, read_joints
+from .clusters import Capsule, NotSeen
+from .drink import find_drink
+from .frames import box_messages
+from .interface import Frame, Robot
+from .kitchen import Kitchen, base_from_fridge, kitchen_from, look_point
+from .own_limbs import limbs_of
+from .ros_robot import RosRobot
+from .skill_server import Say, SkillServer
+from .tabletop import find_tabletop
+
+HIGHEST_LEAST = 0.3  # m: what is asked for as `min_height`
+MODEL_WAIT_S = 60.0
+
+
+class Perception:
+    """What the camera sees, as the results of the two actions. Needs no node."""
+
+    def __init__(self, robot: Robot, links: Dict[str, Joint], kitchen: Kitchen) -> None:
+        """
+        :param links: the robot's joints by the link that each carries, from `chain.read_joints`.
+        :param kitchen: the map in which the refrigerator is.
+        """
+        self._robot = robot
+        self._links = links
+        self._kitchen = kitchen
+
+    def detect_tabletop(self, goal: DetectTabletopGoal, say: Say) -> DetectTabletopResult:
+        """The table and the objects on it. Raises NotSeen, RobotError."""
+        lowest = _height(goal.min_height)
+        say('looking')
+        frame = self._robot.see()
+        found = find_tabletop(frame, lowest, self._limbs())
+        say('{} objects'.format(len(found.objects)))
+        objects = [box_messages(box, _stamp(frame)) for box in found.objects]
+        return DetectTabletopResult(table=box_messages(found.table, _stamp(frame))[0],
+                                    objects=[pose for pose, _ in objects], sizes=[size for _, size in objects])
+
+    def detect_drink(self, goal: DetectDrinkGoal, say: Say) -> DetectDrinkResult:
+        """The foremost drink on the shelf. Raises NotSeen, RobotError."""
+        lowest = _height(goal.min_height)
+        fridge = base_from_fridge(self._kitchen, self._robot.odom_from_base())
+        say('looking into the refrigerator')
+        self._robot.look_at(look_point(self._kitchen, fridge))
+        frame = self._robot.see()
+        pose, size = box_messages(find_drink(frame, self._kitchen, fridge, lowest, self._limbs()), _stamp(frame))
+        return DetectDrinkResult(drink=pose, size=size)
+
+    def _limbs(self) -> List[Capsule]:
+        return limbs_of(self._links, self._robot.joints())
+
+
+def _height(value: float) -> float:
+    """A goal's `min_height`. Raises NotSeen."""
+    if not (np.isfinite(value) and 0 <= value <= HIGHEST_LEAST):
+        raise NotSeen('min_height is {} m; allowed: 0 to {}'.format(value, HIGHEST_LEAST))
+    return float(value)
+
+
+def _stamp(frame: Frame) -> rospy.Time:
+    return rospy.Time.from_sec(frame.stamp)
+
+
+def kitchen_at(parameter: str) -> Kitchen:
+    """The map that a parameter names as a file or gives as a dictionary; the usual one where it is `none`.
+
+    :raises ValueError: for what is no map; names the parameter.
+    """
+    value: Any = rospy.get_param(parameter, 'none')
+    if value in ('none', ''):
+        return Kitchen()
+    try:
+        return kitchen_from(value if isinstance(value, Mapping) else _read(value))
+    except (OSError, ValueError, yaml.YAMLError) as err:
+        raise ValueError('{}: {}'.format(rospy.resolve_name(parameter), err)) from err
+
+
+def _read(path: str) -> Any:
+    with open(path, encoding='utf-8') as file:
+        return yaml.safe_load(file)
+
+
+def robot_links(limit_s: float = MODEL_WAIT_S) -> Dict[str, Joint]:
+    """The robot's joints from `robot_description`, which may come only after this node.
+
+    :raises ValueError: where it does not come within the limit.
+    """
+    period_s = 0.1
+    text: Optional[str] = rospy.get_param('robot_description', None)
+    for _ in range(int(limit_s / period_s)):
+        if text is not None or rospy.is_shutdown():
+            break
+        rospy.rostime.wallsleep(period_s)
+        text = rospy.get_param('robot_description', None)
+    if text is None:
+        raise ValueError('no parameter {} within {:.0f} s'.format(rospy.resolve_name('robot_description'), limit_s))
+    return read_joints(text)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    parameters_only('Node: detects the table and the objects on it, and drinks in the refrigerator. '
+                    'Parameters: ~snapshot, ~kitchen; see doc/perception.md.')
+    rospy.init_node('pr2_perception')
+    try:
+        links, kitchen = robot_links(), kitchen_at('~kitchen')
+    except ValueError as err:
+        rospy.logfatal('pr2_perception: %s', err)
+        raise SystemExit(2) from err
+    robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
+    perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort)
+    server.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,))
+    server.offer('detect_drink', DetectDrinkAction, perception.detect_drink, (NotSeen,))
+    rospy.loginfo('pr2_perception: %d actions ready', server.names())
+    rospy.spin()
