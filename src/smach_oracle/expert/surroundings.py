@@ -1,57 +1,81 @@
-"""What is around a marked object in its frame: the surface that it stands on, and the other things there."""
-from typing import List, NamedTuple
+"""What a driven arm could hit, kept up to date from joint_states and the collision map that the robot publishes."""
+import re
+import threading
+from typing import List, Optional
 
-import numpy as np
-from scipy import ndimage
+import rospkg
+import rospy
 
-from ..geometry.box import UprightBox, upright_box
-from ..geometry.depth import points_of
-from ..geometry.pieces import largest_patch, standing_on
-from .segmentation import Cutting, Picture
+from smach_oracle.msg import CollisionBoxes
 
-STRIDE = 2
-OFF_SURFACE = 0.012  # m that a point of the surface may seem to lie off it
-LOWEST = 0.02  # m above the surface: lower things are noise
-HIGHEST = 0.8
-LARGEST = 0.35  # m: what is wider or higher is no object
-REACH = 2.5  # m of depth
-GROWN = 3  # px around the mask that belong to nothing
-MARGIN = 0.01  # m from the surface's edge
+from ..geometry.chain import read_joints
+from ..geometry.links import link_pose
+from ..geometry.transforms import from_quaternion
+from .clearance import Box, ClearanceError, ClearanceModel
+from .hand import Hand, Robot
 
 
-class SurroundingsError(Exception):
-    """The surface cannot be made out; the text says why."""
+class Surroundings:
+    """The robot's model and the boxes around it; `update` and the arms' questions come from one thread."""
+
+    def __init__(self, robot: Robot, within: float) -> None:
+        """`within`: m beyond which nothing is near.
+
+        :raises ClearanceError: where the robot's model cannot be used.
+        """
+        self._robot = robot
+        self._within = within
+        self._tree = read_joints(robot.urdf)
+        self._model = ClearanceModel(openable(robot.urdf), robot.base)
+        self._lock = threading.Lock()
+        self._news: Optional[List[Box]] = None
+
+    def watch_over(self, hand: Hand) -> None:
+        """Let an arm slow down near itself and the boxes."""
+        hand.watch(self._model.arm(hand.chain, self._within))
+
+    def replace(self, message: CollisionBoxes) -> None:
+        """Take over a new map; one in a frame that is no part of the robot is left aside with a warning."""
+        try:
+            boxes = self._boxes(message)
+        except ValueError as err:
+            rospy.logwarn('collision_map %s cannot be used: %s', message.map_id, err)
+            return
+        with self._lock:
+            self._news = boxes
+
+    def update(self) -> None:
+        """Bring the model to where the joints and the boxes are now."""
+        self._model.set_joints(self._robot.listener.now()[0])
+        with self._lock:
+            news, self._news = self._news, None
+        if news is not None:
+            self._model.set_boxes(news)
+
+    def _boxes(self, message: CollisionBoxes) -> List[Box]:
+        if not len(message.names) == len(message.poses) == len(message.sizes):
+            raise ValueError('{} names, {} poses, {} sizes'.format(
+                len(message.names), len(message.poses), len(message.sizes)))
+        base_from_map = link_pose(self._tree, self._robot.base, message.header.frame_id,
+                                  self._robot.listener.now()[0])
+        boxes = []
+        for name, pose, size in zip(message.names, message.poses, message.sizes):
+            at, turn = pose.position, pose.orientation
+            centre = from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+            if not min(size.x, size.y, size.z) > 0.0:
+                raise ValueError('size of {!r}: {}'.format(name, (size.x, size.y, size.z)))
+            boxes.append(Box(name, base_from_map @ centre, (size.x, size.y, size.z)))
+        return boxes
 
 
-class Surroundings(NamedTuple):
-    """In the frame of the base."""
+def openable(urdf: str) -> str:
+    """A robot description whose mesh files are named by their paths.
 
-    surface: UprightBox  # what is seen of it; its height is 0
-    others: List[UprightBox]  # other things on it, nearest to the base first
-
-
-def surroundings(picture: Picture, cutting: Cutting) -> Surroundings:
-    """What is around the object of a cutting.
-
-    :raises SurroundingsError: where the surface below it is not seen.
+    :raises ClearanceError: for a package that is not there.
     """
-    plane = cutting.surface
-    if plane is None:
-        raise SurroundingsError('what the object stands on cannot be made out around it')
-    depth = picture.depth[::STRIDE, ::STRIDE].copy()
-    depth[ndimage.binary_dilation(cutting.mask, iterations=GROWN)[::STRIDE, ::STRIDE] | (depth > REACH)] = np.nan
-    points = points_of(depth, picture.intrinsics, picture.base_from_camera, stride=STRIDE).reshape(-1, 3)
-    points = points[np.isfinite(points[:, 2])]
-    patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SURFACE])
-    if len(patch) < 3:
-        raise SurroundingsError('too little is seen of what the object stands on')
-    others = []
-    for chosen in standing_on(points, plane, patch, LOWEST, HIGHEST, MARGIN):
-        own = points[chosen]
-        box = upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))
-        if max(box.wide, box.size[2]) <= LARGEST:
-            others.append(box)
-    others.sort(key=lambda box: float(np.hypot(*box.centre[:2])))
-    top = upright_box(patch, float(patch[:, 2].min()))
-    centre = np.array([top.centre[0], top.centre[1], plane.z_at(top.centre[0], top.centre[1])])
-    return Surroundings(UprightBox(centre, top.size * [1, 1, 0], top.yaw), others)
+    packs = rospkg.RosPack()
+    try:
+        named = re.sub(r'package://([^/"]+)', lambda match: str(packs.get_path(match.group(1))), urdf)
+    except rospkg.ResourceNotFound as err:
+        raise ClearanceError('robot description: no package {}'.format(err)) from err
+    return named.replace('file://', '')

@@ -1,0 +1,57 @@
+"""What is around a marked object in its frame: the surface that it stands on, and the other things there."""
+from typing import List, NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from ..geometry.box import UprightBox, upright_box
+from ..geometry.depth import points_of
+from ..geometry.pieces import largest_patch, standing_on
+from .segmentation import Cutting, Picture
+
+STRIDE = 2
+OFF_SURFACE = 0.012  # m that a point of the surface may seem to lie off it
+LOWEST = 0.02  # m above the surface: lower things are noise
+HIGHEST = 0.8
+LARGEST = 0.35  # m: what is wider or higher is no object
+REACH = 2.5  # m of depth
+GROWN = 3  # px around the mask that belong to nothing
+MARGIN = 0.01  # m from the surface's edge
+
+
+class SceneError(Exception):
+    """The surface cannot be made out; the text says why."""
+
+
+class MarkedScene(NamedTuple):
+    """In the frame of the base."""
+
+    surface: UprightBox  # what is seen of it; its height is 0
+    others: List[UprightBox]  # other things on it, nearest to the base first
+
+
+def scene_of(picture: Picture, cutting: Cutting) -> MarkedScene:
+    """What is around the object of a cutting.
+
+    :raises SceneError: where the surface below it is not seen.
+    """
+    plane = cutting.surface
+    if plane is None:
+        raise SceneError('what the object stands on cannot be made out around it')
+    depth = picture.depth[::STRIDE, ::STRIDE].copy()
+    depth[ndimage.binary_dilation(cutting.mask, iterations=GROWN)[::STRIDE, ::STRIDE] | (depth > REACH)] = np.nan
+    points = points_of(depth, picture.intrinsics, picture.base_from_camera, stride=STRIDE).reshape(-1, 3)
+    points = points[np.isfinite(points[:, 2])]
+    patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SURFACE])
+    if len(patch) < 3:
+        raise SceneError('too little is seen of what the object stands on')
+    others = []
+    for chosen in standing_on(points, plane, patch, LOWEST, HIGHEST, MARGIN):
+        own = points[chosen]
+        box = upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))
+        if max(box.wide, box.size[2]) <= LARGEST:
+            others.append(box)
+    others.sort(key=lambda box: float(np.hypot(*box.centre[:2])))
+    top = upright_box(patch, float(patch[:, 2].min()))
+    centre = np.array([top.centre[0], top.centre[1], plane.z_at(top.centre[0], top.centre[1])])
+    return MarkedScene(UprightBox(centre, top.size * [1, 1, 0], top.yaw), others)
