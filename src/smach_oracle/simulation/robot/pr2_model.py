@@ -2,7 +2,8 @@
 
 What is mended: file names are made absolute; triangles get normals (some meshes have none and would look black); links
 without inertia get one of a gram, for simulators take none for 1 kg; the four-bar fingers become jaws that slide,
-whose joints read the way (m) of one finger from its closed place, so that the gap between the tips is their sum.
+whose joints read the way (m) of one finger from its closed place, so that the gap between the tips is their sum;
+parts in signal colours get those of a PR2.
 """
 import os
 import shutil
@@ -17,12 +18,14 @@ import numpy as np
 
 from .rigid_links import inertia_of, merge_rigid_links, set_inertia
 
-MENDED = 2  # raise it when what is derived here changes: it names the cache's folder
+MENDED = 3  # raise it when what is derived here changes: it names the cache's folder
 BASE_JOINTS = ('base_x', 'base_y', 'base_theta')  # of the mobile model: m, m, rad in the world
 JAW_OPEN = 0.045  # m, each finger from its closed place
 JAW_SHIFT = 0.00187  # m outwards, of each closed finger: as they are, the tips are within each other
 LIGHT = 1e-3  # kg, of a link that has no mass
 LEAST_INERTIA = 1e-6  # kg m2
+COLOURS = {'White': '0.93 0.93 0.92 1', 'Grey2': '0.84 0.85 0.86 1', 'Grey': '0.60 0.61 0.63 1',
+           'Blue': '0.42 0.47 0.55 1', 'Green': '0.88 0.89 0.90 1', 'Red': '0.25 0.26 0.28 1'}
 TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
 
 
@@ -113,6 +116,8 @@ def _write(share: Path, draft: Path, folder: Path) -> None:
         name = '{}_{}'.format(found.parent.name, found.name)
         (draft / name).write_bytes(with_normals(found.read_bytes()))
         mesh.set('filename', str(folder / name))
+    for material in robot.findall('material'):
+        _child(material, 'color').set('rgba', COLOURS[material.get('name', '')])
     for link in robot.findall('link'):
         _give_inertia(link)
     for joint in robot.findall('joint'):

@@ -75,7 +75,7 @@ def _move_into(holder: Element, link: Element, holder_from_link: np.ndarray) -> 
     centre = (first[0] * first[1] + second[0] * second[1]) / mass
     _part(ours, 'mass').set('value', repr(mass))
     set_inertia(ours, _about(centre, *first) + _about(centre, *second))
-    _set_origin(ours, transform(centre))
+    _set_origin(ours, transform(centre.tolist()))
 
 
 def _mass_properties(inertial: Element, holder_from_link: np.ndarray) -> Tuple[float, np.ndarray, np.ndarray]:

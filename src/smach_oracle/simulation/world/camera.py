@@ -44,7 +44,7 @@ class View:
                                         physicsClientId=world.client, **dict(LIGHT, **light))
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
-        self.depth = far * NEAR / (far - (far - NEAR) * buffer)  # m along the optical axis; `far` where there is nothing
+        self.depth = far * NEAR / (far - (far - NEAR) * buffer)  # m along the axis; `far` where there is nothing
         self.bodies = np.asarray(image[4], int).reshape(height, width)  # numbers in the client, -1 for none
 
 
@@ -53,7 +53,7 @@ def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List
     width, height = size
     pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
     matrix: List[float] = pybullet.computeProjectionMatrix(
-        -(width - 1) / 2 * pixel, (width + 1) / 2 * pixel, -(height - 1) / 2 * pixel, (height + 1) / 2 * pixel, NEAR, far)
+        -pixel * (width - 1) / 2, pixel * (width + 1) / 2, -pixel * (height - 1) / 2, pixel * (height + 1) / 2, NEAR, far)
     return matrix
 
 
