@@ -1,0 +1,261 @@
+"""What another memory, threshold or policy would have decided at the failures that were recorded.
+
+Each recorded failure is put once more to an oracle of other settings that has seen the same results before it: would
+it have asked where the recorded one recovered, or the other way round? That is all that a record can tell. It is no
+forecast of how often such an oracle asks: after the first other decision the trial would have gone another way, and
+the rates with it; for that, run the trials under it (run_trials --memory ... --policy ...).
+
+The record is first replayed under its own settings. Where that does not give the recorded rates and decisions, nothing
+is said. Exit code: 0; 2 where nothing could be replayed.
+"""
+import argparse
+import itertools
+import sys
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+from ..oracle.errors import OracleError
+from ..oracle.events import Event, EventKind
+from ..oracle.failure_rate import FailureClass, classify, make_estimator
+from ..oracle.history import History
+from ..oracle.naming import is_preempted
+from ..oracle.policy import POLICIES, Action, Chain, Preconditions, Situation, policy_named
+from ..oracle.question import Visit, VisitResult
+from .bag_events import BagError, EventReader, find_bags
+from .trials import summarise
+
+ENOUGH_VISITS = 50
+OUTCOMES = ('same', 'would ask', 'would recover', 'recovers otherwise', 'not known')
+RUN_FOR = (int(FailureClass.LOW), int(FailureClass.MODERATE))  # classes for which every policy runs preconditions
+_ROUNDING = 1e-9
+
+Key = Tuple[str, str]  # path and state
+
+
+class Tried(NamedTuple):
+    """What became of the recorded decisions under other settings."""
+
+    settings: Mapping[str, Any]
+    counts: Mapping[str, int]  # by OUTCOMES
+    trials: int
+    other_trials: int  # in which at least one decision is another
+
+
+class _State:
+    """What an oracle learns of a state, and what it knows of the present failure."""
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        self.estimator = make_estimator(settings['estimator'], settings['memory'], settings['prior'])
+        self.chain: Optional[Chain] = None
+        self.preconditions: List[bool] = []  # whether each was met, of those run for the present failure
+
+
+class Replay:
+    """An oracle that follows the recorded trials of one replicate, in their order."""
+
+    def __init__(self, settings: Mapping[str, Any], conditioned: Mapping[Key, bool]) -> None:
+        """`conditioned`: whether a state has preconditions, where that is known."""
+        self._settings = settings
+        self._policy = policy_named(settings['policy'])
+        self._conditioned = conditioned
+        self._states: Dict[Key, _State] = {}
+        self._histories: Dict[str, History] = {}
+
+    def take(self, event: Event) -> Optional[str]:
+        """Follow one event. Returns the action it would take, 'not known' included, at a DECISION, else None."""
+        if event.kind == EventKind.TRIAL_START:
+            for history in self._histories.values():
+                history.begin_trial()
+        elif event.kind == EventKind.CONTAINER_START:
+            self._history(event.path).begin_execution()
+        elif event.kind == EventKind.FAILURE:
+            self._failed(event)
+        elif event.kind == EventKind.TRANSITION:
+            self._left(event)
+        elif event.kind == EventKind.PRECONDITION_END:
+            self._state(event).preconditions.append(event.outcome == 'met')
+        elif event.kind == EventKind.SUPERSEDE:
+            self._state(event).estimator.take_back_failure()
+            self._history(event.path).supersede(event.outcome)
+        elif event.kind == EventKind.DECISION:
+            return self._decide(event)
+        return None
+
+    def rate(self, event: Event) -> float:
+        """What it has learned of the event's state."""
+        return self._state(event).estimator.rate
+
+    def _state(self, event: Event) -> _State:
+        key = (event.path, event.state)
+        if key not in self._states:
+            self._states[key] = _State(self._settings)
+        return self._states[key]
+
+    def _history(self, path: str) -> History:
+        return self._histories.setdefault(path, History(ENOUGH_VISITS))
+
+    def _failed(self, event: Event) -> None:
+        state, history = self._state(event), self._history(event.path)
+        successes = state.estimator.successes
+        state.chain = Chain(event.state, '', history.failed_last(event.state),
+                            history.failing_since(event.state, successes), history.unconditioned,
+                            history.succeeded_before(event.state))
+        state.preconditions = []
+        history.failed(event.state, successes)
+        state.estimator.add(True)
+        self._visited(event, VisitResult.FAILURE)
+
+    def _left(self, event: Event) -> None:
+        state = self._state(event)
+        if state.chain is not None:  # the end of the visit whose failure is known
+            return
+        if not is_preempted(event.outcome):
+            state.estimator.add(False)
+            self._visited(event, VisitResult.SUCCESS)
+
+    def _visited(self, event: Event, result: VisitResult) -> None:
+        self._history(event.path).visited(Visit(event.state, event.outcome, result),
+                                          self._conditioned.get((event.path, event.state), False))
+
+    def begin_visit(self, event: Event) -> None:
+        """A state is about to run."""
+        self._state(event).chain = None
+
+    def _decide(self, event: Event) -> str:
+        state = self._state(event)
+        if _is_spent(event):
+            return Action.ASK.value
+        failure_class = classify(state.estimator.rate, self._settings['moderate_from'], self._settings['high_from'])
+        preconditions = self._preconditions(event, state, failure_class)
+        if preconditions is None or state.chain is None:
+            return OUTCOMES[-1]
+        return self._policy.decide(Situation(failure_class, preconditions,
+                                             self._policy.is_continuous(state.chain))).value
+
+    def _preconditions(self, event: Event, state: _State, failure_class: FailureClass) -> Optional[Preconditions]:
+        if self._conditioned.get((event.path, event.state)) is False:
+            return Preconditions.NONE
+        if not self._policy.runs_preconditions(failure_class):
+            return Preconditions.NOT_MET
+        if not state.preconditions:
+            return None  # they were not run: nobody knows whether they would have been met
+        return Preconditions.MET if all(state.preconditions) else Preconditions.NOT_MET
+
+
+def _is_spent(event: Event) -> bool:
+    """Whether max_recoveries decided, outside every policy."""
+    return 'are spent on it' in event.text
+
+
+def _conditioned(events: Iterable[Event]) -> Dict[Key, bool]:
+    """Which states have preconditions: those where some were run; not those where none were, though they would be."""
+    known: Dict[Key, bool] = {}
+    for event in events:
+        key = (event.path, event.state)
+        if event.kind == EventKind.PRECONDITION_START:
+            known[key] = True
+        elif event.kind == EventKind.DECISION and not _is_spent(event) and event.failure_class in RUN_FOR:
+            known.setdefault(key, False)
+    return known
+
+
+def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> Tried:
+    """Put the decisions of one replicate to an oracle of other settings.
+
+    :param trials: the events of each trial, in order.
+    :raises BagError: where the record cannot be replayed under its own settings.
+    """
+    recorded = dict((trials[0][0].data or {}).get('settings') or {})
+    if not recorded:
+        raise BagError('its trials do not tell the settings of their oracle')
+    conditioned = _conditioned(event for trial in trials for event in trial)
+    own, other = Replay(recorded, conditioned), Replay({**recorded, **settings}, conditioned)
+    counts = dict.fromkeys(OUTCOMES, 0)
+    other_trials = 0
+    for trial in trials:
+        before = counts['same']
+        decisions = 0
+        for event in trial:
+            _check_rate(own, event)
+            if event.kind == EventKind.STATE_START:
+                own.begin_visit(event)
+                other.begin_visit(event)
+            done, tried = own.take(event), other.take(event)
+            if done is not None and tried is not None:
+                _check_decision(done, event)
+                decisions += 1
+                counts[_outcome(event.outcome, tried)] += 1
+        other_trials += counts['same'] - before < decisions
+    return Tried(dict(settings), counts, len(trials), other_trials)
+
+
+def _check_rate(own: Replay, event: Event) -> None:
+    if event.kind == EventKind.FAILURE and abs(own.rate(event) - event.rate) > _ROUNDING:
+        raise BagError('{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}: states with '
+                       'settings of their own, rates kept from elsewhere, or trials that are missing'.format(
+                           event.trial_id, event.state, event.rate, own.rate(event)))
+
+
+def _check_decision(done: str, event: Event) -> None:
+    if done not in (event.outcome, OUTCOMES[-1]):
+        raise BagError('{}: {}: it decided {}, where its own settings say {}'.format(
+            event.trial_id, event.state, event.outcome, done))
+
+
+def _outcome(recorded: str, tried: str) -> str:
+    if tried in (recorded, OUTCOMES[-1]):
+        return 'same' if tried == recorded else tried
+    if tried == Action.ASK.value:
+        return 'would ask'
+    return 'would recover' if recorded == Action.ASK.value else 'recovers otherwise'
+
+
+def load_replicates(places: Sequence[str]) -> Dict[str, List[List[Event]]]:
+    """The trials with an oracle, by the folder they were recorded in, in order. Raises BagError."""
+    reader = EventReader()
+    found: Dict[str, List[List[Event]]] = {}
+    for path in find_bags(places):
+        trials: Dict[str, List[Event]] = {}
+        for event in reader.read(path).events:
+            trials.setdefault(event.trial_id, []).append(event)
+        for events in trials.values():
+            summary = summarise(events, (path,))
+            if summary.recovers and not summary.lost_events:
+                found.setdefault(summary.replicate, []).append(sorted(events, key=lambda event: event.seq))
+    return {folder: sorted(trials, key=lambda events: events[0].wall_time) for folder, trials in found.items()}
+
+
+def format_tried(rows: Sequence[Tried]) -> str:
+    """A line for each oracle that was tried."""
+    names = [', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded' for row in rows]
+    width = max(len(name) for name in names + ['settings'])
+    lines = ['{:<{}}  decisions'.format('settings', width) + ''.join('{:>20}'.format(name) for name in OUTCOMES)
+             + '   trials with another']
+    for name, row in zip(names, rows):
+        lines.append('{:<{}}  {:>9}'.format(name, width, sum(row.counts.values())) + ''.join(
+            '{:>20}'.format(row.counts[outcome]) for outcome in OUTCOMES)
+            + '   {} of {}'.format(row.other_trials, row.trials))
+    return '\n'.join(lines) + '\n'
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', help='with bags in it or below it')
+    parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
+    parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')
+    for name in ('moderate_from', 'high_from', 'prior'):
+        parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try')
+    args = parser.parse_args(argv)
+    varied = {name: values for name, values in vars(args).items() if name != 'folders' and values}
+    try:
+        replicates = load_replicates(args.folders)
+        if not replicates:
+            raise BagError('no trials with an oracle in {}'.format(', '.join(args.folders)))
+        for folder, trials in sorted(replicates.items()):
+            rows = [compare(trials, dict(zip(varied, values))) for values in itertools.product(*varied.values())]
+            sys.stdout.write('{}\n{}'.format(folder, format_tried(rows)))
+    except OracleError as err:
+        sys.stderr.write('what_if: {}\n'.format(err))
+        return 2
+    return 0

@@ -1,0 +1,108 @@
+"""What another oracle would have decided: replayed from the events of real machines."""
+import random
+
+import pytest
+import smach
+
+from smach_oracle.analysis import what_if
+from smach_oracle.analysis.bag_events import BagError
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.question import Answer, AnswerKind, Expert
+from smach_oracle.ros.recorder import TrialRecorder
+
+KEPT = {'memory': 10, 'policy': 'prose', 'prior': 0.1}
+
+
+class Chance(smach.State):
+    """Fails now and then."""
+
+    def __init__(self, generator, share):
+        super().__init__(outcomes=['succeeded', 'aborted'])
+        self._generator = generator
+        self._share = share
+
+    def execute(self, userdata):
+        return 'aborted' if self._generator.random() < self._share else 'succeeded'
+
+
+class Hand(Expert):
+    """Does the failed state's work, and now and then sends the machine back to it."""
+
+    def __init__(self, generator):
+        self._generator = generator
+
+    def ask(self, question, cancelled, progress):
+        if self._generator.random() < 0.3:
+            return Answer(AnswerKind.GOTO, state=question.failed_state, by='hand')
+        return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='hand')
+
+
+def run(count, seed=1, states=None, **settings):
+    """The events of some trials of one learning machine, by trial."""
+    generator = random.Random(seed)
+    inner = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+    with inner:
+        smach.StateMachine.add('REACH', Chance(generator, 0.3))
+    machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+    with machine:
+        smach.StateMachine.add('LOOK', Chance(generator, 0.1), {'succeeded': 'PICK'})
+        smach.StateMachine.add('PICK', Chance(generator, 0.5), {'succeeded': 'INNER'})
+        smach.StateMachine.add('INNER', inner, {'succeeded': 'PLACE'})
+        smach.StateMachine.add('PLACE', Chance(generator, 0.3))
+    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator), preconditions={'PICK': ['LOOK']},
+                         settings=dict(KEPT, states=states or {}, **settings))
+    events = []
+    machine.events.observers.append(events.append)
+    for _ in range(count):
+        machine.execute()
+    ids = list(dict.fromkeys(event.trial_id for event in events))
+    return [[event for event in events if event.trial_id == trial_id] for trial_id in ids]
+
+
+@pytest.mark.parametrize('settings', [{}, {'memory': 2}, {'policy': 'algorithm1'}, {'estimator': 'exponential'},
+                                      {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
+def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
+    tried = what_if.compare(run(60, **{**KEPT, **settings}), {})
+    assert sum(tried.counts.values()) > 20
+    assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
+    assert tried.counts['not known'] == 0, 'preconditions that were not run are needed by nobody here'
+
+
+def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():
+    trials = run(60)
+    tried = what_if.compare(trials, {'memory': 1})
+    assert tried.counts['would ask'] > 5 and tried.counts['would recover'] == 0
+    assert 0 < tried.other_trials <= tried.trials == 60
+
+
+def test_what_was_not_tried_is_not_known():
+    trials = run(60, memory=1)  # every failure is HIGH: no precondition was run, if there are any
+    tried = what_if.compare(trials, {'memory': 50})
+    assert tried.counts['not known'] > 5 and tried.counts['would recover'] == 0
+
+
+def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
+    assert what_if.compare(run(60, memory=2), {'memory': 50}).counts['would recover'] > 5
+
+
+def test_a_record_that_does_not_replay_is_refused():
+    with pytest.raises(BagError, match='states with settings of their own'):
+        what_if.compare(run(60, states={'PICK': {'memory': 3}}), {'memory': 5})
+    with pytest.raises(BagError, match='trials that are missing'):
+        what_if.compare(run(60)[5:], {'memory': 5})
+
+
+def test_the_command(tmp_path, capsys):
+    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
+    for trial in run(40):
+        for event in trial:
+            recorder(event)
+    assert recorder.close(20.0)
+    capsys.readouterr()
+    assert what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose', 'algorithm1']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == str(tmp_path) and len(lines) == 6
+    row = next(line for line in lines if line.startswith('memory 10, policy prose'))
+    assert row.split()[4] == row.split()[5] and row.endswith('   0 of 40'), 'as recorded'
+    assert what_if.main([str(tmp_path / 'nowhere')]) == 2
+    assert 'no such folder' in capsys.readouterr().err
