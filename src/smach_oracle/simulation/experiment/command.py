@@ -104,6 +104,7 @@ def make_parser() -> argparse.ArgumentParser:
     for name, kind, what in OVERRIDES:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
     parser.add_argument('--answer-delay', type=float, default=0.0, help='s that the scripted expert takes')
+    parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
     parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
                         help='s without the end of a trial, after which it is run anew (default: 300)')
     parser.add_argument('--output', type=Path,
@@ -129,7 +130,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
             Settings.from_dict(dict(arm.settings))
         except ConfigError as err:
             parser.error(str(err))
-    args.plan = Plan(args.task, trials, args.seed, args.replicates, arms, args.answer_delay)
+    args.plan = Plan(args.task, trials, args.seed, args.replicates, arms, args.answer_delay, args.benign)
     return args
 
 

@@ -72,7 +72,8 @@ class Job:
         settings = dict(self.arm.settings, rates_file=str(self._records.rates))
         return {'trials': self.trials - self._next, 'seed': self._seed + self._next, 'record': self._records.folder,
                 'truth': self._records.truth, 'with_oracle': str(self.arm.recovers).lower(),
-                'answer_delay': self._plan.answer_delay, 'oracle': json.dumps(settings)}
+                'answer_delay': self._plan.answer_delay, 'benign': str(self._plan.benign).lower(),
+                'oracle': json.dumps(settings)}
 
     def watch(self) -> None:
         """See how it goes: take in new trials, start again after a trial in which something hung or died.

@@ -38,6 +38,7 @@ class Plan(NamedTuple):
     replicates: int
     arms: Tuple[Arm, ...]
     answer_delay: float  # s
+    benign: bool = False  # worlds without causes to fail
 
     def first_seed(self, replicate: int) -> int:
         """Seed of the first trial of a replicate, which is counted from 0; the next trial has the next."""
