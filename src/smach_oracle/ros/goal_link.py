@@ -23,6 +23,7 @@ class GoalEvent(NamedTuple):
     feedback: Any = None
     status: int = 0
     result: Any = None
+    text: str = ''  # what the server says of the end
 
 
 class SentGoal:
@@ -68,7 +69,8 @@ class SentGoal:
         if state == actionlib.CommState.WAITING_FOR_RESULT:
             self._ended_s = time.monotonic()
         elif state == actionlib.CommState.DONE:
-            self._events.put(GoalEvent(status=handle.get_terminal_state(), result=handle.get_result()))
+            self._events.put(GoalEvent(status=handle.get_terminal_state(), result=handle.get_result(),
+                                       text=handle.get_goal_status_text()))
 
     def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: Any) -> None:
         """actionlib's callback."""

@@ -39,7 +39,7 @@ def main() -> None:
     except (ValueError, ModelError) as err:
         rospy.logfatal('pr2_manipulation: %s', err)
         raise SystemExit(2) from err
-    server = SkillServer(robot.abort)
+    server = SkillServer(robot.abort, robot.resume)
     serve(Manipulation(Means(robot, model)), server)
     rospy.loginfo('pr2_manipulation: %d actions ready', server.names())
     rospy.spin()

@@ -119,7 +119,7 @@ def main() -> None:
         rospy.logfatal('pr2_perception: %s', err)
         raise SystemExit(2) from err
     robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
-    perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort)
+    perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort, robot.resume)
     server.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,))
     server.offer('detect_drink', DetectDrinkAction, perception.detect_drink, (NotSeen,))
     rospy.loginfo('pr2_perception: %d actions ready', server.names())

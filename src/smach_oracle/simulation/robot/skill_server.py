@@ -16,11 +16,12 @@ Handler = Callable[[Any, Say], Any]
 class SkillServer:
     """Action servers that share one robot, which does one thing at a time."""
 
-    def __init__(self, abort: Callable[[], None]) -> None:
+    def __init__(self, abort: Callable[[], None], resume: Callable[[], None]) -> None:
         """
-        :param abort: makes what the robot does now end with a RobotError; called from any thread.
+        :param abort: makes what the robot does, now and until `resume`, end with a RobotError; called from any thread.
         """
         self._abort = abort
+        self._resume = resume
         self._busy = threading.Lock()
         self._running = ''
         self._servers: List[actionlib.SimpleActionServer] = []
@@ -53,10 +54,12 @@ class SkillServer:
             server.publish_feedback(feedback)
 
         with self._busy:
+            self._running = name
+            self._resume()
             if server.is_preempt_requested():
+                self._running = ''
                 server.set_preempted(result)
                 return
-            self._running = name
             try:
                 server_result = handler(goal, say)
             except expected as err:

@@ -1,29 +1,29 @@
 """What moves now: at most one motion for each part of the robot."""
 from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
-from smach_oracle.simulation.robot.interface import RobotError
+from smach_oracle.simulation.world.trajectory import Result
 
 PARTS = ('base', 'head', 'left_arm', 'left_gripper', 'right_arm', 'right_gripper', 'torso')
 
 
 class Ending(NamedTuple):
-    """How a motion ended: with its result, by an error, or because it was stopped (neither)."""
+    """How a motion ended: with its result, or because it was stopped (None)."""
 
-    result: Any = None
-    error: Optional[RobotError] = None
-    text: str = ''
+    result: Optional[Result]
+    text: str = ''  # why it was stopped, or failed
+    aborted: bool = False  # stopped by the world, not by who commanded it or by a newer command
 
 
 class _Running(NamedTuple):
     motion: Any
     ended: Callable[[Ending], None]
+    result: Optional[Result] = None  # done, but what its end set off in the world has not come to rest yet
 
 
 class MotionTable:
     """Advances the motions of all parts together, in the order of the parts' names.
 
-    A motion has ``tick(world)``, called before each control period, which returns None until it has ended and then its
-    result, and may raise RobotError; and ``stop(world)``, which has the part rest where it is.
+    A motion is what world/motions.py has: ``tick(world)``, ``events()``, ``stop(world)``.
     """
 
     def __init__(self, world: Any) -> None:
@@ -38,43 +38,41 @@ class MotionTable:
         running = self._running.get(part)
         return running.motion if running else None
 
-    def start(self, part: str, motion: Any, ended: Callable[[Ending], None], newer: str) -> None:
+    def start(self, part: str, motion: Any, ended: Callable[[Ending], None], newer: str = '') -> None:
         """Begin a motion; `ended` is called once. An older one of the same part ends with the text `newer`."""
         self.stop(part, newer)
         self._running[part] = _Running(motion, ended)
 
-    def stop(self, part: str, text: str) -> None:
+    def stop(self, part: str, text: str, aborted: bool = False) -> None:
         """End the motion of a part, if there is one, where it is."""
         running = self._running.pop(part, None)
-        if running:
-            running.motion.stop(self._world)
-            running.ended(Ending(text=text))
+        if running is None:
+            return
+        if running.result is not None:
+            running.ended(Ending(running.result, running.result.text))
+            return
+        running.motion.stop(self._world)
+        running.ended(Ending(None, text, aborted))
 
     def stop_all(self, text: str) -> None:
-        """End every motion where it is."""
+        """End every motion where it is, as the world's own doing."""
         for part in sorted(self._running):
-            self.stop(part, text)
+            self.stop(part, text, aborted=True)
 
     def tick(self) -> None:
-        """Have every motion set its targets, the world advance by a control period, and those that are done end."""
-        over: List[str] = []
-        endings: List[Ending] = []
+        """Have every motion send its joints on, or end; then let a control period pass, unless all have ended."""
         for part in sorted(self._running):
-            ending = self._advance(part)
-            if ending:
-                over.append(part)
-                endings.append(ending)
-        running = [self._running.pop(part) for part in over]
+            running = self._running[part]
+            if running.result is None:
+                result = running.motion.tick(self._world)
+                if result is not None:
+                    self._world.happened(*running.motion.events())
+                    self._running[part] = running._replace(result=result)
+        over: List[str] = []
+        if not self._world.unrest:
+            over = [part for part, running in sorted(self._running.items()) if running.result is not None]
+        ended = [self._running.pop(part) for part in over]
         if self._running or not over:
             self._world.step()
-        for each, ending in zip(running, endings):
-            each.ended(ending)
-
-    def _advance(self, part: str) -> Optional[Ending]:
-        motion = self._running[part].motion
-        try:
-            result = motion.tick(self._world)
-        except RobotError as err:
-            motion.stop(self._world)
-            return Ending(error=err, text=str(err))
-        return None if result is None else Ending(result=result)
+        for running in ended:
+            running.ended(Ending(running.result, running.result.text if running.result else ''))

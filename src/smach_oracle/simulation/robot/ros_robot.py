@@ -1,0 +1,177 @@
+"""The PR2 behind its actions and topics: what the subsystems' nodes drive, simulated or real."""
+import math
+import threading
+import time
+from typing import Any, Dict, Optional, Sequence
+
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import (FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult,
+                              GripperCommandAction, GripperCommandGoal, PointHeadAction, PointHeadGoal,
+                              SingleJointPositionAction, SingleJointPositionGoal)
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ...geometry.transforms import quaternion
+from ...ros.goal_link import GoalEvent, GoalLink, lost
+from .interface import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, Frame, GripperState, RobotError
+from .ros_senses import RosSenses
+
+NO_SNAPSHOT = 'none'
+
+
+class RosRobot:
+    """The Robot protocol over ROS. All names are relative to the node's namespace, and can be remapped.
+
+    :param snapshot: service smach_oracle/Snapshot of a simulated world, which gives joint states, transforms and frames
+        with one stamp; NO_SNAPSHOT: whatever comes next, as on a real robot.
+    :param timeout_s: wall s that the robot may be silent, or not there, before a call fails.
+    """
+
+    def __init__(self, snapshot: str = 'world/snapshot', timeout_s: float = 30.0) -> None:
+        self._timeout_s = timeout_s
+        self._senses = RosSenses('' if snapshot == NO_SNAPSHOT else snapshot, timeout_s)
+        self._links: Dict[str, GoalLink] = {}
+        for side in (arm[0] for arm in ARMS):
+            self._link(side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction)
+            self._link(side + '_gripper_controller/gripper_action', GripperCommandAction)
+        self._link('head_traj_controller/point_head_action', PointHeadAction)
+        self._link('torso_controller/position_joint_action', SingleJointPositionAction)
+        self._link('move_base', MoveBaseAction)
+        self._aborted = threading.Event()
+        self._calls = threading.RLock()
+
+    def _link(self, name: str, spec: Any) -> None:
+        self._links[name] = GoalLink(rospy.resolve_name(name), spec)
+
+    def abort(self) -> None:
+        """Stop what moves now, and refuse all further calls with RobotError until resume(). From any thread."""
+        self._aborted.set()
+
+    def resume(self) -> None:
+        """Take calls again after abort()."""
+        self._aborted.clear()
+
+    def joints(self) -> Dict[str, float]:
+        """See Robot. Raises RobotError where no joint states come."""
+        self._check_allowed()
+        return self._senses.joints()
+
+    def odom_from_base(self) -> np.ndarray:
+        """See Robot. Raises RobotError where no transform comes."""
+        self._check_allowed()
+        return self._senses.transform(ODOM_FRAME, BASE_FRAME)
+
+    def see(self) -> Frame:
+        """See Robot."""
+        self._check_allowed()
+        return self._senses.see(BASE_FRAME, CAMERA_FRAME)
+
+    def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
+        """See Robot; all of the joints belong to one arm."""
+        arm = next((arm for arm in ARMS if set(joints) <= set(ARM_JOINTS[arm])), '')
+        if not arm or not len(joints):
+            raise RobotError('follow: joints {}; allowed: those of one arm, {}'.format(
+                list(joints), ' or '.join(', '.join(ARM_JOINTS[each]) for each in ARMS)))
+        shape = np.shape(positions)
+        if shape != (len(times), len(joints)):
+            raise RobotError('follow: positions {} do not fit {} times and {} joints'.format(
+                shape, len(times), len(joints)))
+        points = [JointTrajectoryPoint(positions=list(map(float, point)), time_from_start=_duration(moment))
+                  for point, moment in zip(positions, times)]
+        goal = FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=list(joints), points=points))
+        result = self._do(arm[0] + '_arm_controller/follow_joint_trajectory', goal, arm + ' arm')
+        if result.error_code != FollowJointTrajectoryResult.SUCCESSFUL:
+            raise RobotError('{} arm: error {} {}'.format(arm, result.error_code, result.error_string))
+
+    def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
+        """See Robot. A gripper that stalls has not failed; RobotError means that it did not do what it was told."""
+        if arm not in ARMS:
+            raise RobotError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+        goal = GripperCommandGoal()
+        goal.command.position, goal.command.max_effort = float(position), float(max_effort)
+        result = self._do(arm[0] + '_gripper_controller/gripper_action', goal, arm + ' gripper', stalls=True)
+        return GripperState(result.position, result.effort, result.stalled, result.reached_goal)
+
+    def torso(self, height: float) -> None:
+        """See Robot."""
+        self._do('torso_controller/position_joint_action', SingleJointPositionGoal(position=float(height)), 'torso')
+
+    def look_at(self, point: Sequence[float]) -> None:
+        """See Robot."""
+        target = PointStamped(Header(frame_id=BASE_FRAME), Point(*map(float, point)))
+        self._do('head_traj_controller/point_head_action',
+                 PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=CAMERA_FRAME), 'head')
+
+    def drive(self, odom_from_goal: np.ndarray) -> None:
+        """See Robot."""
+        if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
+            raise RobotError('drive: the goal is no finite 4x4 pose')
+        place = Point(*odom_from_goal[:3, 3].tolist())
+        pose = Pose(place, Quaternion(*quaternion(odom_from_goal).tolist()))
+        self._do('move_base', MoveBaseGoal(PoseStamped(Header(frame_id=ODOM_FRAME), pose)), 'base')
+
+    def _do(self, name: str, goal: Any, what: str, stalls: bool = False) -> Any:
+        """Send a goal and wait for its result.
+
+        :param stalls: a goal that was aborted has a result all the same (a gripper that holds something).
+        :raises RobotError: where nobody takes it, it fails, or abort() is called.
+        """
+        with self._calls:
+            link = self._ready(name, what)
+            sent = link.send(goal, time.monotonic())
+            cancelled_at: Optional[float] = None
+            while True:
+                event = sent.poll()
+                if event is not None and event.status:
+                    return self._result(event, what, stalls)
+                self._check(link, sent, what)
+                now = time.monotonic()
+                if self._aborted.is_set() and cancelled_at is None:
+                    cancelled_at = now
+                    sent.cancel()
+                if cancelled_at is not None and now - cancelled_at > self._timeout_s:
+                    raise RobotError('{}: stopping it got no answer'.format(what))
+
+    def _ready(self, name: str, what: str) -> GoalLink:
+        link = self._links[name]
+        until = time.monotonic() + self._timeout_s
+        self._check_allowed()
+        while not link.ready():
+            if time.monotonic() > until or rospy.is_shutdown():
+                raise RobotError('{}: no controller at {}'.format(what, link.name))
+            time.sleep(0.01)
+            self._check_allowed()
+        return link
+
+    def _check_allowed(self) -> None:
+        if self._aborted.is_set():
+            raise RobotError('the robot was told to stop')
+
+    @staticmethod
+    def _check(link: GoalLink, sent: Any, what: str) -> None:
+        if rospy.is_shutdown():
+            raise RobotError('{}: this node is shutting down'.format(what))
+        if not link.alive() or sent.unheard(time.monotonic()):
+            raise RobotError('{}: the controller at {} has gone'.format(what, link.name))
+
+    @staticmethod
+    def _result(event: GoalEvent, what: str, stalls: bool) -> Any:
+        ended_well = event.status == GoalStatus.SUCCEEDED or (stalls and event.status == GoalStatus.ABORTED)
+        if ended_well and event.result is not None:
+            return event.result
+        if lost(event):
+            raise RobotError('{}: the controller was restarted'.format(what))
+        text = event.text or getattr(event.result, 'error_string', '')
+        raise RobotError('{}: {}{}'.format(what, {
+            GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted', GoalStatus.RECALLED: 'preempted'}.get(
+                event.status, 'failed'), ': ' + text if text else ''))
+
+
+def _duration(seconds: float) -> rospy.Duration:
+    if not math.isfinite(seconds):
+        raise RobotError('follow: a time is {}; allowed: finite numbers'.format(seconds))
+    return rospy.Duration.from_sec(float(seconds))

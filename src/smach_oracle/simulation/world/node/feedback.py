@@ -1,0 +1,96 @@
+"""What the controllers tell about a motion, while it goes on and at its end."""
+from typing import Any, List
+
+import numpy as np
+import rospy
+from control_msgs.msg import (FollowJointTrajectoryFeedback, FollowJointTrajectoryResult, GripperCommandFeedback,
+                              GripperCommandResult, PointHeadFeedback, PointHeadResult, SingleJointPositionFeedback,
+                              SingleJointPositionResult)
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from move_base_msgs.msg import MoveBaseFeedback, MoveBaseResult
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from smach_oracle.geometry.transforms import inverse, quaternion
+from smach_oracle.simulation.robot.interface import CAMERA_FRAME, ODOM_FRAME
+from smach_oracle.simulation.world.motions import Gripper, Head, Torso
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.trajectory import Trajectory
+
+from .motion_table import Ending
+
+CODES = {'': FollowJointTrajectoryResult.INVALID_GOAL,
+         'path': FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
+         'goal': FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED}
+
+
+def _header(frame_id: str = '') -> Header:
+    return Header(stamp=rospy.get_rostime(), frame_id=frame_id)
+
+
+def arm(world: World, motion: Trajectory) -> FollowJointTrajectoryFeedback:
+    """Where the joints should be, and are."""
+    wanted = [world.robot.target(name) for name in motion.joints]
+    found = [world.robot.position(name) for name in motion.joints]
+    return FollowJointTrajectoryFeedback(_header(), motion.joints, _point(wanted), _point(found),
+                                         _point([a - b for a, b in zip(wanted, found)]))
+
+
+def _point(positions: List[float]) -> JointTrajectoryPoint:
+    return JointTrajectoryPoint(positions=positions)
+
+
+def arm_result(_world: World, _motion: Trajectory, ending: Ending) -> FollowJointTrajectoryResult:
+    """By whether it failed on the way or at its end."""
+    if ending.result is None or ending.result.ok:
+        return FollowJointTrajectoryResult(FollowJointTrajectoryResult.SUCCESSFUL, ending.text)
+    return FollowJointTrajectoryResult(CODES[ending.result.missed], ending.text)
+
+
+def gripper(name: str, world: World, _motion: Gripper) -> GripperCommandFeedback:
+    """Where the fingers are."""
+    return GripperCommandFeedback(world.gap(name), world.robot.finger_force(name), False, False)
+
+
+def gripper_result(name: str, world: World, _motion: Gripper, ending: Ending) -> GripperCommandResult:
+    """Where the fingers came to rest."""
+    state = ending.result.gripper if ending.result else None
+    if state is None:
+        return GripperCommandResult(world.gap(name), world.robot.finger_force(name), False, False)
+    return GripperCommandResult(state.position, state.effort, state.stalled, state.reached)
+
+
+def head(world: World, motion: Head) -> PointHeadFeedback:
+    """The angle that is left."""
+    camera = inverse(world.true_base()) @ world.link_pose(CAMERA_FRAME)
+    way = motion.point - camera[:3, 3]
+    cosine = float(way @ camera[:3, 2]) / max(float(np.linalg.norm(way)), 1e-9)
+    return PointHeadFeedback(float(np.arccos(min(1.0, max(-1.0, cosine)))))
+
+
+def head_result(_world: World, _motion: Head, _ending: Ending) -> PointHeadResult:
+    """Nothing."""
+    return PointHeadResult()
+
+
+def torso(world: World, motion: Torso) -> SingleJointPositionFeedback:
+    """How far it is."""
+    name = motion.joints[0]
+    position = world.robot.position(name)
+    return SingleJointPositionFeedback(_header(), position, world.joint_velocities()[name], motion.height - position)
+
+
+def torso_result(_world: World, _motion: Torso, _ending: Ending) -> SingleJointPositionResult:
+    """Nothing."""
+    return SingleJointPositionResult()
+
+
+def base(world: World, _motion: Any) -> MoveBaseFeedback:
+    """Where the robot believes to be."""
+    pose = world.odom_from_base()
+    return MoveBaseFeedback(PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))))
+
+
+def base_result(_world: World, _motion: Any, _ending: Ending) -> MoveBaseResult:
+    """Nothing."""
+    return MoveBaseResult()

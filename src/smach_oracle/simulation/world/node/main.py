@@ -1,0 +1,212 @@
+"""The world node: one process with the physics, the PR2's controllers and camera, and the book on each trial's truth."""
+import importlib
+import sys
+import threading
+import traceback
+from typing import Dict, List, Optional
+
+import rosgraph
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+
+from smach_oracle.msg import TrialCause
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.simulation.robot.pr2_model import ModelError
+from smach_oracle.simulation.world.camera import FRAME_PERIODS, shoot
+from smach_oracle.simulation.world.judge import Verdict, judge
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.scene import Scene
+from smach_oracle.srv import (Judge, JudgeRequest, JudgeResponse, ResetWorld, ResetWorldRequest, ResetWorldResponse,
+                              Reveal, RevealRequest, RevealResponse, Snapshot, SnapshotRequest, SnapshotResponse)
+
+from .camera_publisher import CameraPublisher
+from .controllers import Controllers
+from .loop import PERIOD_S, WorldLoop, WorldStopped
+from .motion_table import MotionTable
+from .reveal import reveal
+from .settings import WorldSettings, read_settings
+from .sim_clock import SimClock
+from .state_publisher import StatePublisher, publish_description, ros_time
+from .trial import Trial, append_line
+
+SCENES: Dict[str, str] = {'pick_and_place': 'tabletop_scene', 'drink_retrieval': 'kitchen_scene'}
+SETTLING_S = 1.0  # after a trial, before it is judged
+LAST_WORDS_S = 1.5  # for the last trial's line, at the end
+SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
+
+
+def draw(task: str, seed: int, benign: bool) -> Scene:
+    """A trial's scene."""
+    module = importlib.import_module('smach_oracle.simulation.world.' + SCENES[task])
+    scene: Scene = module.draw(seed, benign=benign)
+    return scene
+
+
+class WorldNode:
+    """The node's topics, services and actions around one world; `run` serves until `close`."""
+
+    def __init__(self, settings: WorldSettings) -> None:
+        """Raises ModelError where the PR2's model cannot be had, ValueError where a scene cannot be built."""
+        self._settings = settings
+        self._world = World(draw(settings.task, settings.seed, settings.benign))
+        self._trial: Optional[Trial] = None
+        clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
+        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
+        self._motions = MotionTable(self._world)
+        self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
+        self._state = StatePublisher(publish_description(), list(self._world.joints()))
+        self._camera = CameraPublisher()
+        self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
+        self._state_due = self._frame_due = 0.0
+        self._controllers = Controllers(self._world, self._loop, self._motions, lambda: self._clock.now_ns / 1e9,
+                                        self._target_reached)
+        self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
+                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
+                          rospy.Service('world/reveal', Reveal, self._answer_reveal),
+                          rospy.Service('world/judge', Judge, self._answer_judge)]
+
+    def run(self) -> None:
+        """Serve until close(); in the thread that shall own the physics."""
+        rospy.loginfo('pr2_world: ready for %s', self._settings.task)
+        self._publish_state()
+        self._loop.run(self._end)
+
+    def close(self) -> None:
+        """Stop serving; returns when the last trial's line is written."""
+        self._loop.stop(LAST_WORDS_S)
+
+    # in the world's thread
+
+    def _after_tick(self) -> None:
+        now = self._clock.now_ns / 1e9
+        if now >= self._state_due and not (self._settings.lock_step and self._controllers.streaming()):
+            self._publish_state()
+            self._controllers.publish_feedback()
+        if self._settings.camera_rate and now >= self._frame_due and self._camera.wanted:
+            self._frame_due = now + 1.0 / self._settings.camera_rate
+            self._publish_frame(self._publish_state(), counted=False)
+
+    def _publish_state(self) -> rospy.Time:
+        stamp = ros_time(self._clock.stamp())
+        self._state.publish(self._world, stamp)
+        self._state_due = stamp.to_sec() + 1.0 / self._settings.state_rate - PERIOD_S / 2
+        return stamp
+
+    def _publish_frame(self, stamp: rospy.Time, counted: bool) -> None:
+        self._loop.watch.lap('publish')
+        frame = shoot(self._world, counted)
+        self._loop.watch.lap('camera')
+        self._camera.publish(frame.colour, frame.depth, frame.intrinsics, stamp)
+        self._loop.watch.lap('publish')
+
+    def _target_reached(self) -> None:
+        if self._settings.lock_step:
+            self._publish_state()
+
+    def _snapshot(self, camera: bool) -> rospy.Time:
+        if camera:
+            self._loop.pass_time(FRAME_PERIODS * PERIOD_S)
+        stamp = self._publish_state()
+        if camera:
+            self._publish_frame(stamp, counted=True)
+        return stamp
+
+    def _reset(self, seed: int) -> None:
+        self._motions.stop_all('the world was reset')
+        self._finish_trial()
+        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
+        self._trial = Trial(self._world.scene, self._world.time)
+        self._loop.watch.restart()
+        causes = self._world.scene.causes
+        self._cause.publish(TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
+                                       [cause.kind for cause in causes], [cause.text for cause in causes]))
+        self._publish_state()
+
+    def _judge(self) -> Verdict:
+        return judge(self._world, self._world.scene.goal)
+
+    def _finish_trial(self) -> None:
+        """Write down what came of the trial, once."""
+        trial, self._trial = self._trial, None
+        if trial is None or self._settings.truth_file == 'none':
+            return
+        sim_s = self._world.time
+        self._world.step(round(SETTLING_S / PERIOD_S))
+        verdict = self._judge()
+        record = trial.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent)
+        try:
+            append_line(self._settings.truth_file, record)
+        except OSError as err:
+            rospy.logerr('%s: the truth on trial %d is lost: %s', rospy.resolve_name('~truth_file'), record['seed'], err)
+
+    def _end(self) -> None:
+        self._finish_trial()
+        self._world.close()
+
+    # in the threads of ROS
+
+    def _answer_reset(self, request: ResetWorldRequest) -> ResetWorldResponse:
+        try:
+            self._loop.ask(lambda: self._reset(request.seed))
+        except (ValueError, WorldStopped) as err:
+            return ResetWorldResponse(False, str(err))
+        return ResetWorldResponse(True, '')
+
+    def _answer_snapshot(self, request: SnapshotRequest) -> SnapshotResponse:
+        try:
+            return SnapshotResponse(True, '', self._loop.ask(lambda: self._snapshot(request.camera)))
+        except WorldStopped as err:
+            return SnapshotResponse(False, str(err), rospy.Time())
+
+    def _answer_reveal(self, request: RevealRequest) -> RevealResponse:
+        try:
+            bodies = self._loop.ask(lambda: reveal(self._world, request.names, ros_time(self._clock.now_ns)))
+        except (ValueError, WorldStopped) as err:
+            return RevealResponse(ok=False, message=str(err))
+        scene = self._world.scene
+        return RevealResponse(True, '', scene.seed, scene.goal.body, bodies)
+
+    def _answer_judge(self, _request: JudgeRequest) -> JudgeResponse:
+        try:
+            verdict = self._loop.ask(self._judge)
+        except WorldStopped as err:
+            return JudgeResponse(ok=False, message=str(err))
+        return JudgeResponse(True, '', verdict.success, verdict.why)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    parameters_only('Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
+                    '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate; see '
+                    'doc/simulation.md.')
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        rospy.set_param('/use_sim_time', True)  # before the node is made: rospy looks at it only then
+    except OSError as err:
+        raise SystemExit('pr2_world: no ROS master at {}: {}'.format(rosgraph.get_master_uri(), err)) from err
+    rospy.init_node('pr2_world')
+    try:
+        node = WorldNode(read_settings(rospy.get_param))
+    except (ConfigError, ModelError, ValueError) as err:
+        rospy.logfatal('pr2_world: %s', err)
+        raise SystemExit(2) from err
+    broken: List[BaseException] = []
+    thread = threading.Thread(target=_run, args=(node, broken), name='world')
+    rospy.on_shutdown(node.close)
+    thread.start()
+    rospy.spin()
+    thread.join()
+    if broken:
+        raise SystemExit(1) from broken[0]
+
+
+def _run(node: WorldNode, broken: List[BaseException]) -> None:
+    """A world that fails takes its node along: it must not stand there without answering."""
+    try:
+        node.run()
+    except Exception as err:  # whatever it is, the node cannot go on
+        broken.append(err)
+        rospy.logfatal('pr2_world: %s', traceback.format_exc())
+        rospy.signal_shutdown('the world failed')

@@ -1,0 +1,120 @@
+"""What an expert would see standing beside the robot: the bodies as they truly are, and where the camera has them."""
+import xml.etree.ElementTree as ElementTree
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from scipy.spatial import ConvexHull, QhullError
+from sensor_msgs.msg import RegionOfInterest
+from std_msgs.msg import Header
+
+from smach_oracle.geometry.depth import pixels_of
+from smach_oracle.geometry.transforms import from_rpy, inverse, quaternion
+from smach_oracle.msg import RevealedBody
+from smach_oracle.simulation.robot.interface import BASE_FRAME, CAMERA_FRAME
+from smach_oracle.simulation.world.camera import HEIGHT, INTRINSICS, WIDTH, View
+from smach_oracle.simulation.world.fridge import DOOR_JOINT
+from smach_oracle.simulation.world.physics import World
+
+PARTS = {'door': 'box', 'handle': 'cylinder'}  # of a door's link: the first shape of each kind
+
+
+class _Thing(NamedTuple):
+    """A body, or a part of one."""
+
+    body: str  # in the world
+    pose: np.ndarray  # 4x4, the world from its centre
+    size: np.ndarray  # (3,) m; 0: not known
+
+
+def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[RevealedBody]:
+    """The bodies of these names, or all.
+
+    :raises ValueError: for a name that is not there, with those that are.
+    """
+    things = _things(world)
+    unknown = [name for name in names if name not in things]
+    if unknown:
+        raise ValueError('no body {!r} in this scene; there: {}'.format(unknown[0], ', '.join(things) or 'none'))
+    seen = View(world, world.link_pose(CAMERA_FRAME)).bodies
+    return [_message(world, name, things[name], seen, stamp) for name in names or things]
+
+
+def _things(world: World) -> Dict[str, _Thing]:
+    found = {}
+    for name in world.body_names:
+        body = world.body(name)
+        size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
+        found[name] = _Thing(name, world.body_pose(name), np.zeros(3) if body.shape == 'urdf' else size)
+        if dict(body.joint_friction).get(DOOR_JOINT) is not None:
+            for part, (pose, extent) in _door_parts(body.urdf).items():
+                found[part] = _Thing(name, world.body_pose(name, 'door') @ pose, extent)
+    return found
+
+
+def _door_parts(urdf: str) -> Dict[str, Tuple[np.ndarray, np.ndarray]]:
+    """Pose in the door's link, and size, of the door and its handle."""
+    parts = {}
+    for name, shape in PARTS.items():
+        for part in ElementTree.fromstring(urdf).findall("./link[@name='door']/visual"):
+            solid = part.find('geometry/' + shape)
+            origin = part.find('origin')
+            if solid is not None and origin is not None:
+                parts[name] = (from_rpy(_numbers(origin.get('xyz'))), _extent(solid))
+                break
+    return parts
+
+
+def _extent(solid: ElementTree.Element) -> np.ndarray:
+    if solid.tag == 'box':
+        return np.array(_numbers(solid.get('size')))
+    across = 2 * float(solid.get('radius', 0))
+    return np.array([across, across, float(solid.get('length', 0))])
+
+
+def _numbers(text: Optional[str]) -> List[float]:
+    return [float(word) for word in (text or '0 0 0').split()]
+
+
+def _message(world: World, name: str, thing: _Thing, seen: np.ndarray, stamp: rospy.Time) -> RevealedBody:
+    pose = inverse(world.true_base()) @ thing.pose
+    body = world.body(thing.body)
+    region, visible = _region(world, thing, seen) if thing.size.any() else (RegionOfInterest(), 0.0)
+    return RevealedBody(
+        name=name, size=Vector3(*thing.size), movable=name in world.movable(), region=region, visible=visible,
+        pose=PoseStamped(Header(stamp=stamp, frame_id=BASE_FRAME),
+                         Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))),
+        held=world.holding(thing.body) if name == thing.body else '',
+        angle=world.body_joint(thing.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
+
+
+def _region(world: World, thing: _Thing, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
+    """Where the camera has it, and the share of its outline that nothing hides."""
+    corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * thing.size
+    camera = world.link_pose(CAMERA_FRAME)
+    points = corners @ thing.pose[:3, :3].T + thing.pose[:3, 3]
+    pixels = pixels_of(points, INTRINSICS, camera)
+    if (pixels[:, 2] <= 0).any():
+        return RegionOfInterest(), 0.0
+    left, top = np.maximum(np.floor(pixels[:, :2].min(axis=0)).astype(int), 0)
+    right, bottom = np.minimum(np.ceil(pixels[:, :2].max(axis=0)).astype(int), (WIDTH - 1, HEIGHT - 1))
+    if right < left or bottom < top:
+        return RegionOfInterest(), 0.0
+    window = seen[top:bottom + 1, left:right + 1]
+    own = [index for index in np.unique(window) if world.seen_as(int(index)) == thing.body]
+    rows, columns = np.nonzero(np.isin(window, own))
+    if not len(rows):
+        return RegionOfInterest(), 0.0
+    outline = _area(pixels[:, :2])
+    return (RegionOfInterest(x_offset=int(left + columns.min()), y_offset=int(top + rows.min()),
+                             width=int(np.ptp(columns)) + 1, height=int(np.ptp(rows)) + 1),
+            float(min(1.0, len(rows) / max(outline, 1.0))))
+
+
+def _area(points: np.ndarray) -> float:
+    """Of the outline around points (n, 2), pixels."""
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:  # all on a line
+        return 0.0
