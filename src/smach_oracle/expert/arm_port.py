@@ -1,7 +1,7 @@
 """A robot's arm on ROS: joint states in, joint targets out, a gripper action."""
 import threading
 import time
-from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -23,6 +23,7 @@ class ArmNames(NamedTuple):
     tool: str  # link that commands move
     command: str  # topic for trajectory_msgs/JointTrajectory
     gripper: str  # control_msgs/GripperCommand action
+    posture: Sequence[float] = ()  # rad, one for each joint: where the arm is at ease; none: the middle of its ranges
 
     @classmethod
     def parse(cls, key: str, value: object) -> 'ArmNames':
@@ -30,11 +31,14 @@ class ArmNames(NamedTuple):
 
         :raises ConfigError: naming the key, its value and what is allowed.
         """
-        if not isinstance(value, Mapping) or sorted(value) != sorted(_FIELDS):
-            raise ConfigError(key, value, 'a mapping with the keys ' + ', '.join(_FIELDS))
+        if not isinstance(value, Mapping) or set(value) - {'posture'} != set(_FIELDS):
+            raise ConfigError(key, value, 'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)))
         for field in _FIELDS:
             if not isinstance(value[field], str) or not value[field]:
                 raise ConfigError('{}.{}'.format(key, field), value[field], 'a name')
+        posture = value.get('posture', [])
+        if not isinstance(posture, list) or not all(isinstance(each, (int, float)) for each in posture):
+            raise ConfigError(key + '.posture', posture, 'a list of angles, rad')
         return cls(**value)
 
 

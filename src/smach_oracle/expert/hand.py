@@ -36,7 +36,10 @@ class Hand:
         self._tree = read_joints(robot.urdf)
         self.chain = Chain.from_urdf(robot.urdf, names.base, names.tool)
         self._limits = limits
-        self._drive = CartesianDrive(self.chain, limits)
+        if len(names.posture) not in (0, len(self.chain.names)):
+            raise ValueError('posture of {}: {} angles for {} joints'.format(
+                names.tool, len(names.posture), len(self.chain.names)))
+        self._drive = self._driven(None)
         self._port = ArmPort(names.command, self.chain.names)
         self.gripper = GripperPort(names.gripper)
         self._lead = lead
@@ -46,7 +49,11 @@ class Hand:
 
     def watch(self, near: Near) -> None:
         """Slow down near what `near` tells."""
-        self._drive = CartesianDrive(self.chain, self._limits, near)
+        self._drive = self._driven(near)
+
+    def _driven(self, near: Optional[Near]) -> CartesianDrive:
+        posture = np.array(self._names.posture) if self._names.posture else None
+        return CartesianDrive(self.chain, self._limits, near, posture)
 
     def forget(self) -> None:
         """A new goal begins: what was grasped for another one does not count."""
@@ -82,7 +89,8 @@ class Hand:
         targets = measured if self._targets is None else pulled_back(self._targets, measured, self._lead)
         twist = _array(command.twist)
         axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id, positions)
-        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]), period_s)
+        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]), period_s,
+                                command.turn_freely)
         if step.velocities.any():
             self._port.send(step.joints, step.velocities, period_s)
         self._targets = step.joints

@@ -11,6 +11,8 @@ import numpy as np
 from typing_extensions import Protocol
 
 _ROOM = 1e-4  # rad; a joint with less room than this before its limit takes no part in a motion towards it
+_EASE_GAIN = 2.0  # 1/s, towards the arm's posture
+_EASE_SPEED = 0.8  # rad/s
 
 
 class Arm(Protocol):
@@ -75,8 +77,12 @@ def standing() -> Step:
 class CartesianDrive:
     """Drives one arm's tool by velocities. Stateless: each step starts from the joints that it is given."""
 
-    def __init__(self, arm: Arm, limits: Optional[DriveLimits] = None, near: Optional[Near] = None) -> None:
-        """`near` tells, for joint positions (n,), the nearest things that the arm could hit, one of a kind at most."""
+    def __init__(self, arm: Arm, limits: Optional[DriveLimits] = None, near: Optional[Near] = None,
+                 posture: Optional[np.ndarray] = None) -> None:
+        """`near` tells, for joint positions (n,), the nearest things that the arm could hit, one of a kind at most.
+
+        `posture`: (n,) rad, to which the arm goes where the tool may turn freely; by default the middle of the ranges.
+        """
         self.arm = arm
         self.limits = limits or DriveLimits()
         self._near = near
@@ -84,21 +90,25 @@ class CartesianDrive:
         self._upper = arm.upper - self.limits.joint_margin
         finite = np.isfinite(arm.lower) & np.isfinite(arm.upper)
         self._middle = np.where(finite, (np.where(finite, arm.lower, 0) + np.where(finite, arm.upper, 0)) / 2, 0.0)
+        self._posture = posture
         self._half_range = np.where(finite, np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf)
 
-    def step(self, joints: np.ndarray, twist: np.ndarray, period: float) -> Step:
+    def step(self, joints: np.ndarray, twist: np.ndarray, period: float, turn_freely: bool = False) -> Step:
         """Where the joints go within one period for the tool to move by `twist`.
 
+        :param turn_freely: only the linear part counts; meanwhile, also where that is zero, the tool turns and the elbow
+            moves as brings the arm to its posture.
         :raises ValueError: for joints, a twist or a period that is not finite or has the wrong shape; a period of 0.
         """
         joints, twist = _checked(joints, twist, period, len(self.arm.names))
         nearest = self._near(joints) if self._near is not None else ()
         clearance = min((each.distance for each in nearest), default=float('inf'))
-        if not twist.any():
+        if not (turn_freely or twist.any()):
             return Step(joints, np.zeros(len(joints)), np.zeros(6), 1.0, '', clearance)
         wanted, limit, share = self._within_tool_limits(twist)
         jacobian = self.arm.jacobian(joints)
-        velocities, why, rest = self._joint_velocities(joints, jacobian, wanted)
+        rows = slice(0, 3 if turn_freely else 6)
+        velocities, why, rest = self._joint_velocities(joints, jacobian[rows], wanted[rows])
         limit, share = why or limit, share * rest
         for slower in (self._joint_speed, self._joint_room, self._workspace, partial(self._obstacles, nearest)):
             scale, why = slower(joints, velocities, period)
@@ -129,10 +139,11 @@ class CartesianDrive:
             stuck = 'joint limit of ' + ', '.join(np.array(self.arm.names)[~free])
         else:
             return np.zeros(len(joints)), stuck, 0.0
-        lost = np.linalg.norm(jacobian @ velocities - twist) / np.linalg.norm(twist)
+        wanted = max(float(np.linalg.norm(twist)), 1e-9)
+        lost = np.linalg.norm(jacobian @ velocities - twist) / wanted if twist.any() else 0.0
         if stuck and lost > self.limits.off_course:
             return np.zeros(len(joints)), stuck, 0.0
-        along = float(np.clip(jacobian @ velocities @ twist / (twist @ twist), 0.0, 1.0))
+        along = float(np.clip(jacobian @ velocities @ twist / wanted ** 2, 0.0, 1.0)) if twist.any() else 1.0
         return velocities, 'singular posture' if damped and lost > 0.02 else '', along
 
     def _least_squares(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray, free: np.ndarray
@@ -142,18 +153,25 @@ class CartesianDrive:
         nearness = np.clip(1.0 - (values / self.limits.singular_below) ** 2, 0.0, 1.0)
         damping = self.limits.damping ** 2 * nearness
         solution = right.T @ (values / (values ** 2 + damping) * (left.T @ twist))
-        spare = self._posture(joints, twist)[free]
+        spare = self._spare(joints, twist)[free]
         solution += spare - right.T @ (right @ spare)
         velocities = np.zeros(len(joints))
         velocities[free] = solution
         return velocities, bool(nearness.any())
 
-    def _posture(self, joints: np.ndarray, twist: np.ndarray) -> np.ndarray:
-        """Velocities (n,) away from limits that are near, for the motion that the tool does not notice."""
+    def _spare(self, joints: np.ndarray, twist: np.ndarray) -> np.ndarray:
+        """Velocities (n,) for the motion that the tool does not notice.
+
+        They lead away from limits that are near; where the tool may turn freely, to the arm's posture.
+        """
         offset = (joints - self._middle) / self._half_range
-        effort = min(1.0, np.linalg.norm(twist[:3]) / self.limits.linear
-                     + np.linalg.norm(twist[3:]) / self.limits.angular)
-        return -effort * self.limits.posture_gain * np.sign(offset) * np.maximum(np.abs(offset) - 0.6, 0.0)
+        if len(twist) == 6:
+            effort = min(1.0, np.linalg.norm(twist[:3]) / self.limits.linear
+                         + np.linalg.norm(twist[3:]) / self.limits.angular)
+            return -effort * self.limits.posture_gain * np.sign(offset) * np.maximum(np.abs(offset) - 0.6, 0.0)
+        away = offset if self._posture is None else np.arctan2(np.sin(joints - self._posture),
+                                                               np.cos(joints - self._posture))
+        return -np.clip(_EASE_GAIN * away, -_EASE_SPEED, _EASE_SPEED)
 
     def _joint_speed(self, joints: np.ndarray, velocities: np.ndarray, period: float) -> Tuple[float, str]:
         shares = np.abs(velocities) / (self.arm.velocity * self.limits.joint_share)

@@ -1,0 +1,78 @@
+"""The scripted expert's hand and eye in one process with the world, without ROS: the same drive, the same truth."""
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from smach_oracle.expert.teleoperation import CartesianDrive, DriveLimits, pulled_back
+from smach_oracle.geometry.chain import Chain, read_joints
+from smach_oracle.geometry.links import link_pose
+from smach_oracle.geometry.transforms import inverse
+from smach_oracle.simulation.operator.pilot import Grip
+from smach_oracle.simulation.operator.sight import Seen, Sight
+from smach_oracle.simulation.robot.pr2_model import pr2_urdf
+
+SETTINGS = yaml.safe_load((Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text())
+PERIODS = 2  # of the world, for one of the hand
+
+
+class DirectHand:
+    """Drives an arm of a World as the manipulation interface does in lock-step."""
+
+    def __init__(self, world, arm):
+        self.arm = arm
+        self.period = PERIODS / 60.0
+        self.limits_met = []
+        self.moves = 0
+        self._world = world
+        names = SETTINGS['arms'][arm]
+        text = pr2_urdf().read_text()
+        self._tree = read_joints(text)
+        self._names = names
+        self._chain = Chain.from_urdf(text, names['base'], names['tool'])
+        self._drive = CartesianDrive(self._chain, DriveLimits(**SETTINGS['limits']),
+                                     posture=np.array(names['posture']))
+        self._targets = self._measured()
+
+    def _measured(self):
+        joints = self._world.joints()
+        return np.array([joints[name] for name in self._chain.names])
+
+    def tool(self):
+        return link_pose(self._tree, 'base_footprint', self._names['tool'], self._world.joints())
+
+    def move(self, twist, turn_freely=False):
+        self.moves += 1
+        self._targets = pulled_back(self._targets, self._measured(), SETTINGS['lead'])
+        step = self._drive.step(self._targets, twist, self.period, turn_freely)
+        for tick in range(1, PERIODS + 1):
+            for name, at, speed in zip(self._chain.names, self._targets, step.velocities):
+                self._world.set_target(name, at + speed * self.period * tick / PERIODS, speed)
+            self._world.step()
+        self._targets = step.joints
+        if step.limit:
+            self.limits_met.append(step.limit)
+        return step.limit
+
+    def grip(self, gap, effort):
+        self._world.set_gripper(self.arm, gap, effort)
+        before = self._world.gap(self.arm)
+        for _ in range(120):
+            self._world.step(3)
+            now = self._world.gap(self.arm)
+            if abs(now - before) < 1e-4:
+                break
+            before = now
+        return Grip(now, now > gap + 0.004)
+
+
+def look(world):
+    """Everything, as the eye sees it."""
+    base = inverse(world.true_base())
+    bodies = {}
+    for name in world.body_names:
+        body = world.body(name)
+        size = body.size if body.shape == 'box' else (2 * body.size[0], 2 * body.size[1], body.size[2])
+        bodies[name] = Seen(name, base @ world.body_pose(name), tuple(size), name in world.movable(),
+                            world.holding(name))
+    return Sight(bodies, world.scene.seed, world.scene.goal.body)
