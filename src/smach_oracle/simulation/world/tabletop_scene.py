@@ -1,34 +1,23 @@
 """The world of the first use case: a table, things on it, and reasons to fail, all drawn from the trial's seed."""
-from typing import List, NamedTuple, Tuple
+from typing import List, Tuple
 
 import numpy as np
 
-from .scene import Body, Cause, Disturbance, Goal, RobotStart, Scene, Sensor
+from .scene import Body, Goal, RobotStart, Scene, Sensor
+from .tabletop_causes import GOAL, TABLE_TOP, TORSO, Draft, with_causes
 
 TASK = 'pick_and_place'
-TABLE_TOP = 0.72  # m
 TABLE_X = 0.82  # m, of its middle
 TABLE_SIZE = (0.70, 1.40, 0.04)
-GOAL = (0.60, -0.35)  # m, where the task puts the object
 TOLERANCE = 0.06
 NEAREST_X, NEAREST_Y = (0.53, 0.62), (-0.12, 0.22)  # m, where the object to be picked stands
 OTHERS_X, OTHERS_Y = (0.62, 0.86), (-0.45, 0.40)
 CLEAR = 0.13  # m between the middles of things, where nothing is crowded
 FREE_GOAL = 0.17  # m around the goal
-TORSO = 0.22
 MASS = (0.15, 0.40)  # kg
 COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15), (0.55, 0.20, 0.60),
            (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
 WOOD = (0.58, 0.42, 0.27)
-
-
-class _Draft(NamedTuple):
-    """A scene in the making."""
-
-    things: List[Body]
-    disturbances: List[Disturbance]
-    causes: List[Cause]
-    sensor: Sensor
 
 
 def draw(seed: int, benign: bool = False) -> Scene:
@@ -37,12 +26,13 @@ def draw(seed: int, benign: bool = False) -> Scene:
     :param seed: 0 or more.
     :param benign: without any reason to fail.
     """
-    generator = np.random.default_rng([seed, 61])
-    draft = _Draft(_things(generator), [], [], Sensor())
+    draft = Draft(_things(np.random.default_rng([seed, 61])))
+    if not benign:
+        draft = with_causes(draft, seed)
     height = TABLE_TOP + draft.things[0].size[2] / 2
     goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
-    return Scene(TASK, seed, tuple(_table() + draft.things), goal, RobotStart((('torso_lift_joint', TORSO),)),
-                 draft.sensor, tuple(draft.disturbances), tuple(draft.causes))
+    return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal, RobotStart((('torso_lift_joint', TORSO),)),
+                 Sensor(), draft.disturbances, draft.causes)
 
 
 def _table() -> List[Body]:
@@ -54,7 +44,7 @@ def _table() -> List[Body]:
     return [top] + legs
 
 
-def _things(generator: np.random.Generator) -> List[Body]:
+def _things(generator: np.random.Generator) -> Tuple[Body, ...]:
     """The object to be picked, which stands nearest, and two to four others beyond it."""
     colours = generator.permutation(len(COLOURS))
     spots = [(generator.uniform(*NEAREST_X), generator.uniform(*NEAREST_Y))]
@@ -64,7 +54,7 @@ def _things(generator: np.random.Generator) -> List[Body]:
         beyond = np.hypot(x, y) > np.hypot(*spots[0]) + 0.05
         if len(spots) < wanted and beyond and _clear((x, y), spots):
             spots.append((x, y))
-    return [_thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]]) for k, spot in enumerate(spots)]
+    return tuple(_thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]]) for k, spot in enumerate(spots))
 
 
 def _clear(spot: Tuple[float, float], spots: List[Tuple[float, float]]) -> bool:

@@ -1,0 +1,135 @@
+"""Why a trial at the table may fail: each cause is physical, is drawn from the trial's seed, and is told to nobody."""
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from ...geometry.chain import Chain
+from ...geometry.transforms import from_rpy
+from ..robot.interface import ARM_JOINTS, BASE_FRAME, TOOL_FRAME
+from ..robot.pr2_model import pr2_urdf
+from .scene import Body, Cause, Disturbance
+
+TABLE_TOP = 0.72  # m
+GOAL = (0.60, -0.35)  # m, where the task puts the object
+TORSO = 0.22  # m
+EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
+TARGET = 0  # the thing that stands nearest
+
+CHANCE = {'arm_in_view': 0.06, 'glare': 0.04, 'dim_light': 0.03, 'crowded': 0.09, 'slippery_object': 0.05,
+          'object_moved': 0.05, 'goal_occupied': 0.05, 'edge_of_reach': 0.05}
+
+
+class Draft(NamedTuple):
+    """A scene in the making."""
+
+    things: Tuple[Body, ...]
+    disturbances: Tuple[Disturbance, ...] = ()
+    causes: Tuple[Cause, ...] = ()
+
+
+def with_causes(draft: Draft, seed: int) -> Draft:
+    """A scene with the causes that its seed has for it: mostly none, seldom two."""
+    for number, kind in enumerate(sorted(CHANCE)):
+        generator = np.random.default_rng([seed, 62, number])
+        if generator.random() < CHANCE[kind]:
+            draft = MAKERS[kind](draft, generator) or draft
+    return draft
+
+
+def _caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> Draft:
+    return draft._replace(disturbances=draft.disturbances + disturbances,
+                          causes=draft.causes + (Cause(kind, text),))
+
+
+def _arm_in_view(draft: Draft, generator: np.random.Generator) -> Optional[Draft]:
+    """Somebody pushes the left arm between the camera and the nearest thing, after the head has turned there."""
+    thing = draft.things[TARGET]
+    chain = Chain.from_urdf(pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'], {'torso_lift_joint': TORSO})
+    for _ in range(20):
+        top = np.array(thing.position) + [0.0, 0.0, thing.size[2] / 2]
+        point = top + generator.uniform(0.3, 0.5) * (EYE - top) + [0.0, generator.uniform(-0.06, 0.02), 0.0]
+        pose = from_rpy(point, yaw=generator.uniform(-1.2, -0.2))
+        q = chain.inverse(pose, np.array([0.6, 0.2, 1.2, -1.6, 0.0, -0.8, 0.0]), generator)
+        if q is not None and point[2] > TABLE_TOP + 0.28:
+            turned = chain.nearest_turn(q, np.zeros(len(q)))
+            values = tuple(zip(ARM_JOINTS['left'], (float(each) for each in turned)))
+            return _caused(draft, 'arm_in_view', 'the left arm is pushed over the table, its hand {:.0f} cm above it'
+                           .format(100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values))
+    return None
+
+
+def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
+    frames = int(generator.integers(1, 3))
+    dropout = float(generator.uniform(0.85, 0.97))
+    return _caused(draft, 'glare', 'light falls into the camera for {} frames: {:.0f}% of the depth is lost'.format(
+        frames, 100 * dropout), Disturbance('glare', 'look_at', (('dropout', dropout), ('frames', frames))))
+
+
+def _dim_light(draft: Draft, generator: np.random.Generator) -> Draft:
+    frames = int(generator.integers(1, 3))
+    brightness = float(generator.uniform(0.02, 0.12))
+    return _caused(draft, 'dim_light', 'the light fails for {} frames, down to {:.0f}%'.format(
+        frames, 100 * brightness), Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', frames))))
+
+
+def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
+    """A further thing stands close behind the nearest one, or beside it."""
+    thing, other = draft.things[TARGET], draft.things[-1]
+    gap = float(generator.uniform(0.008, 0.032))
+    away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
+    far = _radius(thing) + _radius(other) + gap
+    spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
+    moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
+    return _caused(draft._replace(things=draft.things[:-1] + (moved,)), 'crowded',
+                   'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap))
+
+
+def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
+    friction = float(generator.uniform(0.04, 0.16))
+    mass = float(generator.uniform(0.4, 0.7))
+    thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
+    return _caused(draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
+                   'the nearest thing is slippery and heavy: friction {:.2f}, {:.2f} kg'.format(friction, mass))
+
+
+def _object_moved(draft: Draft, generator: np.random.Generator) -> Draft:
+    """Somebody moves the nearest thing after it has been detected."""
+    way = float(generator.uniform(0.05, 0.08))
+    heading = float(generator.uniform(2.2, 4.1))
+    values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration', 0.8))
+    return _caused(draft, 'object_moved', 'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(
+        100 * way), Disturbance('nudge:' + draft.things[TARGET].name, 'see', values))
+
+
+def _goal_occupied(draft: Draft, generator: np.random.Generator) -> Draft:
+    """A thing stands beside the place where the object shall go."""
+    away = float(generator.uniform(0.075, 0.12))
+    heading = float(generator.uniform(-1.6, 1.6))
+    other = draft.things[-1]
+    moved = other._replace(position=(float(GOAL[0] + away * np.cos(heading)), float(GOAL[1] + away * np.sin(heading)),
+                                     other.position[2]))
+    return _caused(draft._replace(things=draft.things[:-1] + (moved,)), 'goal_occupied',
+                   'a thing stands {:.0f} cm beside the place for the object'.format(100 * away))
+
+
+def _edge_of_reach(draft: Draft, generator: np.random.Generator) -> Draft:
+    """The nearest thing stands where the right arm gets to from few sides; the others are beyond it."""
+    thing = draft.things[TARGET]
+    spot = (float(generator.uniform(0.50, 0.60)), float(generator.uniform(0.26, 0.36)))
+    moved = thing._replace(position=(spot[0], spot[1], thing.position[2]))
+    others = tuple(other for other in draft.things[1:]
+                   if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
+                   and np.hypot(*other.position[:2]) > np.hypot(*spot) + 0.04)
+    return _caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
+                   'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]))
+
+
+def _radius(thing: Body) -> float:
+    return thing.size[0] if thing.shape == 'cylinder' else float(np.hypot(*thing.size[:2])) / 2
+
+
+Maker = Callable[[Draft, np.random.Generator], Optional[Draft]]
+MAKERS: Dict[str, Maker] = {'arm_in_view': _arm_in_view, 'glare': _glare, 'dim_light': _dim_light,
+                            'crowded': _crowded, 'slippery_object': _slippery_object, 'object_moved': _object_moved,
+                            'goal_occupied': _goal_occupied, 'edge_of_reach': _edge_of_reach}
+KINDS: List[str] = sorted(CHANCE)
