@@ -96,14 +96,15 @@ class Hand:
         self._targets = step.joints
         return step
 
-    def positions(self) -> Tuple[Dict[str, float], rospy.Time]:
-        """The arm's joint positions (rad), and their time."""
-        positions, stamp = self._robot.listener.now()
-        return {name: positions[name] for name in self.chain.names}, stamp
-
-    def wait_for_motion(self, before: Mapping[str, float], since: rospy.Time, limit_s: float) -> bool:
-        """Wait for joint states later than `since` that differ from `before`; whether they came."""
-        return self._robot.listener.wait_for_motion(before, since, limit_s)
+    def move_and_wait(self, command: TeleopCommand, period_s: float, limit_s: float) -> Tuple[Step, bool]:
+        """Move in lock-step with a world that stands still between commands; whether it has carried that out."""
+        positions, since = self._robot.listener.now()
+        before = {name: positions[name] for name in self.chain.names}
+        step = self.move(command, period_s)
+        if not step.velocities.any():  # time passes, too
+            self._port.send(step.joints, step.velocities, period_s)
+        moved = before if step.velocities.any() else None
+        return step, self._robot.listener.wait_for_period(moved, since, period_s, limit_s)
 
     def measured(self, positions: Mapping[str, float]) -> np.ndarray:
         """(n,) rad, of this arm's joints."""
