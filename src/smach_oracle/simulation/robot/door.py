@@ -3,35 +3,39 @@
 Opening does not look at its result: where the arm did not get far enough, the door stands half open and nobody knows
 until somebody looks into the fridge.
 """
-from typing import Callable, Dict
+from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from ...geometry.transforms import apply, from_rpy, yaw_of
+from ...geometry.transforms import apply, from_rpy, inverse, yaw_of
 from .collision import RobotModel
 from .door_view import DoorNotSeen, DoorView, find_door
-from .interface import GRIPPER_OPEN, Robot
+from .interface import ARMS, GRIPPER_OPEN, Robot, RobotError
 from .kitchen import Kitchen, MapBox, base_from_fridge, door_frame, fridge_boxes, handle_point, odom_from_pose
-from .limb import TRAVEL, Limb, stow
-from .planner import PlanningError
+from .limb import TRAVEL, Limb, check_arm, stow
+from .planner import straight
 from .swing import Swing, best_swing
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
-OPENING = (-0.97, 0.08, 0.0)
+OPENING = (-0.98, 0.02, 0.0)
 CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, for whoever drives in next
 CLOSING = (-0.87, -0.30, 0.0)
 
 AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
-WIDE = np.radians(100.0)  # as far as it is opened
+PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside
+WIDE = np.radians(104.0)  # as far as the door is opened
 STEP = np.radians(4.0)
+AWAY = 0.16  # m that the base takes the hand back from the bar
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
-BEYOND = 0.025  # m that the finger tips reach beyond the bar
+BEYOND = 0.012  # m that the finger tips reach beyond the bar
 BEFORE = 0.10  # m that the hand comes straight
 PUSH_REACH, CLOSE_REACH = 0.50, 0.42  # m from the hinge at which the hand pushes
 GRIP_EFFORT = 100.0  # N
+RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
-PULL_SPEED, PUSH_SPEED = 0.25, 0.25  # share of the joints' speed limits
+APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
+JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
 COMFORT: Dict[str, np.ndarray] = {'left': np.array([0.2, 0.2, 1.0, -1.2, 0.0, -1.0, 0.0]),
                                   'right': np.array([-0.2, 0.2, -1.0, -1.2, 0.0, -1.0, 0.0])}
 
@@ -49,19 +53,18 @@ def open_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed:
     :returns: rad, the opening that the arm's motion should have brought about.
     :raises DoorError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
-    back_off(robot, kitchen)
-    stow(robot, model, ('left', 'right'), {}, seed)
-    robot.drive(odom_from_pose(kitchen, *OPENING))
-    view = look(robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+    check_arm(arm)
+    view = _stand_before(robot, model, kitchen, seed)
     if view.angle < AJAR:
         angle = _pull(robot, model, kitchen, arm, view, seed)
-    elif view.angle < WIDE - STEP:
-        angle = _push_open(robot, model, kitchen, arm, view, seed)
-    else:
-        angle = view.angle
-    stow(robot, model, (arm,), _boxes(kitchen, view.base_from_fridge, angle), seed)
+        _step_back(robot, AWAY)
+        _stow_beside(robot, model, kitchen, angle, seed)
+        view = _stand_before(robot, model, kitchen, seed)
+    if view.angle < WIDE - STEP:
+        view = view._replace(angle=_push_open(robot, model, kitchen, arm, view, seed))
+        _stow_beside(robot, model, kitchen, view.angle, seed)
     robot.drive(odom_from_pose(kitchen, *CLEAR))
-    return angle
+    return view.angle
 
 
 def close_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed: int) -> None:
@@ -69,6 +72,7 @@ def close_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed
 
     :raises DoorError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
+    check_arm(arm)
     robot.drive(odom_from_pose(kitchen, *CLOSING))
     view = look(robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
     if view.angle >= STEP:
@@ -78,11 +82,25 @@ def close_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed
         raise DoorError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
 
 
-def back_off(robot: Robot, kitchen: Kitchen) -> None:
-    """Drive straight back, out of the door's swing, where the base stands in it."""
-    here = np.linalg.inv(base_from_fridge(kitchen, robot.odom_from_base()))
-    if here[0, 3] > CLEAR[0] + 0.05:
-        robot.drive(odom_from_pose(kitchen, CLEAR[0], here[1, 3], yaw_of(here)))
+def _stand_before(robot: Robot, model: RobotModel, kitchen: Kitchen, seed: int) -> DoorView:
+    """Drive to where the door is opened, with the arms out of the way, and look at it."""
+    here = inverse(base_from_fridge(kitchen, robot.odom_from_base()))
+    if here[0, 3] > CLEAR[0] + 0.05:  # within the door's swing
+        _step_back(robot, here[0, 3] - CLEAR[0])
+    _stow_beside(robot, model, kitchen, WIDE, seed)
+    robot.drive(odom_from_pose(kitchen, *OPENING))
+    return look(robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+
+
+def _step_back(robot: Robot, length: float) -> None:
+    """Drive straight back by `length` m."""
+    robot.drive(robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
+
+
+def _stow_beside(robot: Robot, model: RobotModel, kitchen: Kitchen, angle: float, seed: int) -> None:
+    """Take both arms to their postures for driving, with the door at `angle`."""
+    boxes = _boxes(kitchen, base_from_fridge(kitchen, robot.odom_from_base()), angle)
+    stow(robot, model, ARMS, boxes, seed)
 
 
 def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> DoorView:
@@ -107,20 +125,23 @@ def _pull(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view: Doo
         return from_rpy(bar, yaw=turn - angle + yaw_of(fridge)) @ from_rpy((BEYOND, 0.0, 0.0))
 
     with Limb(robot, model, arm, _boxes(kitchen, fridge, view.angle), seed) as limb:
-        swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, WIDE, (-1.05, 1.5), ('handle',))
+        swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45), ('handle',),
+                       lambda q: _approach(limb, q) is not None)
         if swing is None or swing.angles[-1] < LEAST_PULL:
             raise DoorError('the handle is out of reach of the {} arm, or cannot be pulled from here'.format(arm))
         robot.gripper(arm, GRIPPER_OPEN)
-        limb.go(_before(limb, swing))
-        limb.line(limb.space.chain.forward(swing.path[0]), ('handle',))
+        _place_door(limb, kitchen, fridge, view.angle)
+        approach = _approach(limb, swing.path[0])
+        limb.go(approach[0])
+        limb.follow(approach, APPROACH_SPEED)
         held = robot.gripper(arm, 0.0, GRIP_EFFORT)
         if held.position < LEAST_GAP:
             limb.back(BEFORE, ('handle',))
             raise DoorError('the hand closed on nothing: the handle is not where it was seen')
-        limb.follow(np.vstack([limb.where(), swing.path[1:]]), PULL_SPEED)
-        robot.gripper(arm, GRIPPER_OPEN)
-        _place_door(limb, kitchen, fridge, swing.angles[-1])
-        limb.back(BEFORE, ('handle', 'door'))
+        _strain(limb, swing, PULL_SPEED)
+        if sum(robot.joints()[name] for name in JAWS[arm]) < LEAST_GAP:
+            raise DoorError('the handle slipped out of the {} hand'.format(arm))
+        robot.gripper(arm, RELEASE)
     return float(swing.angles[-1])
 
 
@@ -132,13 +153,13 @@ def _push_open(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view
         return _against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
     with Limb(robot, model, arm, _boxes(kitchen, fridge, view.angle), seed) as limb:
-        robot.gripper(arm, 0.0)
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE + STEP, (-1.75, 0.6), ('door',))
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6), ('door',))
         if swing is None or swing.angles[-1] < view.angle + STEP:
             raise DoorError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
         limb.go(swing.path[0])
-        limb.follow(np.vstack([limb.where(), swing.path[1:]]), PUSH_SPEED)
+        robot.gripper(arm, 0.0)
+        _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
         limb.back(BEFORE, ('door',))
     return float(swing.angles[-1])
@@ -158,14 +179,15 @@ def _push_shut(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view
             raise DoorError('the {} arm cannot push the door shut from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
         limb.go(swing.path[0])
-        limb.follow(np.vstack([limb.where(), swing.path[1:]]), PUSH_SPEED)
+        _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
         limb.back(BEFORE, ('door',))
         limb.go(np.array(TRAVEL[arm]))
 
 
 def _swing(limb: Limb, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float, last: float,
-           turns: 'tuple', touching: 'tuple') -> 'Swing':
+           turns: Tuple[float, float], touching: Tuple[str, ...],
+           may_begin: Callable[[np.ndarray], bool] = lambda q: True) -> Optional[Swing]:
     """The best path of the hand along the door between two angles, with the door where the hand has it."""
     count = int(np.ceil(abs(last - first) / STEP)) + 1
 
@@ -175,16 +197,23 @@ def _swing(limb: Limb, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, fi
             return limb.space.is_free(q)
 
     return best_swing(limb.space.chain, tool_at, np.linspace(first, last, count), turns, COMFORT[limb.arm],
-                      np.random.default_rng(limb.seed), is_free)
+                      np.random.default_rng(limb.seed), is_free, may_begin)
 
 
-def _before(limb: Limb, swing: Swing) -> np.ndarray:
-    """Joint positions straight before the beginning of a swing. Raises PlanningError."""
-    pose = limb.space.chain.forward(swing.path[0]) @ from_rpy((-BEFORE, 0.0, 0.0))
-    found = limb.space.chain.inverse(pose, swing.path[0])
-    if found is None or not limb.space.is_free(found):
-        raise PlanningError('no free place before the handle for the {} hand'.format(limb.arm))
-    return found
+def _strain(limb: Limb, swing: Swing, speed: float) -> None:
+    """Follow a swing against what resists; where the arm is held up in the end, it has done what it could."""
+    try:
+        limb.follow(np.vstack([limb.where(), swing.path[1:]]), speed)
+    except RobotError:
+        pass
+
+
+def _approach(limb: Limb, grasp: np.ndarray) -> Optional[np.ndarray]:
+    """A straight way (m, 7) of the hand to joint positions at the handle; None where there is none."""
+    before = limb.space.chain.forward(grasp) @ from_rpy((-BEFORE, 0.0, 0.0))
+    with limb.space.touchable(('handle',)):
+        way = straight(limb.space, grasp, before)
+    return None if way is None or not limb.space.is_free(way[-1]) else way[::-1]
 
 
 def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, reach: float, height: float,

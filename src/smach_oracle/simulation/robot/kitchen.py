@@ -23,7 +23,7 @@ class Kitchen(NamedTuple):
     door_thickness: float = 0.04
     handle_radius: float = 0.011
     handle_inset: float = 0.05  # its axis, from the free edge of the door
-    handle_stand_off: float = 0.065  # its axis, from the outer face of the door
+    handle_stand_off: float = 0.085  # its axis, from the outer face of the door
     handle_span: Tuple[float, float] = (0.725, 1.175)  # heights of its ends
 
 

@@ -24,8 +24,7 @@ class Limb:
         :param seed: of all that is drawn at random.
         :raises ValueError: for an unknown arm.
         """
-        if arm not in ARMS:
-            raise ValueError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+        check_arm(arm)
         self.robot = robot
         self.arm = arm
         self.seed = seed
@@ -82,6 +81,12 @@ class Limb:
         """Follow joint positions (m, 7), the first of them being where the arm is. Raises RobotError."""
         points, times = timed(self.space.chain, way, speed)
         self.robot.follow(ARM_JOINTS[self.arm], points, times)
+
+
+def check_arm(arm: str) -> None:
+    """Raise ValueError for an unknown arm."""
+    if arm not in ARMS:
+        raise ValueError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
 
 
 def stow(robot: Robot, model: RobotModel, arms: Iterable[str], boxes: Mapping[str, MapBox], seed: int) -> None:

@@ -103,8 +103,8 @@ class RosRobot:
     def look_at(self, point: Sequence[float]) -> None:
         """See Robot."""
         target = PointStamped(Header(frame_id=BASE_FRAME), Point(*map(float, point)))
-        self._do('head_traj_controller/point_head_action',
-                 PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=CAMERA_FRAME), 'head')
+        goal = PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=CAMERA_FRAME)
+        self._do('head_traj_controller/point_head_action', goal, 'head')
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
         """See Robot."""

@@ -24,11 +24,13 @@ class Swing(NamedTuple):
 
 
 def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tuple[float, float], seed: np.ndarray,
-               generator: np.random.Generator, is_free: IsFree, tries: int = 12) -> Optional[Swing]:
+               generator: np.random.Generator, is_free: IsFree,
+               may_begin: Callable[[np.ndarray], bool] = lambda q: True, tries: int = 15) -> Optional[Swing]:
     """The longest path found along `angles` (rad, in order, evenly spaced).
 
     :param turns: rad, the least and most that the hand may be turned against the door.
     :param seed: (7,) a comfortable posture; paths are begun near it first.
+    :param may_begin: whether the arm can get to the first joint positions of a path at all.
     :returns: None where not even the first pose can be reached freely.
     """
     best: Optional[Swing] = None
@@ -36,7 +38,7 @@ def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tu
         turn = float(generator.uniform(*turns))
         starts = chain.solutions(tool_at(angles[0], turn), seed, generator, restarts=6)
         for start in starts[:3]:
-            if not is_free(start, angles[0]):
+            if not (is_free(start, angles[0]) and may_begin(start)):
                 continue
             swing = _follow(chain, tool_at, angles, turns, start, turn, is_free)
             if best is None or swing.share > best.share:

@@ -1,0 +1,73 @@
+"""The kitchen of the second use case: a refrigerator with drinks, and a person who holds out a hand."""
+from typing import Dict, List, Tuple
+
+import numpy as np
+
+from ..robot.kitchen import Kitchen
+from ..robot.limb import TRAVEL
+from ..robot.interface import ARM_JOINTS, ARMS
+from .fridge import DOOR_JOINT, fridge_urdf
+from .scene import Body, Goal, RobotStart, Scene, Vector
+
+TASK = 'drink_retrieval'
+DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
+PALM: Vector = (-0.10, -0.62, 0.85)  # the middle of its upper face
+PALM_SIZE: Vector = (0.20, 0.20, 0.03)
+SKIN, SHIRT, TROUSERS = (0.87, 0.68, 0.55), (0.25, 0.42, 0.62), (0.20, 0.22, 0.27)
+COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
+DOOR_FRICTION = 3.0  # N m, dry
+START_TORSO = 0.15  # m
+
+
+def draw(seed: int, benign: bool = False) -> Scene:
+    """The scene of a trial.
+
+    :param benign: without any reason to fail that could be left out.
+    :raises ValueError: for a negative seed.
+    """
+    if seed < 0:
+        raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
+    generator = np.random.default_rng([seed, 2])
+    kitchen = Kitchen()
+    drinks = _drinks(generator, kitchen)
+    return Scene(TASK, seed, (_fridge(kitchen),) + tuple(drinks) + _person(),
+                 Goal('in_hand', '', PALM, PALM_SIZE[0] / 2),
+                 RobotStart(_posture(), drive_error=(0.01, 0.01, 0.01)))
+
+
+def _fridge(kitchen: Kitchen) -> Body:
+    x, y, yaw = kitchen.place
+    return Body('fridge', 'urdf', (0.0, 0.0, 0.0), (x, y, 0.0), yaw, urdf=fridge_urdf(kitchen),
+                joints=((DOOR_JOINT, 0.0),), joint_friction=((DOOR_JOINT, DOOR_FRICTION),))
+
+
+def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
+    """Upright on the shelf, apart from each other, near the front."""
+    places: List[Tuple[float, float]] = []
+    while len(places) < 3:
+        x, y = generator.uniform(0.06, 0.16), generator.uniform(-0.20, 0.02)
+        if all(np.hypot(x - other[0], y - other[1]) > 0.10 for other in places):
+            places.append((x, y))
+    floor = kitchen.shelves[kitchen.drinks_shelf]
+    return [Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
+                 (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001), mass=DRINK_MASS,
+                 colour=COLOURS[index % len(COLOURS)]) for index, (x, y) in enumerate(places)]
+
+
+def _person() -> Tuple[Body, ...]:
+    """Somebody who stands beyond the palm and waits; nothing of it moves."""
+    x, y, top = PALM
+    parts: List[Dict] = [
+        dict(name='palm', shape='box', size=PALM_SIZE, position=(x, y, top - PALM_SIZE[2] / 2), colour=SKIN),
+        dict(name='person_arm', shape='box', size=(0.07, 0.34, 0.07), position=(x, y - 0.24, top - 0.06), colour=SHIRT),
+        dict(name='person_body', shape='cylinder', size=(0.17, 0.17, 0.62), position=(x, y - 0.52, 1.14), colour=SHIRT),
+        dict(name='person_legs', shape='cylinder', size=(0.15, 0.15, 0.83), position=(x, y - 0.52, 0.415),
+             colour=TROUSERS),
+        dict(name='person_head', shape='cylinder', size=(0.10, 0.10, 0.24), position=(x, y - 0.52, 1.60), colour=SKIN)]
+    return tuple(Body(**part) for part in parts)
+
+
+def _posture() -> Tuple[Tuple[str, float], ...]:
+    arms = [pair for arm in ARMS for pair in zip(ARM_JOINTS[arm], TRAVEL[arm])]
+    jaws = [('{}_gripper_{}_finger_joint'.format(arm[0], finger), 0.0) for arm in ARMS for finger in 'lr']
+    return tuple(arms + jaws + [('torso_lift_joint', START_TORSO)])
