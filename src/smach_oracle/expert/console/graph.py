@@ -9,7 +9,7 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Tuple
 
 MOST_STATES = 500  # of a container; more are not drawn
 MOST_EDGES = 3000
-_CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 7.6, 34.0, 112.0, 300.0, 46.0  # of a state's box, in pixels
+_CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 8.7, 28.0, 118.0, 300.0, 46.0  # of a state's box, in pixels
 _PIXELS_PER_INCH = 72.0
 
 
@@ -73,6 +73,8 @@ def dot_text(structure: Structure) -> str:
         width, height = box(label) if label in structure.states else (box(label)[0] * 0.9, 30.0)
         lines.append('{} [width={:.3f}, height={:.3f}];'.format(
             name, width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH))
+    if structure.outcomes:
+        lines.append('{{rank=sink; {}}}'.format('; '.join(names[outcome] for outcome in structure.outcomes)))
     for number, edge in enumerate(structure.edges):
         lines.append('{} -> {} [id=e{}, label="{}"];'.format(
             names[edge.source], names[edge.target], number, 'x' * min(24, len(edge.outcome) + 5)))
@@ -92,7 +94,7 @@ def read_layout(text: str) -> Layout:
     try:
         data = json.loads(text)
         left, bottom, right, top = (float(number) for number in data['bb'].split(','))
-        nodes = {each['name']: _node(each, top) for each in data.get('objects', [])}
+        nodes = {each['name']: _node(each, top) for each in data.get('objects', []) if 'nodes' not in each}
         edges = {each['id']: _edge(each, top) for each in data.get('edges', [])}
     except (KeyError, TypeError, AttributeError) as err:
         raise ValueError('dot has written something unexpected: {!r}'.format(err)) from err

@@ -1,0 +1,106 @@
+// Everything that may be answered, each a button: one press sends it. Keys: 1 to 9 a state, s the first supersede,
+// i the first interface, g give up.
+import { h } from './dom.js';
+import { CLASSES, chip, percent, rateBar } from './format.js';
+
+export class AnswerForm {
+  // `onAnswer({kind, name, outputs, why})`
+  constructor(question, onAnswer) {
+    this.question = question;
+    this.onAnswer = onAnswer;
+    this.buttons = [];
+    this.keys = new Map();
+    this.why = h('input', { type: 'text', class: 'why', maxlength: 2000, placeholder: 'Reason, for the record (optional)', 'aria-label': 'Reason, for the record' });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.outputs = question.outputs.map((key) => this.output(key));
+    this.root = h('div', { class: 'answer-form' }, this.states(), this.interfaces(), this.supersede(), this.giveUp(), this.problem, this.why);
+    this.enable(false);
+  }
+
+  enable(on) {
+    for (const button of this.buttons) button.disabled = !on || button.dataset.blocked === 'yes';
+  }
+
+  press(key) {
+    const button = this.keys.get(key);
+    if (button && !button.disabled) button.click();
+  }
+
+  send(kind, name) {
+    let outputs = [];
+    try {
+      if (kind === 'supersede') outputs = this.outputs.map((output) => output.read()).filter(Boolean);
+    } catch (err) {
+      this.problem.textContent = err.message;
+      return;
+    }
+    this.problem.textContent = '';
+    this.onAnswer({ kind, name, outputs, why: this.why.value });
+  }
+
+  choice(kind, name, key, title, ...more) {
+    const button = h('button', { class: 'choice ' + kind, type: 'button', 'data-kind': kind, 'data-name': name, onclick: () => this.send(kind, name) },
+      h('kbd', {}, key || ''), h('span', { class: 'choice-text' }, title, more));
+    if (key) this.keys.set(key, button);
+    this.buttons.push(button);
+    return button;
+  }
+
+  states() {
+    const { choices, state } = this.question;
+    return [h('h4', {}, 'Go to'), h('div', { class: 'choices' }, choices.map((choice, index) => {
+      const button = this.choice('goto', choice.state, index < 9 ? String(index + 1) : '',
+        h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, choice.state), choice.state === state && chip('again', '', 'The state that failed'), h('span', { class: 'spacer' }),
+          rateBar(1 - choice.success, choice.success, percent(choice.success) + ' ok')),
+        h('span', { class: 'chips' }, CLASSES[choice.class] && chip(CLASSES[choice.class], 'class-' + choice.class),
+          choice.blocked && chip('blocked: ' + choice.blocked, 'bad'),
+          choice.missing.length > 0 && chip('missing: ' + choice.missing.join(', '), 'warn', 'Userdata that it needs and would not have'),
+          choice.preconditions.length > 0 && chip('first: ' + choice.preconditions.join(', '), '', 'Its preconditions, in this order'),
+          choice.visits > 0 && chip(choice.visits + (choice.visits === 1 ? ' visit' : ' visits'), '', 'In this trial'),
+          choice.helped[1] > 0 && chip('helped ' + choice.helped[0] + ' of ' + choice.helped[1], choice.helped[0] * 2 > choice.helped[1] ? 'good' : '', 'How often going there helped when ' + state + ' had failed, as far as this console saw')));
+      if (choice.blocked) button.dataset.blocked = 'yes';
+      return button;
+    }))];
+  }
+
+  interfaces() {
+    const { interfaces } = this.question;
+    return interfaces.length > 0 && [h('h4', {}, 'Do it through an interface'), h('div', { class: 'choices' }, interfaces.map((offer, index) =>
+      this.choice('interface', offer.name, index ? '' : 'i', h('strong', {}, offer.name), offer.description && h('span', { class: 'dim' }, offer.description))))];
+  }
+
+  supersede() {
+    const { supersede, state } = this.question;
+    if (!supersede.length) return null;
+    return [h('h4', {}, 'I have done the work of ', state), this.outputs.length > 0 && h('details', { class: 'outputs', open: this.outputs.length <= 2 },
+      h('summary', {}, 'Its output userdata'), this.outputs.map((output) => output.root)),
+    h('div', { class: 'choices short' }, supersede.map((choice, index) => this.choice('supersede', choice.outcome, index ? '' : 's',
+      h('strong', {}, choice.outcome), h('span', { class: 'dim' }, '→ ', choice.target))))];
+  }
+
+  giveUp() {
+    const { give_up: outcomes, path } = this.question;
+    return [h('h4', {}, 'Give up'), h('div', { class: 'choices short' }, this.choice('give_up', '', 'g', h('strong', {}, 'as the failure would have ended ', path)),
+      outcomes.map((outcome) => this.choice('give_up', outcome, '', h('strong', {}, 'with ', outcome))))];
+  }
+
+  // One output key: JSON, or nothing; a message of a type that the question knows is written as its fields.
+  output(key) {
+    const known = this.question.userdata.find((item) => item.key === key);
+    const type = known && known.type && known.type.includes('/') ? known.type : '';
+    const text = h('textarea', { rows: 1, spellcheck: 'false', 'data-output': key, 'aria-label': 'Value of ' + key, placeholder: type ? 'JSON fields of ' + type + '; empty: not set' : 'JSON; empty: not set' });
+    text.addEventListener('input', () => { this.problem.textContent = ''; });
+    const root = h('label', { class: 'output' }, h('span', {}, key), text);
+    const read = () => {
+      const typed = text.value.trim();
+      if (!typed) return null;
+      try {
+        return { key, value: JSON.parse(typed), type };
+      } catch (err) {
+        text.focus();
+        throw new Error(key + ' is not JSON: text needs "quotes".');
+      }
+    };
+    return { root, read };
+  }
+}

@@ -1,0 +1,133 @@
+// The queue of all robots' open questions, and the one that is worked on.
+import { h, replace, setText, typing } from './dom.js';
+import { chip, duration, rateBar } from './format.js';
+import { Detail } from './question_detail.js';
+
+export const questions = { id: 'questions', title: 'Questions', create: (app) => new Questions(app) };
+
+class Questions {
+  constructor(app) {
+    this.app = app;
+    this.detail = null;
+    this.rows = new Map();
+    this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
+    this.stage = h('div', { class: 'stage' });
+    this.servers = h('p', { class: 'dim servers' });
+    this.root = h('div', { class: 'panel questions' }, h('aside', { class: 'queue-side' }, this.queue, this.servers), this.stage);
+    window.addEventListener('keydown', (event) => this.key(event));
+    this.showStage();
+  }
+
+  get open() { return this.app.store.get('questions') || []; }
+
+  badge() { return this.open.filter((each) => each.status === 'pending').length; }
+
+  shown() { this.update(['questions', 'servers']); }
+
+  connected() { if (this.detail) this.detail.connected(); }
+
+  tick() {
+    for (const question of this.open) this.showTimes(question);
+    if (this.detail) this.detail.tick();
+  }
+
+  update(names) {
+    if (names.includes('servers')) this.showServers();
+    if (names.includes('questions')) this.showQueue();
+    if (this.detail) this.detail.update(names);
+    else if (names.includes('questions')) this.showStage();
+  }
+
+  showServers() {
+    const servers = this.app.store.get('servers') || [];
+    setText(this.servers, servers.length ? 'Listening to ' + servers.map((each) => each.name + (each.connected ? '' : ' (gone)')).join(', ')
+      : 'No robot with an expert query server is known yet.');
+  }
+
+  showQueue() {
+    const open = this.open;
+    const keys = new Set(open.map((each) => each.key));
+    for (const key of [...this.rows.keys()]) if (!keys.has(key)) this.rows.delete(key);
+    for (const question of open) {
+      const shown = JSON.stringify([question, this.detail && this.detail.key === question.key, this.app.expert]);
+      const row = this.rows.get(question.key);
+      if (!row || row.shown !== shown) this.rows.set(question.key, Object.assign(this.row(question), { shown }));
+    }
+    const order = open.map((each) => this.rows.get(each.key).root);
+    if (!order.length) {
+      replace(this.queue, h('p', { class: 'empty' }, 'No open questions.'));
+    } else if (order.length !== this.queue.children.length || order.some((root, index) => this.queue.children[index] !== root)) {
+      const focused = document.activeElement && document.activeElement.dataset.key;
+      replace(this.queue, order);
+      const again = focused && this.rows.get(focused);
+      if (again) again.root.focus();
+    }
+    for (const question of open) this.showTimes(question);
+  }
+
+  row(question) {
+    const age = h('span', { class: 'dim' });
+    const left = h('span', { class: 'left' });
+    const mine = question.holder && question.holder === this.app.expert;
+    const who = question.status === 'interface' ? chip('interface ' + question.interface + ' runs', 'accent')
+      : question.holder ? chip(mine ? 'yours' : question.holder, mine ? 'good' : 'warn') : chip('waiting', 'bad');
+    const root = h('button', { class: 'question-row ' + question.status, 'data-key': question.key, 'aria-current': Boolean(this.detail && this.detail.key === question.key), onclick: () => this.choose(question.key) },
+      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, question.state), h('span', { class: 'spacer' }), who),
+      h('span', { class: 'row dim' }, h('span', { class: 'ellipsis' }, question.robot + ' · ' + question.path), h('span', { class: 'spacer' }), rateBar(question.rate)),
+      h('span', { class: 'row' }, age, h('span', { class: 'spacer' }), left));
+    return { root, age, left };
+  }
+
+  showTimes(question) {
+    const row = this.rows.get(question.key);
+    if (!row) return;
+    const now = this.app.store.now();
+    setText(row.age, 'asked ' + duration(now - question.asked) + ' ago');
+    if (question.deadline === null) return;
+    setText(row.left, duration(question.deadline - now) + ' left');
+    row.left.classList.toggle('urgent', question.deadline - now < 20);
+  }
+
+  choose(key) {
+    const question = this.open.find((each) => each.key === key);
+    if (!question || (this.detail && this.detail.key === key)) return;
+    this.close();
+    this.detail = new Detail(this.app, question, () => this.close());
+    this.showStage();
+    this.showQueue();
+    this.detail.begin();
+  }
+
+  close() {
+    if (!this.detail) return;
+    this.detail.end();
+    this.detail = null;
+    this.showStage();
+    this.showQueue();
+  }
+
+  showStage() {
+    this.root.classList.toggle('working', Boolean(this.detail));
+    if (this.detail) {
+      replace(this.stage, this.detail.root);
+      this.stage.scrollTop = 0;
+      return;
+    }
+    const waiting = this.badge();
+    const hint = waiting ? h('p', {}, 'Choose one, or press ', h('kbd', {}, 'n'), ' for the oldest that nobody works on.')
+      : h('p', {}, 'Robots recover by themselves where they can; they ask here where they cannot.');
+    replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, waiting ? waiting + (waiting === 1 ? ' question waits' : ' questions wait') : 'All quiet'), hint));
+  }
+
+  key(event) {
+    if (this.app.current !== 'questions' || event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector('dialog[open]')) return;
+    if (event.key === 'n') {
+      const next = this.open.find((each) => each.status === 'pending' && !(this.detail && this.detail.key === each.key));
+      if (next) this.choose(next.key);
+    } else if (event.key === 'Escape') {
+      this.close();
+    } else if (this.detail) {
+      this.detail.press(event.key);
+    }
+  }
+}

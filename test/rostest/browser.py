@@ -1,0 +1,90 @@
+"""A headless Chromium for tests of web pages, with a profile of its own."""
+import shutil
+import tempfile
+import time
+
+from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from waiting import wait_for
+
+FLAGS = ['--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run', '--disable-background-networking',
+         '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage', '--disable-extensions',
+         '--mute-audio', '--disable-background-timer-throttling']
+
+
+class Browser:
+    """One browser; everything is waited for, since the machine may be loaded."""
+
+    def __init__(self, width=1360, height=860):
+        self._profile = tempfile.mkdtemp(prefix='console-browser-')
+        options = Options()
+        for flag in FLAGS + ['--user-data-dir=' + self._profile, '--window-size={},{}'.format(width, height)]:
+            options.add_argument(flag)
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+        self.driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')), options=options)
+        self.driver.set_page_load_timeout(30)
+
+    def close(self):
+        """End it, with its profile."""
+        self.driver.quit()
+        shutil.rmtree(self._profile, ignore_errors=True)
+
+    def find(self, selector, limit_s=20.0):
+        """The first element that is there and shown; raises where none comes in time."""
+        found = wait_for(lambda: self._shown(selector), limit_s)
+        if not found:
+            raise AssertionError('nothing on the page for {!r}; it says:\n{}'.format(selector, self.text()[:2000]))
+        return found
+
+    def click(self, selector, limit_s=20.0):
+        """Click what is there, shown and enabled; the page may replace it in between."""
+        def clicked():
+            try:
+                element = self._shown(selector)
+                if element is None or not element.is_enabled():
+                    return False
+                element.click()
+                return True
+            except StaleElementReferenceException:
+                return False
+        if not wait_for(clicked, limit_s):
+            raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000]))
+
+    def says(self, text, selector='body', limit_s=20.0):
+        """Whether an element comes to hold a text."""
+        return bool(wait_for(lambda: text in self.text(selector), limit_s))
+
+    def text(self, selector='body'):
+        """Text of the first such element, '' where there is none."""
+        try:
+            elements = self.driver.find_elements(By.CSS_SELECTOR, selector)
+            return elements[0].text if elements else ''
+        except StaleElementReferenceException:
+            return ''
+
+    def run(self, script, *arguments):
+        """Run JavaScript in the page."""
+        return self.driver.execute_script(script, *arguments)
+
+    def errors(self):
+        """What the page's console complains of: exceptions and violations of its policy, not lost connections."""
+        return [entry['message'] for entry in self.driver.get_log('browser') if entry['level'] == 'SEVERE'
+                and 'net::ERR_' not in entry['message'] and 'WebSocket connection' not in entry['message']]
+
+    def screenshot(self, path, width=None, height=None):
+        """A picture of the page, at another size where given."""
+        if width:
+            self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
+                'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500})
+            time.sleep(0.5)  # for the picture alone: nothing is proven by it
+        self.driver.save_screenshot(path)
+
+    def _shown(self, selector):
+        try:
+            return next((element for element in self.driver.find_elements(By.CSS_SELECTOR, selector)
+                         if element.is_displayed()), None)
+        except StaleElementReferenceException:
+            return None

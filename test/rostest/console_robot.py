@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""A robot for the console's tests: a real machine under a real oracle, whose PICK fails until its work is done."""
+import sys
+
+import rospy
+import smach
+
+from smach_oracle import OracleContainer
+
+OUTCOMES = ['succeeded', 'aborted', 'preempted']
+
+
+class Work(smach.State):
+    """Succeeds after some time; the labels in `failing` fail."""
+
+    def __init__(self, label, failing, time_s, output_keys=(), input_keys=()):
+        smach.State.__init__(self, OUTCOMES, input_keys=list(input_keys), output_keys=list(output_keys))
+        self._label = label
+        self._failing = failing
+        self._time_s = time_s
+        self._outputs = output_keys
+
+    def execute(self, ud):
+        rospy.sleep(self._time_s)
+        if self._label in self._failing:
+            raise RuntimeError('no grasp found for <b>mug</b> & <script>window.hacked = 1</script>')
+        for key in self._outputs:
+            ud[key] = 'done by ' + self._label
+        return 'succeeded'
+
+
+def chain(labels, make):
+    """A machine of states one after the other."""
+    sm = smach.StateMachine(OUTCOMES)
+    with sm:
+        for label, following in zip(labels, list(labels[1:]) + ['succeeded']):
+            smach.StateMachine.add(label, make(label), {'succeeded': following})
+    return sm
+
+
+def make_machine(failing, time_s, size):
+    """Fetch, nested: DETECT, PICK, PLACE; `size`: so many further states around it."""
+    def pick(label):
+        return Work(label, failing, time_s, ['grasp'] if label == 'PICK' else [],
+                    {'PICK': ['object'], 'PLACE': ['grasp']}.get(label, []))
+    inner = chain(['DETECT', 'PICK', 'PLACE'], pick)
+    inner.register_input_keys(['object'])
+    labels = ['STEP_{:02}_OF_A_LONG_JOB'.format(number) for number in range(size)]
+    sm = chain(['MOVE_ARMS_ASIDE', 'FETCH'] + labels,
+               lambda label: inner if label == 'FETCH' else Work(label, failing, time_s))
+    sm.userdata.object = {'name': 'mug', 'weight_kg': 0.3}
+    return sm
+
+
+def main(argv):
+    """Arguments: failing labels with commas, s that a state takes, further states, trials."""
+    failing, time_s, size, trials = argv[1].split(','), float(argv[2]), int(argv[3]), int(argv[4])
+    rospy.init_node('robot')
+    sm = make_machine(failing, time_s, size)
+    # prior: every failure is a question at once
+    OracleContainer.wrap(sm, name='KITCHEN', settings={
+        'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
+        'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
+        'interfaces': {'assist': {'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']}}})
+    for _ in range(trials):
+        if rospy.is_shutdown():
+            break
+        sm.execute()
+    rospy.spin()
+
+
+if __name__ == '__main__':
+    main(rospy.myargv(sys.argv))
