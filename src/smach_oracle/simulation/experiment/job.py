@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
 
-from .launching import Launch, end_marked
+from .launching import LOG_FILE, Launch, end_marked, last_words
 from .plan import TASKS, Arm, ExperimentError, Plan
 from .records import JobRecords
 
@@ -103,7 +103,7 @@ class Job:
             return
         number = self._next
         self._attempts[number] = self._attempts.get(number, 0) + 1
-        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why, self._records.folder)
+        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why, self._records.folder / LOG_FILE)
         if self._attempts[number] >= ATTEMPTS:
             self._lose(number, why, text)
         else:
@@ -114,7 +114,7 @@ class Job:
     def _lose(self, number: int, why: str, text: str) -> None:
         before = set(range(number - LOST_IN_A_ROW + 1, number))
         if not self.summaries or before <= set(self._lost) and len(before) < number:
-            raise ExperimentError(text)
+            raise ExperimentError(text + last_words(self._records.folder / LOG_FILE))
         self._records.lose(number, why)
         self.messages.append(text + '; LOST')
         self._settle()

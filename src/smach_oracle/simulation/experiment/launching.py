@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any, IO, List, Mapping, Optional
 
+LOG_FILE = 'launch.log'
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
 NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
 STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
@@ -20,14 +21,13 @@ class Launch:
 
     def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any]) -> None:
         """Start it. Raises OSError."""
-        self.log = folder / 'launch.log'
         self._mark = str(folder)
         port = free_port()
         command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
         command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:{}'.format(port), ROS_HOSTNAME='localhost',
                            ROS_LOG_DIR=str(folder / 'log'), PYTHONUNBUFFERED='1')
-        self._log_file: IO[str] = self.log.open('a')
+        self._log_file: IO[str] = (folder / LOG_FILE).open('a')
         self._process = subprocess.Popen(command, env=dict(environment, **{MARK: self._mark}), stdout=self._log_file,
                                          stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=end_with_parent)
 
@@ -50,6 +50,14 @@ class Launch:
         end_marked(self._mark)
         self._process.wait()
         self._log_file.close()
+
+
+def last_words(log: Path, count: int = 6) -> str:
+    """The last lines of a log, each on a line of its own; '' where there is none."""
+    if not log.exists():
+        return ''
+    lines = [line for line in log.read_text(encoding='utf-8', errors='replace').splitlines() if line.strip()]
+    return ''.join('\n  ' + line for line in lines[-count:])
 
 
 def end_with_parent() -> None:

@@ -1,0 +1,111 @@
+"""A job and what can happen to its launches: trials that hang or die, what is tried again and what is lost."""
+from types import SimpleNamespace
+
+import pytest
+
+from smach_oracle.simulation.experiment import job as job_module
+from smach_oracle.simulation.experiment.command import parse
+from smach_oracle.simulation.experiment.job import Job
+from smach_oracle.simulation.experiment.plan import ExperimentError
+from smach_oracle.simulation.experiment.records import Progress
+
+FIRST_SEED = 100
+
+
+class FakeRecords:
+    """Trials that are done by number, without any files."""
+
+    def __init__(self, folder, first_seed, trials):
+        self.folder, self.rates, self.truth = folder, folder / 'rates.json', folder / 'truth.jsonl'
+        self._trials = trials
+        self.done, self.lost = [], {}
+
+    def settle(self):
+        left = [number for number in range(self._trials) if number not in self.done and number not in self.lost]
+        done = [SimpleNamespace(summary=SimpleNamespace(bags=(path,))) for path in self.closed_bags()]
+        return Progress(done, dict(self.lost), (), left[0] if left else self._trials)
+
+    def closed_bags(self):
+        return ['{}.bag'.format(number) for number in sorted(self.done)]
+
+    def read(self, path):
+        return SimpleNamespace(summary=SimpleNamespace(bags=(path,)))
+
+    def lose(self, number, why):
+        self.lost[number] = why
+
+
+class FakeLaunch:
+    """Runs trials as told: by number of the launch, how many it completes and whether it then hangs or ends."""
+
+    script = []
+    started = []
+
+    def __init__(self, folder, launch_file, arguments):
+        self.arguments = arguments
+        self.completes, self.hangs = FakeLaunch.script.pop(0)
+        first = arguments['seed'] - FIRST_SEED
+        FakeLaunch.records.done += range(first, first + min(self.completes, arguments['trials']))
+        FakeLaunch.started.append(arguments)
+
+    def running(self):
+        return self.hangs
+
+    def request_stop(self):
+        self.hangs = False
+
+    stop = request_stop
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run a job of six trials with launches that do as told; returns it, and how each launch was started."""
+    def run_job(*script):
+        FakeLaunch.script, FakeLaunch.started = list(script), []
+        monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
+        monkeypatch.setattr(job_module, 'JobRecords', FakeRecords)
+        plan = parse(['--trials', '6', '--seed', str(FIRST_SEED), '--memory', '5']).plan
+        job = Job(plan, plan.arms[0], 0, tmp_path, hung_after_s=-1.0)  # whatever runs on is hung
+        FakeLaunch.records = job._records
+        job.start()
+        while not job.over:
+            job.watch()
+        return job, [(arguments['seed'] - FIRST_SEED, arguments['trials']) for arguments in FakeLaunch.started]
+    return run_job
+
+
+def test_a_launch_that_does_its_trials_is_the_only_one(run):
+    job, started = run((6, False))
+    assert started == [(0, 6)] and job.lost == {} and job.finished == 6
+    arguments = FakeLaunch.started[0]
+    assert arguments['with_oracle'] == 'true' and '"memory": 5' in arguments['oracle']
+    assert 'rates.json' in arguments['oracle']
+
+
+@pytest.mark.parametrize('hangs', [True, False])
+def test_a_trial_that_hangs_or_dies_is_tried_once_more(run, hangs):
+    job, started = run((2, hangs), (4, False))
+    assert started == [(0, 6), (2, 4)] and job.lost == {}
+    assert ('no trial has ended' if hangs else 'it ended before') in job.messages[0]
+    assert job.messages[0].endswith('started again')
+
+
+def test_a_trial_that_hangs_twice_is_lost_and_the_next_one_begins(run):
+    job, started = run((2, True), (0, True), (3, False))
+    assert started == [(0, 6), (2, 4), (3, 3)]
+    assert list(job.lost) == [FIRST_SEED + 2] and job.messages[-1].endswith('LOST') and job.finished == 6
+
+
+def test_each_trial_has_its_own_second_attempt(run):
+    job, started = run((1, True), (2, True), (3, False))
+    assert started == [(0, 6), (1, 5), (3, 3)] and job.lost == {}
+
+
+def test_a_job_that_cannot_even_begin_is_an_error(run):
+    with pytest.raises(ExperimentError, match='seed 100: it ended before its trials were over'):
+        run((0, False), (0, False))
+
+
+def test_too_many_lost_trials_in_a_row_are_an_error(run):
+    with pytest.raises(ExperimentError, match='seed 103'):
+        run((1, True), *[(0, True)] * 6)
