@@ -56,16 +56,20 @@ class JointListener:
         with self._changed:
             return dict(self._positions), self._stamp
 
-    def wait_for_motion(self, before: Mapping[str, float], since: rospy.Time, limit_s: float) -> bool:
-        """Wait until joints are reported later than `since` and elsewhere than `before`; whether they were.
+    def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time, period_s: float,
+                        limit_s: float) -> bool:
+        """Wait until joints are reported a period after `since`, elsewhere than `before` if given; whether they were.
 
         A world that stands still while nobody commands it repeats its positions to the last bit; a later report of
         others comes from after the command.
         """
-        def moved() -> bool:
-            return self._stamp > since and any(self._positions.get(name) != value for name, value in before.items())
+        after = since + rospy.Duration(0.9 * period_s)
+
+        def passed() -> bool:
+            return self._stamp > after and (before is None or any(
+                self._positions.get(name) != value for name, value in before.items()))
         with self._changed:
-            return self._changed.wait_for(moved, limit_s)
+            return self._changed.wait_for(passed, limit_s)
 
     def _heard(self, message: JointState) -> None:
         with self._changed:

@@ -1,8 +1,7 @@
 """One arm that a person drives: commands in, one control period of motion out, and what is known of its tool."""
-from typing import Dict, Mapping, NamedTuple, Optional, Tuple
+from typing import Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
-import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 

@@ -96,8 +96,8 @@ class CartesianDrive:
     def step(self, joints: np.ndarray, twist: np.ndarray, period: float, turn_freely: bool = False) -> Step:
         """Where the joints go within one period for the tool to move by `twist`.
 
-        :param turn_freely: only the linear part counts; meanwhile, also where that is zero, the tool turns and the elbow
-            moves as brings the arm to its posture.
+        :param turn_freely: only the linear part counts; meanwhile, also where it is zero, tool and elbow turn as brings
+            the arm to its posture.
         :raises ValueError: for joints, a twist or a period that is not finite or has the wrong shape; a period of 0.
         """
         joints, twist = _checked(joints, twist, period, len(self.arm.names))

@@ -21,7 +21,7 @@ from .dead_man import DeadMan
 from .hand import Hand
 from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
 from .surroundings import Surroundings
-from .teleoperation import Step, standing
+from .teleoperation import standing
 from .teleoperation_settings import GRASP_POSE, TeleoperationSettings
 
 _IDLE_S = 0.2  # how often the state is published while a goal is active and nothing moves
@@ -152,9 +152,10 @@ class TeleoperationServer:
         until_s = time.monotonic() + _GRIPPER_S
         while hand.gripper.moving and time.monotonic() < until_s and not rospy.is_shutdown():
             self._poll_gripper(hand, 0.02)
-        before, since = hand.positions()
-        self._step = self._moved(hand, command)
-        if self._step.velocities.any() and not hand.wait_for_motion(before, since, _APPLIED_S):
+        if self._surroundings is not None:
+            self._surroundings.update()
+        self._step, done = hand.move_and_wait(command, self._settings.period_s, _APPLIED_S)
+        if not done:
             self._refused = 'the world has not carried it out within {:g} s'.format(_APPLIED_S)
         self._tell()
 
@@ -165,14 +166,11 @@ class TeleoperationServer:
             self._held, self._step = None, standing()
         else:
             hand = self._hands[command.arm]
-            self._step = self._moved(hand, command)
+            if self._surroundings is not None:
+                self._surroundings.update()
+            self._step = hand.move(command, self._settings.period_s)
             self._poll_gripper(hand, 0.0)
         self._tell()
-
-    def _moved(self, hand: Hand, command: TeleopCommand) -> Step:
-        if self._surroundings is not None:
-            self._surroundings.update()
-        return hand.move(command, self._settings.period_s)
 
     def _poll_gripper(self, hand: Hand, timeout_s: float) -> None:
         if hand.gripper.poll(timeout_s):
@@ -193,7 +191,8 @@ class TeleoperationServer:
                             operator=self._dead_man.holder(now_s), refused=self._refused,
                             moving=bool(self._step.velocities.any()), speed=self._step.speed,
                             limit=hand.gripper.report.problem or self._step.limit, clearance=self._step.clearance,
-                            gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled)
+                            gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled,
+                            gripper_moving=hand.gripper.moving)
         pose = hand.tool_pose()
         state.header = Header(frame_id=pose.header.frame_id, stamp=pose.header.stamp)
         state.tool_pose = pose.pose

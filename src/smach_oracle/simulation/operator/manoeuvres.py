@@ -1,5 +1,5 @@
 """What the scripted expert does with a hand in place of the robot: take a thing, put it down, hand it over."""
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -17,6 +17,9 @@ LIFT = 0.12  # m
 CLEAR_OF = 0.07  # m beside the middle of the hand that neighbours should be away
 _TURNS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad beside the straight heading
 _PITCHES = (0.45, 0.9, 0.15)  # rad downwards
+_LEVEL = (0.1, 0.3)  # the same, inside a shelf
+_OFF_SHELF = 0.03  # m that a thing is lifted inside a shelf
+OUT = 0.28  # m straight back out of a shelf
 
 Look = Callable[[], Sight]
 
@@ -86,11 +89,12 @@ def come_out(pilot: Pilot, height: float) -> None:
     pilot.come_to(READY[pilot.hand.arm] + [0.0, 0.0, max(0.0, height + 0.1 - READY[pilot.hand.arm][2])])
 
 
-def grasps(thing: UprightBox, others: List[UprightBox], arm: str) -> List[np.ndarray]:
+def grasps(thing: UprightBox, others: List[UprightBox], arm: str,
+           pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
     """Poses (4x4, base_footprint from tool) from which to take a thing, the most promising first."""
     straight = float(np.arctan2(*(thing.centre[:2] - SHOULDER[arm])[::-1]))
     found = []
-    for order, (pitch, turn) in enumerate((pitch, turn) for pitch in _PITCHES for turn in _TURNS):
+    for order, (pitch, turn) in enumerate((pitch, turn) for pitch in pitches for turn in _TURNS):
         if width_across(thing, straight + turn) > WIDEST:
             continue
         pose = from_rpy((0, 0, 0), pitch=pitch, yaw=straight + turn)
@@ -100,7 +104,7 @@ def grasps(thing: UprightBox, others: List[UprightBox], arm: str) -> List[np.nda
         pose[:3, 3] = thing.centre[:2].tolist() + [height]
         pose[:2, 3] += ahead * pose[:2, 0] / max(np.linalg.norm(pose[:2, 0]), 0.2)
         crowded = sum(max(0.0, CLEAR_OF - _beside(pose, other)) for other in others)
-        found.append((20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - 0.45), order, pose))
+        found.append((20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - pitches[0]), order, pose))
     return [pose for _, _, pose in sorted(found, key=lambda item: item[:2])]
 
 
@@ -167,18 +171,6 @@ def let_go(pilot: Pilot) -> None:
     _as_far_as_it_goes(lambda: pilot.shift(z=0.10))
 
 
-def hand_over(attempt: Attempt, palm: np.ndarray) -> None:
-    """Put what the hand holds onto a palm.
-
-    :param palm: (3,) m, the middle of the palm, in base_footprint.
-    :raises Failed, Stuck: where it does not rest there.
-    """
-    thing = attempt.look().held_by(attempt.pilot.hand.arm)
-    if thing is None:
-        raise Failed('the hand holds nothing')
-    put_down(attempt, palm + [0.0, 0.0, thing.size[2] / 2])
-
-
 def _carried(tool: np.ndarray, now: np.ndarray, centre: np.ndarray, turn: float) -> np.ndarray:
     """The tool's pose once the thing at `now` is at `centre`, turned by `turn` about the vertical."""
     rotation = from_rpy((0, 0, 0), yaw=turn)[:3, :3]
@@ -219,3 +211,40 @@ def _as_far_as_it_goes(drive: Callable[[], None]) -> None:
         drive()
     except Stuck:
         return
+
+
+def pull_out(attempt: Attempt, target: Callable[[Sight], Optional[Seen]]) -> None:
+    """Take a thing out of a shelf: level, straight in, lifted a little, straight back.
+
+    :raises Failed, Stuck: where it is not in the hand in the end.
+    """
+    pilot, arm = attempt.pilot, attempt.pilot.hand.arm
+    sight = attempt.look()
+    if sight.held_by(arm) is None:
+        thing = target(sight)
+        if thing is None:
+            raise Failed('there is nothing to take')
+        _reach_in(attempt, sight, thing)
+    _as_far_as_it_goes(lambda: pilot.shift(z=_OFF_SHELF, share=0.3))
+    _as_far_as_it_goes(lambda: pilot.shift(x=-OUT, share=0.4))
+    if attempt.look().held_by(arm) is None:
+        raise Failed('it slipped out of the hand')
+
+
+def _reach_in(attempt: Attempt, sight: Sight, thing: Seen) -> None:
+    pilot = attempt.pilot
+    others = [other.box for other in sight.movable() if other.name != thing.name]
+    level = grasps(thing.box, others, pilot.hand.arm, _LEVEL)
+    if not level:
+        raise Failed('{} is too wide for the hand'.format(thing.name))
+    grasp = level[attempt.number % len(level)]
+    grasp[:3, 3] += attempt.slip()
+    pilot.open()
+    _as_far_as_it_goes(lambda: pilot.shift(x=min(0.0, thing.centre[0] - OUT - pilot.hand.tool()[0, 3]), share=0.5))
+    _as_far_as_it_goes(lambda: pilot.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
+    pilot.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
+    pilot.go(grasp, share=0.4, near=(0.006, 0.05))
+    if not pilot.close().stalled or attempt.look().held_by(pilot.hand.arm) is None:
+        pilot.open()
+        pilot.back(OUT * 0.7)
+        raise Failed('the hand closed on nothing')

@@ -1,0 +1,72 @@
+"""The services of the two interfaces, as the scripted expert calls them."""
+import time
+from typing import Callable, Sequence, TypeVar
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point32
+from sensor_msgs.msg import RegionOfInterest
+
+from smach_oracle.msg import SegmentStroke
+from smach_oracle.srv import (FinishInterface, GiveUpInterface, SegmentObject, SegmentObjectRequest, UseFrame,
+                              UseFrameRequest)
+
+from .showing import Line, Marked, Region
+from .topic_hand import Interrupted
+
+_RETRY_S = 0.05
+T = TypeVar('T')
+
+
+class Settling:
+    """How a person ends the work with an interface."""
+
+    def __init__(self, interface: str) -> None:
+        self._finish = rospy.ServiceProxy(interface + '/finish', FinishInterface)
+        self._give_up = rospy.ServiceProxy(interface + '/give_up', GiveUpInterface)
+
+    def finish(self, outcome: str, text: str) -> str:
+        """Supersede the state; why not, or ''."""
+        answer = self._finish(outcome, [], text)
+        return '' if answer.ok else answer.message
+
+    def give_up(self, text: str) -> None:
+        """End it without a result; one that has ended already is left."""
+        self._give_up(text)
+
+
+class Drawing:
+    """The perception interface."""
+
+    def __init__(self, interface: str) -> None:
+        self._segment = rospy.ServiceProxy(interface + '/segment', SegmentObject)
+        self._use_frame = rospy.ServiceProxy(interface + '/use_frame', UseFrame)
+
+    def take_frame(self, limit_s: float) -> None:
+        """Have a fresh frame shown, waiting at most so long (wall time) for the interface to begin.
+
+        :raises Interrupted: where it does not, or gets no frame.
+        """
+        answer = until(lambda: self._use_frame(UseFrameRequest.FRESH), lambda reply: reply.ok, limit_s)
+        if not answer.ok:
+            raise Interrupted('the perception interface shows nothing: ' + answer.message)
+
+    def segment(self, region: Region, strokes: Sequence[Line]) -> Marked:
+        """See showing.Segment."""
+        request = SegmentObjectRequest(region=RegionOfInterest(
+            x_offset=region[0], y_offset=region[1], width=region[2], height=region[3]))
+        request.strokes = [SegmentStroke(line.foreground, [Point32(x, y, 0.0) for x, y in line.points], 0.0)
+                           for line in strokes]
+        answer = self._segment(request)
+        at, size = answer.object.pose.position, answer.size
+        return Marked(answer.ok, answer.message, np.array([at.x, at.y, at.z]), np.array([size.x, size.y, size.z]))
+
+
+def until(call: Callable[[], T], holds: Callable[[T], bool], limit_s: float) -> T:
+    """Call until the answer is right, at most so long in wall time; the last answer."""
+    until_s = time.monotonic() + limit_s
+    answer = call()
+    while not holds(answer) and time.monotonic() < until_s and not rospy.is_shutdown():
+        time.sleep(_RETRY_S)
+        answer = call()
+    return answer

@@ -1,0 +1,87 @@
+"""How the scripted expert shows a thing in the camera's image: a hasty rectangle, a look at the mask, strokes."""
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .sight import Seen, Sight
+
+LEAST_VISIBLE = 0.35  # share of a thing's outline that must be free, to show it
+LEAST_PIXELS = 12  # px of its width and height
+_EDGE_SIGMA = 2.5  # px, by which a person misses each edge of the rectangle
+_MARGIN = 6  # px that a person leaves around it
+_TOO_FAR = 0.025  # m between the marked and the true middle that a person lets pass
+_TOO_LARGE = 0.035  # m between the marked and the true extents
+_TRIES = 4
+
+Region = Tuple[int, int, int, int]  # px: x, y, width, height
+
+
+class Line(NamedTuple):
+    """A stroke."""
+
+    foreground: bool
+    points: Sequence[Tuple[float, float]]  # px
+
+
+class Marked(NamedTuple):
+    """What the interface made of a drawing."""
+
+    ok: bool
+    message: str
+    centre: np.ndarray  # (3,) m, in base_footprint
+    size: np.ndarray  # (3,) m
+
+
+Segment = Callable[[Region, Sequence[Line]], Marked]
+
+
+def what_to_show(sight: Sight) -> Optional[Seen]:
+    """The thing that a task would take next: the nearest one that can be seen well enough; None where there is none."""
+    seen = [body for body in sight.movable() if body.visible >= LEAST_VISIBLE and min(body.region[2:]) >= LEAST_PIXELS
+            and not body.held and (not sight.goal_body or body.name == sight.goal_body)]
+    return min(seen, key=lambda body: float(np.hypot(*body.centre[:2])), default=None)
+
+
+def show(segment: Segment, thing: Seen, image: Tuple[int, int], generator: np.random.Generator) -> str:
+    """Mark a thing until the mask looks right; '' then, else what is wrong with the last one.
+
+    :param image: its width and height, px.
+    """
+    wrong = ''
+    for number in range(_TRIES):
+        strokes = strokes_on(thing.region, generator) if number % 2 else ()
+        marked = segment(rectangle(thing.region, image, generator), strokes)
+        wrong = marked.message or 'no object' if not marked.ok else looks_wrong(marked, thing)
+        if not wrong:
+            return ''
+    return wrong
+
+
+def rectangle(region: Region, image: Tuple[int, int], generator: np.random.Generator) -> Region:
+    """A rectangle about a region (px), drawn by hand, within the image."""
+    left, top, width, height = region
+    missed = generator.normal(0.0, _EDGE_SIGMA, 4)
+    x, right = (int(np.clip(round(edge), 0, image[0])) for edge in (left - _MARGIN + missed[0],
+                                                                    left + width + _MARGIN + missed[1]))
+    y, bottom = (int(np.clip(round(edge), 0, image[1])) for edge in (top - _MARGIN + missed[2],
+                                                                     top + height + _MARGIN + missed[3]))
+    return x, y, max(right - x, 1), max(bottom - y, 1)
+
+
+def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[Line, ...]:
+    """A line down the middle of the thing, and dots beside it that are none of it."""
+    left, top, width, height = region
+    middle = left + width / 2 + generator.normal(0.0, 0.05) * width
+    inside = Line(True, [(middle, top + 0.25 * height), (middle, top + 0.75 * height)])
+    beside = [Line(False, [(x, top + height / 2)]) for x in (left - 5.0, left + width + 5.0) if x >= 0.0]
+    return (inside,) + tuple(beside)
+
+
+def looks_wrong(marked: Marked, thing: Seen) -> str:
+    """What a person finds wrong with a mask, or ''."""
+    beside = float(np.hypot(*(marked.centre - thing.centre)[:2]))
+    if beside > _TOO_FAR:
+        return 'it is {:.0f} cm beside the thing'.format(100 * beside)
+    larger = max(abs(np.sort(marked.size[:2]) - np.sort(np.array(thing.size)[:2])).max(),
+                 abs(marked.size[2] - thing.size[2]))
+    return 'it is {:.0f} cm larger or smaller than the thing'.format(100 * larger) if larger > _TOO_LARGE else ''

@@ -1,0 +1,120 @@
+"""The scripted expert's hand on ROS: commands to the manipulation interface, one after the other, in lock-step."""
+import threading
+import time
+from typing import Optional
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Twist, Vector3
+from std_msgs.msg import Header
+
+from smach_oracle.geometry.transforms import from_quaternion
+from smach_oracle.msg import TeleopCommand, TeleopState
+
+from .pilot import Grip, Stuck
+
+_ANSWER_S = 90.0  # wall time in which a command must be carried out; a gripper may take many periods
+
+
+class Interrupted(Exception):
+    """The interface's goal has ended under the expert's hand."""
+
+
+class HandLink:
+    """The topics of the manipulation interface; hands of both arms share it."""
+
+    def __init__(self, interface: str, operator: str) -> None:
+        """`interface`: name of the node, e.g. manipulation_interface."""
+        self._operator = operator
+        self._seq = 0
+        self._changed = threading.Condition()
+        self._state: Optional[TeleopState] = None
+        self._publisher = rospy.Publisher(interface + '/command', TeleopCommand, queue_size=10, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(interface + '/state', TeleopState, self._heard, queue_size=100,
+                                            tcp_nodelay=True)
+
+    def wait_for_goal(self, query_id: str, limit_s: float) -> bool:
+        """Wait until the interface works on a question; whether it does."""
+        return self._wait(lambda state: state.query_id == query_id, limit_s)
+
+    def send(self, command: TeleopCommand) -> TeleopState:
+        """Send a command, and wait until it is carried out.
+
+        :raises Stuck: where it is refused, or no answer comes.
+        :raises Interrupted: where the interface has no goal any more.
+        """
+        self._seq += 1
+        command.seq, command.operator = self._seq, self._operator
+        self._publisher.publish(command)
+        if not self._wait(lambda state: state.seq == command.seq, _ANSWER_S):
+            raise Stuck('the manipulation interface does not answer')
+        state = self._state
+        if not state.query_id:
+            raise Interrupted('the manipulation interface has no goal any more')
+        if state.refused:
+            raise Stuck('command refused: ' + state.refused)
+        return state
+
+    def let_go(self, arm: str) -> None:
+        """Release the dead-man."""
+        self._seq += 1
+        self._publisher.publish(TeleopCommand(seq=self._seq, operator=self._operator, arm=arm))
+
+    def _wait(self, holds: object, limit_s: float) -> bool:
+        until_s = time.monotonic() + limit_s
+        with self._changed:
+            while not rospy.is_shutdown():
+                if self._state is not None and holds(self._state):
+                    return True
+                left_s = until_s - time.monotonic()
+                if left_s <= 0:
+                    return False
+                self._changed.wait(min(left_s, 0.5))
+        raise Interrupted('the node goes down')
+
+    def _heard(self, state: TeleopState) -> None:
+        with self._changed:
+            self._state = state
+            self._changed.notify_all()
+
+
+class TopicHand:
+    """A DrivenHand of one arm; see pilot.py."""
+
+    def __init__(self, link: HandLink, arm: str, base: str, period: float) -> None:
+        """`base`: the robot's base frame; `period`: s, of the interface.
+
+        :raises Stuck, Interrupted: as HandLink.send does.
+        """
+        self.arm = arm
+        self.period = period
+        self._link = link
+        self._base = base
+        self._state = self._send(np.zeros(6))
+
+    def tool(self) -> np.ndarray:
+        """See DrivenHand."""
+        at, turn = self._state.tool_pose.position, self._state.tool_pose.orientation
+        return from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+
+    def move(self, twist: np.ndarray, turn_freely: bool = False) -> str:
+        """See DrivenHand."""
+        self._state = self._send(twist, turn_freely=turn_freely)
+        limit: str = self._state.limit
+        return limit
+
+    def grip(self, gap: float, effort: float) -> Grip:
+        """See DrivenHand."""
+        self._state = self._send(np.zeros(6), move_gripper=True, gripper=gap, gripper_effort=effort)
+        while self._state.gripper_moving:
+            self._state = self._send(np.zeros(6))
+        return Grip(self._state.gripper, self._state.gripper_stalled)
+
+    def let_go(self) -> None:
+        """Release the dead-man."""
+        self._link.let_go(self.arm)
+
+    def _send(self, twist: np.ndarray, **more: object) -> TeleopState:
+        return self._link.send(TeleopCommand(
+            header=Header(frame_id=self._base), arm=self.arm, dead_man=True,
+            twist=Twist(Vector3(*twist[:3]), Vector3(*twist[3:])), **more))
