@@ -39,6 +39,9 @@ class Tolerances(NamedTuple):
     late_s: float = 0.0  # how much more than usual it may take to arrive
 
 
+USUAL = Tolerances()
+
+
 class Motion(Protocol):
     """Something a controller does."""
 
@@ -69,7 +72,7 @@ class Trajectory:
 
     def __init__(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray,
                  velocities: Optional[np.ndarray] = None, check_speed: bool = True,
-                 tolerances: Tolerances = Tolerances()) -> None:
+                 tolerances: Tolerances = USUAL) -> None:
         """
         :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to the first point.
         :param times: (n,) s from the start, increasing; the first may be 0.

@@ -83,11 +83,11 @@ class Controller:
 class Controllers:
     """All of them, and the topics on which joint targets for the arms come in a stream.
 
-    :param streamed: called in the world's thread when a target of a stream has been reached.
+    :param streamed: called in the world's thread when a target of a stream has been reached, or was refused.
     """
 
     def __init__(self, world: World, loop: WorldLoop, motions: MotionTable, now_s: Callable[[], float],
-                 streamed: Callable[[], None]) -> None:
+                 streamed: Callable[[], Any]) -> None:
         self._world, self._loop, self._motions, self._now_s = world, loop, motions, now_s
         self._streamed = streamed
         self._limits: Dict[str, Dict[str, Tuple[float, float]]] = {

@@ -75,7 +75,8 @@ def points_of_trajectory(message: JointTrajectory, limits: Limits) -> Tuple[List
             np.array([point.time_from_start.to_sec() for point in message.points]))
 
 
-def _check_point(point: JointTrajectoryPoint, where: str, joints: Sequence[str], limits: Limits, before: float) -> float:
+def _check_point(point: JointTrajectoryPoint, where: str, joints: Sequence[str], limits: Limits,
+                 before: float) -> float:
     """Raise BadGoal, or return the point's time; the point before it has the time `before`."""
     if len(point.positions) != len(joints):
         raise BadGoal('{} has {} positions for {} joints'.format(where, len(point.positions), len(joints)))

@@ -105,7 +105,7 @@ class WorldLoop:
                 self._busy_until = time.monotonic()
             elif time.monotonic() - self._busy_until > self._settings.idle_grace:
                 # nothing moves, and those who sleep in simulated time wake up
-                self._clock.advance(IDLE_TICK_S * self._settings.idle_speed)
+                self._clock.skip(IDLE_TICK_S * self._settings.idle_speed)
             self.watch.lap('idle')
 
     def _run_paced(self) -> None:

@@ -1,4 +1,4 @@
-"""The world node: one process with the physics, the PR2's controllers and camera, and the book on each trial's truth."""
+"""The world node: physics, the PR2's controllers and camera, and the book on each trial's truth."""
 import importlib
 import sys
 import threading
@@ -60,8 +60,9 @@ class WorldNode:
         self._camera = CameraPublisher()
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
         self._state_due = self._frame_due = 0.0
+        self._published = -1  # the world's periods at the last state that was published
         self._controllers = Controllers(self._world, self._loop, self._motions, lambda: self._clock.now_ns / 1e9,
-                                        self._target_reached)
+                                        self._publish_state)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
@@ -81,16 +82,22 @@ class WorldNode:
 
     def _after_tick(self) -> None:
         now = self._clock.now_ns / 1e9
-        if now >= self._state_due and not (self._settings.lock_step and self._controllers.streaming()):
+        came_to_rest = not self._motions and self._published != self._world.periods
+        if came_to_rest or (now >= self._state_due and not self._between_targets()):
             self._publish_state()
             self._controllers.publish_feedback()
         if self._settings.camera_rate and now >= self._frame_due and self._camera.wanted:
             self._frame_due = now + 1.0 / self._settings.camera_rate
             self._publish_frame(self._publish_state(), counted=False)
 
+    def _between_targets(self) -> bool:
+        """A stream of targets is answered by the state at each of them, and by no other."""
+        return self._settings.lock_step and self._controllers.streaming()
+
     def _publish_state(self) -> rospy.Time:
         stamp = ros_time(self._clock.stamp())
         self._state.publish(self._world, stamp)
+        self._published = self._world.periods
         self._state_due = stamp.to_sec() + 1.0 / self._settings.state_rate - PERIOD_S / 2
         return stamp
 
@@ -100,10 +107,6 @@ class WorldNode:
         self._loop.watch.lap('camera')
         self._camera.publish(frame.colour, frame.depth, frame.intrinsics, stamp)
         self._loop.watch.lap('publish')
-
-    def _target_reached(self) -> None:
-        if self._settings.lock_step:
-            self._publish_state()
 
     def _snapshot(self, camera: bool) -> rospy.Time:
         if camera:
@@ -139,7 +142,7 @@ class WorldNode:
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
-            rospy.logerr('%s: the truth on trial %d is lost: %s', rospy.resolve_name('~truth_file'), record['seed'], err)
+            rospy.logerr('pr2_world: the truth on trial %d is lost: %s', record['seed'], err)
 
     def _end(self) -> None:
         self._finish_trial()
