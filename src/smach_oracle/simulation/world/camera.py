@@ -53,7 +53,7 @@ def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List
     width, height = size
     pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
     matrix: List[float] = pybullet.computeProjectionMatrix(
-        -pixel * (width - 1) / 2, pixel * (width + 1) / 2, -pixel * (height - 1) / 2, pixel * (height + 1) / 2, NEAR, far)
+        pixel * (1 - width) / 2, pixel * (width + 1) / 2, pixel * (1 - height) / 2, pixel * (height + 1) / 2, NEAR, far)
     return matrix
 
 

@@ -13,6 +13,8 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, Dict, List, NamedTuple
 
+import numpy as np
+
 from ..robot.interface import ARMS
 from .bodies import SceneError
 from .pr2_body import PERIOD, Pr2Body
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 EVENTS = ('start', 'follow', 'torso', 'look_at', 'drive', 'see') + tuple(
     '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
+FASTEST = 0.5  # m/s, of a nudge
 OPTIONS: Dict[str, Dict[str, float]] = {
     'arm': {'duration': 1.5},
     'dim': {'brightness': 0.15, 'frames': 2},
@@ -38,7 +41,7 @@ class _Course(NamedTuple):
     values: Dict[str, float]
     periods: int  # how long it takes
     begun: int  # at which period
-    start: Dict[str, float]  # arm: where the joints were
+    start: Dict[str, float]  # arm: where the joints were; nudge: where the body was, x and y
 
 
 class Disturbances:
@@ -76,18 +79,16 @@ class Disturbances:
         for disturbance in self._due:
             values = _values(disturbance)
             self._moving.append(_Course(disturbance, values, max(1, round(values['duration'] / PERIOD)), world.periods,
-                                        {name: world.robot.position(name) for name in _joints(values, disturbance)}))
+                                        _start(world, disturbance)))
         self._due = []
         for course in list(self._moving):
             done = world.periods - course.begun
             if done >= course.periods:
                 self._moving.remove(course)
-            elif course.cause.kind == 'arm':
+            if course.cause.kind == 'arm' and done < course.periods:
                 _move_arm(world, course, done)
-            else:
-                seconds = course.periods * PERIOD
-                world.set_body_velocity(course.cause.kind.partition(':')[2], course.values['dx'] / seconds,
-                                        course.values['dy'] / seconds)
+            elif course.cause.kind != 'arm':
+                _move_body(world, course, done)
 
     def sensor(self, sensor: Sensor) -> Sensor:
         """How the camera sees just now, of how it sees undisturbed."""
@@ -113,6 +114,16 @@ def _move_arm(world: 'World', course: _Course, done: int) -> None:
         world.set_target(name, start + way * there, way * (there - here) / PERIOD)
 
 
+def _move_body(world: 'World', course: _Course, done: int) -> None:
+    name, share = course.cause.kind.partition(':')[2], min(1.0, (done + 1) / course.periods)
+    x, y = world.body_pose(name)[:2, 3]
+    pace = np.array([course.start['x'] + share * course.values['dx'] - x,
+                     course.start['y'] + share * course.values['dy'] - y]) / PERIOD
+    let_go = done >= course.periods
+    pace *= 0.0 if let_go else min(1.0, FASTEST / max(float(np.hypot(*pace)), 1e-9))
+    world.slide_body(name, pace[0], pace[1], let_go)
+
+
 def _smooth(share: float) -> float:
     return share * share * (3.0 - 2.0 * share)
 
@@ -121,8 +132,10 @@ def _values(disturbance: Disturbance) -> Dict[str, float]:
     return dict(OPTIONS[disturbance.kind.partition(':')[0]], **dict(disturbance.values))
 
 
-def _joints(values: Dict[str, float], disturbance: Disturbance) -> List[str]:
-    return [name for name in values if name not in OPTIONS['arm']] if disturbance.kind == 'arm' else []
+def _start(world: 'World', disturbance: Disturbance) -> Dict[str, float]:
+    if disturbance.kind == 'arm':
+        return {name: world.robot.position(name) for name, _ in disturbance.values if name not in OPTIONS['arm']}
+    return dict(zip('xy', world.body_pose(disturbance.kind.partition(':')[2])[:2, 3].tolist()))
 
 
 def _numbered(event: str) -> str:

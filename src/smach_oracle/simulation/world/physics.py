@@ -225,11 +225,16 @@ class World:
         position: float = pybullet.getJointState(placed.number, placed.joints[joint], physicsClientId=self._client)[0]
         return position
 
-    def set_body_velocity(self, name: str, x: float, y: float) -> None:
-        """Push a body over what it stands on, at m/s; gravity and contacts go on."""
+    def slide_body(self, name: str, x: float, y: float, let_go: bool = False) -> None:
+        """Take a body over what it stands on, at m/s; held so that it does not topple, but what is in its way stops it.
+
+        :param let_go: leave it where it is, with its own friction again.
+        """
         placed = self._find(name)
-        linear, angular = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], angular, physicsClientId=self._client)
+        friction = placed.body.friction if let_go else 0.0
+        pybullet.changeDynamics(placed.number, -1, lateralFriction=friction, physicsClientId=self._client)
+        linear, _ = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], [0.0] * 3, physicsClientId=self._client)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""

@@ -1,0 +1,70 @@
+"""What happens to a world in the course of a trial: once, when its event comes, and no earlier."""
+import numpy as np
+import pytest
+from worlds import scene
+
+from smach_oracle.simulation.robot.interface import RobotError
+from smach_oracle.simulation.world.direct import DirectRobot
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.scene import Disturbance
+
+IN_VIEW = {'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
+           'l_elbow_flex_joint': -1.2}
+LOOK = (0.72, -0.05, 0.75)
+
+
+@pytest.fixture(scope='module')
+def world():
+    one = World()
+    yield one
+    one.close()
+
+
+def test_a_pushed_arm_is_in_the_view_when_the_head_has_turned(world):
+    pushed = Disturbance('arm', 'look_at', tuple(IN_VIEW.items()))
+    world.reset(scene(disturbances=(pushed,)))
+    before = world.joints()['l_shoulder_pan_joint']
+    world.step(120)
+    assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=2e-3)
+    robot = DirectRobot(world)
+    robot.look_at(LOOK)
+    assert not world.unrest
+    for name, position in IN_VIEW.items():
+        assert world.joints()[name] == pytest.approx(position, abs=0.02)
+    robot.follow(['l_shoulder_pan_joint'], np.array([[before]]), np.array([2.0]))  # it can be taken out again
+    robot.look_at(LOOK)
+    assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=0.02)
+
+
+def test_a_nudged_body_slides_and_stays_upright(world):
+    nudge = Disturbance('nudge:can', 'see:2', (('dx', 0.05), ('dy', -0.04)))
+    world.reset(scene(disturbances=(nudge,)))
+    robot, before = DirectRobot(world), world.body_pose('can')
+    robot.see()
+    world.step(60)
+    assert np.abs(world.body_pose('can') - before).max() < 1e-3
+    robot.see()
+    robot.gripper('left', 0.05)
+    moved = world.body_pose('can')
+    assert moved[:2, 3] - before[:2, 3] == pytest.approx([0.05, -0.04], abs=0.01)
+    assert moved[2, 2] > 0.99 and max(world.body_speed('can')) < 0.05
+
+
+def test_an_event_counts_from_the_reset(world):
+    nudge = Disturbance('nudge:can', 'torso:2', (('dx', 0.05),))
+    for _ in range(2):
+        world.reset(scene(disturbances=(nudge,)))
+        robot, before = DirectRobot(world), world.body_pose('can')[0, 3]
+        robot.torso(0.201)
+        assert world.body_pose('can')[0, 3] == pytest.approx(before, abs=1e-3)
+        robot.torso(0.2)
+        assert world.body_pose('can')[0, 3] > before + 0.03
+
+
+def test_a_motion_against_a_push_fails_and_says_so(world):
+    """Somebody takes the arm while it is being moved."""
+    pushed = Disturbance('arm', 'torso', tuple(IN_VIEW.items()) + (('duration', 3.0),))
+    world.reset(scene(disturbances=(pushed,)))
+    world.happened('torso')
+    with pytest.raises(RobotError, match='l_shoulder_pan_joint is .* off its path'):
+        DirectRobot(world).follow(['l_shoulder_pan_joint'], np.array([[1.2]]), np.array([3.0]))
