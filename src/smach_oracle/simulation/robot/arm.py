@@ -118,6 +118,8 @@ class Arm:
     def open(self, gap: float = GRIPPER_OPEN) -> None:
         """Open the gripper. Raises SkillError where it does not open as far."""
         state = self._gripper(gap)
+        if state.position < gap - 0.015:  # something that it held may have got in the way of a finger
+            state = self._gripper(gap)
         if state.position < gap - 0.015:
             raise SkillError('the {} gripper opened only {:.1f} of {:.1f} cm'.format(
                 self.name, 100 * state.position, 100 * gap))

@@ -1,5 +1,6 @@
 """The manipulation skills over messages: goals in, results out. The node gives them servers."""
-from typing import Dict, Optional, Tuple
+import contextlib
+from typing import Dict, Iterator, Optional, Tuple, Type
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .interface import ARMS
 from .kitchen import MapBox
 from .own_limbs import limbs_of
 from .pick import Held, pick
-from .place import place, stands_there
+from .place import Lost, place, put_back, stands_there
 from .skill_server import Say
 from .tabletop import find_tabletop
 
@@ -73,9 +74,11 @@ class Manipulation:
         arm = known_arm(goal.arm)
         target = box_in_base(goal.object, goal.size, self.means.robot, 'object')
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen(target)
+        boxes = around(made, target)
+        self._put_back(arm, boxes)
         say('choosing a grasp')
-        self.held.pop(arm, None)
-        self.held[arm] = pick(self.means, arm, target, around(made, target))
+        with self._withdrawing(arm, boxes):
+            self.held[arm] = pick(self.means, arm, target, boxes)
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, say: Say) -> PlaceResult:
@@ -87,7 +90,8 @@ class Manipulation:
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen()
         held, boxes = self._held_object(arm, grasp, made)
         say('choosing a way')
-        stood = place(self.means, arm, centre, held, boxes)
+        with self._withdrawing(arm, boxes, Lost):
+            stood = place(self.means, arm, centre, held, boxes)
         self.held.pop(arm, None)
         say('looking whether it stands there')
         boxes['placed'] = MapBox(stood, held.half, 0.0)
@@ -95,6 +99,25 @@ class Manipulation:
         if not stands_there(self.means.robot.see(), stood, held):
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
+
+    @contextlib.contextmanager
+    def _withdrawing(self, arm: str, boxes: Dict[str, MapBox], errors: Type[Exception] = SkillError) -> Iterator[None]:
+        """After a failure the hand is empty, and the arm shall not stay where it hides what the camera should see."""
+        try:
+            yield
+        except errors:
+            self.held.pop(arm, None)
+            try:
+                arms_aside(self.means, [arm], boxes)
+            except SkillError:
+                pass  # what made the skill fail is what people should be told
+            raise
+
+    def _put_back(self, arm: str, boxes: Dict[str, MapBox]) -> None:
+        """An object that the hand still holds goes straight down again."""
+        held = self.held.pop(arm, None)
+        if held is not None:
+            put_back(self.means, arm, held, boxes)
 
     def _held_object(self, arm: str, grasp: np.ndarray, made: CollisionMap) -> Tuple[Held, Dict[str, MapBox]]:
         """What is held, and the boxes without it: by the map, by memory, or something of the usual size."""

@@ -32,6 +32,10 @@ class _Way(NamedTuple):
     back: np.ndarray  # (j, 7), without the object
 
 
+class Lost(SkillError):
+    """The hand turned out to be empty."""
+
+
 def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping[str, MapBox],
           support: str = 'table') -> np.ndarray:
     """Put the held object down upright.
@@ -46,18 +50,37 @@ def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping
         if support not in boxes:
             raise SkillError('there is nothing to stand on: the collision map has no {}'.format(support))
         if hand.close() == 0:
-            raise SkillError('the {} hand holds nothing'.format(arm))
+            raise Lost('the {} hand holds nothing'.format(arm))
         centre = _on_support(centre, held, boxes[support])
         hand.space.attach(held.half - 0.004, held.tool_from_object)
         centre, way = _find_way(hand, centre, held, support)
         hand.follow(way.there, FAST)
         if hand.close() == 0:
-            raise SkillError('the object was lost on the way to its place')
+            raise Lost('the object was lost on the way to its place')
         hand.follow(way.down, SLOW)
         hand.open()
         hand.space.detach()
         hand.follow(way.back, SLOW)
         return centre
+
+
+def put_back(means: Means, arm: str, held: Held, boxes: Mapping[str, MapBox]) -> None:
+    """Let go of an object where it was taken, if the arm is still above that; elsewhere, where it is.
+
+    :raises SkillError: where the hand does not open.
+    """
+    with Arm(means, arm, boxes, seed_of(arm, held.grasp)) as hand:
+        now = hand.pose()
+        if np.hypot(*(now - held.grasp)[:2, 3]) < NEAR:
+            with hand.space.touchable(hand.space.names()):
+                down = hand.line(hand.now(), held.grasp)
+                back = None if down is None else hand.line(down[-1], backed_off(held.grasp, RETREAT))
+            if down is not None and back is not None:
+                hand.follow(down, SLOW)
+                hand.open()
+                hand.follow(back, SLOW)
+                return
+        hand.open()
 
 
 def stands_there(frame: Frame, centre: np.ndarray, held: Held) -> bool:

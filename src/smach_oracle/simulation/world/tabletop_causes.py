@@ -1,4 +1,5 @@
 """Why a trial at the table may fail: each cause is physical, is drawn from the trial's seed, and is told to nobody."""
+import functools
 from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -44,7 +45,7 @@ def _caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> D
 def _arm_in_view(draft: Draft, generator: np.random.Generator) -> Optional[Draft]:
     """Somebody pushes the left arm between the camera and the nearest thing, after the head has turned there."""
     thing = draft.things[TARGET]
-    chain = Chain.from_urdf(pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'], {'torso_lift_joint': TORSO})
+    chain = _left_arm()
     for _ in range(20):
         top = np.array(thing.position) + [0.0, 0.0, thing.size[2] / 2]
         point = top + generator.uniform(0.3, 0.5) * (EYE - top) + [0.0, generator.uniform(-0.06, 0.02), 0.0]
@@ -56,6 +57,11 @@ def _arm_in_view(draft: Draft, generator: np.random.Generator) -> Optional[Draft
             return _caused(draft, 'arm_in_view', 'the left arm is pushed over the table, its hand {:.0f} cm above it'
                            .format(100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values))
     return None
+
+
+@functools.lru_cache(maxsize=1)
+def _left_arm() -> Chain:
+    return Chain.from_urdf(pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'], {'torso_lift_joint': TORSO})
 
 
 def _glare(draft: Draft, generator: np.random.Generator) -> Draft:

@@ -1,0 +1,163 @@
+"""Pick, place and arms aside on the simulated PR2, held against the physical truth; and goals that cannot be."""
+import math
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from std_msgs.msg import Header
+from worlds import CAN, CARTON, TABLE, scene
+
+from smach_oracle.msg import BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal
+from smach_oracle.simulation.robot.arm import Means, SkillError
+from smach_oracle.simulation.robot.arms_aside import ASIDE, is_aside
+from smach_oracle.simulation.robot.collision import installed_model
+from smach_oracle.simulation.robot.interface import ARM_JOINTS, RobotError
+from smach_oracle.simulation.robot.manipulation import Manipulation
+from smach_oracle.simulation.world.direct import DirectRobot
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.scene import RobotStart
+
+BASE = 'base_footprint'
+CAN_SIZE = Vector3(0.062, 0.062, 0.12)
+
+
+def say(status):
+    """Nobody listens."""
+
+
+def pose(x, y, z, frame=BASE, w=1.0):
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0.0, 0.0, 0.0, w)))
+
+
+class Bench:
+    """A world and the skills in it, with a map of what stands on the table."""
+
+    def __init__(self, *bodies, **more):
+        self.world = World(scene(*bodies, **more))
+        self.robot = DirectRobot(self.world)
+        self.skills = Manipulation(Means(self.robot, installed_model()))
+
+    def map(self):
+        goal = BuildCollisionMapGoal(pose(0.85, 0.0, 0.72), [pose(*CAN.position), pose(*CARTON.position)],
+                                     [CAN_SIZE, Vector3(*CARTON.size)])
+        goal.table.pose.orientation = Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+        return self.skills.build_collision_map(goal, say)
+
+    def pick(self, map_id, arm='right'):
+        return self.skills.pick(PickGoal(arm, pose(*CAN.position), CAN_SIZE, map_id), say).grasp
+
+
+@pytest.fixture(name='bench')
+def _bench():
+    bench = Bench()
+    yield bench
+    bench.world.close()
+
+
+def test_a_grasp_survives_a_shake_and_the_object_then_stands_where_it_was_to_be(bench):
+    made = bench.map()
+    assert made.boxes == 3
+    grasp = bench.pick(made.map_id)
+    assert bench.world.body_pose('can')[2, 3] > CAN.position[2] + 0.08
+    shake(bench)
+    assert bench.world.holding('can') == 'right'
+    bench.robot.look_at((0.6, -0.2, 0.8))
+    bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
+    there = bench.world.body_pose('can')
+    assert np.hypot(there[0, 3] - 0.6, there[1, 3] + 0.35) < 0.03
+    assert there[2, 2] > 0.99 and abs(there[2, 3] - 0.78) < 0.01
+    assert np.hypot(*(bench.world.body_pose('carton')[:2, 3] - CARTON.position[:2])) < 0.01
+    assert is_aside(bench.robot.joints(), 'right')
+
+
+def shake(bench):
+    """Turn the wrist and the shoulder to and fro, four times a second."""
+    names = ARM_JOINTS['right']
+    here = np.array([bench.robot.joints()[name] for name in names])
+    moves = [here + np.array([0.04, 0, 0, 0, 0.15, 0, 0.3]) * (-1) ** k for k in range(8)] + [here]
+    bench.robot.follow(names, np.array(moves), 0.25 * np.arange(1, len(moves) + 1))
+
+
+def test_the_other_arm_is_moved_out_of_the_view():
+    front = dict(zip(ARM_JOINTS['left'], (0.3, 0.0, 1.2, -1.4, 0.0, -0.8, 0.0)))
+    bench = Bench(robot=RobotStart(tuple(front.items())))
+    assert not is_aside(bench.robot.joints(), 'left')
+    bench.skills.move_arms_aside(MoveArmsAsideGoal(), say)
+    left = np.array([bench.robot.joints()[name] for name in ARM_JOINTS['left']])
+    assert np.abs(left - ASIDE['left']).max() < 0.03
+    bench.world.close()
+
+
+def test_an_arm_that_is_held_is_noticed(bench, monkeypatch):
+    bench.robot.follow(ARM_JOINTS['left'], np.array([[0.3, 0.0, 1.2, -1.4, 0.0, -0.8, 0.0]]), np.array([2.0]))
+    monkeypatch.setattr(DirectRobot, 'follow', lambda *_: None)
+    with pytest.raises(SkillError, match='the left arm is not at the side'):
+        bench.skills.move_arms_aside(MoveArmsAsideGoal(['left']), say)
+
+
+def test_nothing_in_the_hand_is_felt(bench):
+    made = bench.map()
+    goal = PickGoal('right', pose(0.62, -0.35, 0.78), CAN_SIZE, made.map_id)
+    with pytest.raises(SkillError, match='closed on nothing, 2 times'):
+        bench.skills.pick(goal, say)
+    assert is_aside(bench.robot.joints(), 'right')
+    with pytest.raises(SkillError, match='the right hand holds nothing'):
+        bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
+
+
+def test_without_a_map_pick_makes_its_own_of_what_the_camera_sees(bench):
+    bench.robot.look_at((0.7, -0.1, 0.75))
+    bench.pick('')
+    assert bench.world.holding('can') == 'right'
+
+
+def test_a_head_that_is_told_looks_there(bench):
+    bench.skills.point_head(PointHeadGoal(PointStamped(Header(frame_id='base_link'), Point(0.7, -0.2, 0.7))), say)
+    camera = bench.robot.see().base_from_camera
+    way = np.array([0.7, -0.2, 0.751]) - camera[:3, 3]
+    assert np.dot(way / np.linalg.norm(way), camera[:3, 2]) > 0.999
+
+
+BAD = [
+    ('an unknown arm', "unknown arm 'third'; allowed: left, right", dict(arm='third')),
+    ('NaN', 'object: .*not finite', dict(object=pose(math.nan, 0.0, 0.8))),
+    ('a quaternion of no length', 'object: ', dict(object=pose(0.6, 0.0, 0.8, w=0.0))),
+    ('a wrong frame', "object: frame 'moon'; allowed: base_footprint, base_link, odom_combined",
+     dict(object=pose(0.6, 0.0, 0.8, frame='moon'))),
+    ('an unknown map', "no collision map 'x'", dict(map_id='x')),
+    ('no size', 'object: its size is .*each must be above 0', dict(size=Vector3(0.05, 0.0, 0.1))),
+    ('a huge size', 'object: its size is .*at most 1', dict(size=Vector3(0.05, 3.0, 0.1))),
+    ('out of reach', 'none of .* grasps can be done: .*out of reach', dict(object=pose(2.5, 0.0, 0.8))),
+    ('too wide', 'too wide for the gripper from every side', dict(size=Vector3(0.2, 0.2, 0.1)))]
+
+
+@pytest.fixture(name='still', scope='module')
+def _still():
+    bench = Bench(TABLE, CAN, CARTON)
+    bench.map_id = bench.map().map_id
+    yield bench
+    bench.world.close()
+
+
+@pytest.mark.parametrize('text, change', [(text, change) for _, text, change in BAD], ids=[name for name, _, _ in BAD])
+def test_goals_that_cannot_be_are_refused_and_say_why(still, text, change):
+    goal = PickGoal('right', pose(*CAN.position), CAN_SIZE, still.map_id)
+    for name, value in change.items():
+        setattr(goal, name, value)
+    before = still.robot.joints()
+    with pytest.raises(SkillError, match=text):
+        still.skills.pick(goal, say)
+    assert np.abs(np.array(list(still.robot.joints().values())) - np.array(list(before.values()))).max() < 0.01
+
+
+def test_other_goals_that_cannot_be(still):
+    with pytest.raises(SkillError, match="unknown arm 'both'"):
+        still.skills.move_arms_aside(MoveArmsAsideGoal(['both']), say)
+    with pytest.raises(SkillError, match='target: the point is not finite'):
+        still.skills.point_head(PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(math.inf, 0, 0))), say)
+    with pytest.raises((SkillError, RobotError)):
+        still.skills.point_head(PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(-1.0, 0.0, 1.3))), say)
+    with pytest.raises(SkillError, match='1 objects but 0 sizes'):
+        still.skills.build_collision_map(BuildCollisionMapGoal(pose(0.8, 0, 0.7), [pose(0.6, 0, 0.8)], []), say)
+    with pytest.raises(SkillError, match="table: frame 'moon'"):
+        still.skills.build_collision_map(BuildCollisionMapGoal(pose(0.8, 0, 0.7, frame='moon'), [], []), say)

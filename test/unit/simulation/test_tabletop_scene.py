@@ -1,0 +1,49 @@
+"""The scenes of the first use case: they repeat, can be built, and fail for several reasons."""
+import collections
+
+import numpy as np
+
+from smach_oracle.simulation.world.judge import judge
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.tabletop_causes import CHANCE
+from smach_oracle.simulation.world.tabletop_scene import GOAL, draw
+
+
+def test_the_same_seed_gives_the_same_scene_and_another_another():
+    assert draw(7) == draw(7)
+    assert draw(7) != draw(8)
+
+
+def test_a_benign_scene_has_no_cause_and_is_the_same_apart_from_that():
+    for seed in range(25):
+        scene = draw(seed, benign=True)
+        assert not scene.causes and not scene.disturbances
+        if not draw(seed).causes:
+            assert draw(seed)._replace(notes=scene.notes) == scene
+
+
+def test_all_causes_come_up_and_their_share_is_as_it_should():
+    counts: collections.Counter = collections.Counter()
+    scenes = [draw(seed) for seed in range(200, 500)]
+    for scene in scenes:
+        counts.update(cause.kind for cause in scene.causes)
+        assert all(cause.text for cause in scene.causes)
+    assert set(counts) == {kind for kind, chance in CHANCE.items() if chance}
+    assert 0.2 < np.mean([bool(scene.causes) for scene in scenes]) < 0.6
+
+
+def test_nothing_stands_at_the_goal_and_the_things_stand_apart_and_at_rest():
+    world = World()
+    for seed in (1, 2, 3):
+        scene = draw(seed, benign=True)
+        world.reset(scene)
+        assert not judge(world, scene.goal).success
+        things = [body for body in scene.bodies if body.mass]
+        assert len(things) >= 3
+        for thing in things:
+            there = world.body_pose(thing.name)
+            assert np.linalg.norm(there[:3, 3] - thing.position) < 0.004 and there[2, 2] > 0.999
+        nearest = min(things, key=lambda thing: np.hypot(*thing.position[:2]))
+        assert nearest.name == 'object_0'
+        assert np.hypot(nearest.position[0] - GOAL[0], nearest.position[1] - GOAL[1]) > 0.15
+    world.close()
