@@ -1,4 +1,5 @@
 """The settings of the manipulation interface, from its node's parameters."""
+import time
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import rospy
@@ -11,6 +12,7 @@ from .teleoperation import DriveLimits
 
 GRASP_POSE = 'grasp_pose'  # of the tool, when the gripper last closed on something; else where it is now
 TOOL_POSE = 'tool_pose'  # of the tool, now
+_DESCRIPTION_S = 60.0
 _OUTPUTS = (GRASP_POSE, TOOL_POSE)
 
 
@@ -64,10 +66,10 @@ class TeleoperationSettings(NamedTuple):
     def build(self) -> Tuple[Dict[str, Hand], Optional[Surroundings]]:
         """The arms, and what they could hit.
 
-        :raises ConfigError: where there is no robot description.
+        :raises ConfigError: where no robot description is set within 60 s of wall time.
         :raises ValueError: where it lacks a link that is named, or cannot be loaded.
         """
-        urdf = rospy.get_param('robot_description', '')
+        urdf = _description()
         if not isinstance(urdf, str) or not urdf:
             raise ConfigError(rospy.resolve_name('robot_description'), urdf, 'the text of a URDF')
         robot = Robot(urdf, self.base, JointListener())
@@ -77,6 +79,14 @@ class TeleoperationSettings(NamedTuple):
             for hand in hands.values():
                 surroundings.watch_over(hand)
         return hands, surroundings
+
+
+def _description() -> object:
+    """The robot description, which another node of the same launch may still be about to set."""
+    until_s = time.monotonic() + _DESCRIPTION_S
+    while time.monotonic() < until_s and not rospy.is_shutdown() and not rospy.has_param('robot_description'):
+        time.sleep(0.1)
+    return rospy.get_param('robot_description', '')
 
 
 def _limits() -> DriveLimits:

@@ -1,8 +1,8 @@
-"""The node `scripted_operator`: an expert without a person, who answers questions and works with people's interfaces."""
+"""The node `scripted_operator`: an expert without a person who answers questions with the means that people have."""
 import math
 import time
 import zlib
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Tuple
 
 import numpy as np
 import rospy
@@ -99,7 +99,7 @@ class Operator:
         self._asked[goal.failed_state] = number + 1
         return number
 
-    def _decide(self, listed: Listed, number: int, sight: Sight) -> Optional[Decision]:
+    def _decide(self, listed: Listed, number: int, sight: Sight) -> Decision:
         """What to answer; a decision for nothing gives up."""
         goal = listed.goal
         if sum(self._asked.values()) > self._settings.most_questions:
@@ -121,6 +121,7 @@ class Operator:
             kind=kind, state=decision.goto, interface=decision.interface, why=decision.why))
         if not answer.ok:
             rospy.logwarn('Answer for %s refused: %s', listed.goal.failed_state, answer.message)
+            self._front_end.release(listed)
         return bool(answer.ok)
 
 

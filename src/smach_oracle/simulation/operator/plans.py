@@ -48,7 +48,7 @@ class Plans:
 
 
 class Decision(NamedTuple):
-    """What to answer."""
+    """What to answer; neither interface nor state: give up."""
 
     interface: str = ''  # start this one
     goto: str = ''  # or go to this state
@@ -69,7 +69,7 @@ class Situation(NamedTuple):
 def decide(means: Means, situation: Situation) -> Decision:
     """The answer to a question."""
     def go(state: str, why: str) -> Decision:
-        return Decision(goto=state if state in situation.states else situation.state, why=why)
+        return Decision(goto=next((each for each in (state, situation.state) if each in situation.states), ''), why=why)
 
     interface = MEANS[means.means]
     if interface not in situation.interfaces:
