@@ -14,14 +14,15 @@ from typing import Any, Callable, Dict, List, MutableSet, NamedTuple, Optional, 
 import rospy
 import smach
 
+from smach_oracle.msg import ConsoleCommand
 from smach_oracle.oracle.errors import ConfigError
 
-from .expert_client import ExpertQueryClient
+from .expert_client import OWN_SERVER, ExpertQueryClient
 from .event_messages import rates_to_msg
 from .master_watch import start_master_watch
 from .publishers import EventPublisher, RatesPublisher
 from .recorder import TrialRecorder, prepare_folder
-from .recorder_topics import action_topics, smach_topics
+from .recorder_topics import action_topics, audit_topic, smach_topics
 
 PREEMPT_WAIT_S = 1.0  # for machines to end, before their bags are closed under them
 
@@ -36,6 +37,7 @@ class Options(NamedTuple):
 class _RecordingPlan(NamedTuple):
     folder: str
     topics: List[str]
+    types: Dict[str, Any]
 
 
 class Attachments:
@@ -135,11 +137,13 @@ class Attachments:
         if node:
             topics += _topic_names(read_private('record_topics', []))
             topics += smach_topics(rospy.get_name()) + action_topics(rospy.resolve_name('~expert_query'))
-        return _RecordingPlan(folder, topics)
+            audit = audit_topic(rospy.resolve_name(read_private('expert_query_server', '') or OWN_SERVER))
+            return _RecordingPlan(folder, topics + [audit], {audit: ConsoleCommand})
+        return _RecordingPlan(folder, topics, {})
 
     def _record(self, machine: Any, plan: Optional[_RecordingPlan]) -> None:
         if plan is not None:
-            self._recorder = TrialRecorder(plan.folder, plan.topics)
+            self._recorder = TrialRecorder(plan.folder, plan.topics, types=plan.types)
         if self._recorder is not None:
             self._recorder.attach(machine._oracle.events, {'~oracle/rates': _rates_of(machine)})
 

@@ -33,13 +33,15 @@ class TrialRecorder:
     alone are recorded.
     """
 
-    def __init__(self, folder: str, topics: Sequence[str] = (), *, warn: Optional[Callable[[str], None]] = None,
+    def __init__(self, folder: str, topics: Sequence[str] = (), *, types: Optional[Mapping[str, Any]] = None,
+                 warn: Optional[Callable[[str], None]] = None,
                  say: Optional[Callable[[str], None]] = None, on_status: Optional[Callable[[Status], None]] = None,
                  max_events: int = MAX_EVENTS, max_message_bytes: int = MAX_MESSAGE_BYTES,
                  hung_after_s: float = HUNG_AFTER_S) -> None:
         """Create the folder, mend the bags of recorders that died in it, and start.
 
         :param topics: names of other topics to record, each from when it is first published.
+        :param types: message classes of those of them that are known beforehand.
         :param warn: told what went wrong, `say`: what is good to know; default: rospy's log, or without a node the
             log `smach_oracle.recorder`.
         :param on_status: told each change of status, in the recorder's threads.
@@ -63,7 +65,7 @@ class TrialRecorder:
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
         self._thread.start()
-        self._listener = TopicListener(topics, self._take_message) if topics and has_node() else None
+        self._listener = TopicListener(topics, self._take_message, types) if topics and has_node() else None
         atexit.register(self.close)
 
     def attach(self, machine: Any, snapshots: Optional[Snapshots] = None) -> None:

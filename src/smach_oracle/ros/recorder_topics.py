@@ -5,7 +5,7 @@ undecoded messages to the robot's own callbacks. So it subscribes with the true 
 """
 import threading
 import time
-from typing import Any, Callable, Dict, List, Optional, Sequence
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
 
 import genpy
 import rosgraph
@@ -30,6 +30,11 @@ def smach_topics(server: str) -> List[str]:
     return ['{}/smach/{}'.format(server, name) for name in ('container_structure', 'container_status')]
 
 
+def audit_topic(server: str) -> str:
+    """Where operator consoles tell of the commands that people give about the questions of an expert query server."""
+    return server + '/audit'
+
+
 def now() -> When:
     """The present moment by both clocks."""
     stamp = None
@@ -42,13 +47,15 @@ def now() -> When:
 class TopicListener:
     """Subscribes to topics of any type, as soon as the type is known, and hands on each message."""
 
-    def __init__(self, topics: Sequence[str], hand_on: Callable[[MessageItem], None]) -> None:
+    def __init__(self, topics: Sequence[str], hand_on: Callable[[MessageItem], None],
+                 types: Optional[Mapping[str, Any]] = None) -> None:
+        """`types`: message classes of topics that nobody may have advertised yet, so that nothing is missed."""
         self._hand_on = hand_on
         self._unknown = list(dict.fromkeys(rospy.resolve_name(topic) for topic in topics))
         self._subscribers: List[rospy.Subscriber] = []
         self._lock = threading.Lock()
         self._closing = threading.Event()
-        self._subscribe(types_in_process())
+        self._subscribe({**types_in_process(), **(types or {})})
         if self._unknown:
             threading.Thread(target=self._look, name='recorder topics', daemon=True).start()
 

@@ -1,4 +1,4 @@
-"""Who may do what: roles, tokens, the hosts and origins that are answered, limits on rates. Pure; no Tornado, no ROS."""
+"""Who may do what: roles, tokens, the hosts and origins that are answered, limits on rates. No Tornado, no ROS."""
 import hashlib
 import hmac
 import ipaddress

@@ -9,6 +9,7 @@ import rospy
 from smach_oracle.msg import ConsoleCommand
 
 from ...ros.event_messages import ros_now
+from ...ros.recorder_topics import audit_topic
 from ..followed_server import Listed
 
 LONGEST_ARGUMENTS = 4000
@@ -37,7 +38,7 @@ class Audit:
         for server in servers:
             with self._lock:
                 if server not in self._by_server:
-                    self._by_server[server] = rospy.Publisher(server + '/audit', ConsoleCommand, queue_size=1000)
+                    self._by_server[server] = rospy.Publisher(audit_topic(server), ConsoleCommand, queue_size=1000)
 
     def tell(self, person: Person, command: str, ok: bool, message: str, arguments: Optional[Mapping[str, Any]] = None,
              listed: Optional[Listed] = None) -> None:

@@ -1,4 +1,4 @@
-"""Counts one trial as its events come in; by the definitions of doc/statistics.md, which the analysis of bags shares."""
+"""Counts one trial as its events come in, by the definitions of doc/statistics.md, as the analysis of bags does."""
 from collections import Counter
 from typing import Any, Dict, Iterable, List, Set, Tuple
 

@@ -2,7 +2,7 @@
 import { h, replace, setText } from './dom.js';
 
 const TOLD = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end', 'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure', 'trial_end', 'query_opened']);
-const LONGEST = 12;
+const LONGEST = 8;
 const SILENCE_S = 6;
 
 export class FollowUp {

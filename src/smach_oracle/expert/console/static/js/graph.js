@@ -35,7 +35,7 @@ export class Graph {
     this.root = h('div', { class: 'graph-frame' }, this.svg, h('div', { class: 'tools' },
       h('button', { class: 'tool', title: 'Closer', 'aria-label': 'Closer', onclick: () => this.zoom(1.3) }, '+'),
       h('button', { class: 'tool', title: 'Farther', 'aria-label': 'Farther', onclick: () => this.zoom(1 / 1.3) }, '−'),
-      h('button', { class: 'tool', title: 'All of it', onclick: () => { this.setFollow(false); this.fit(); } }, 'Fit'),
+      h('button', { class: 'tool', title: 'All of it', onclick: () => { this.setFollow(false); this.fitted = true; this.fit(); } }, 'Fit'),
       this.followButton));
     this.view = { x: 0, y: 0, scale: 1 };
     this.setFollow(true);
@@ -201,7 +201,8 @@ export class Graph {
     const box = this.root.getBoundingClientRect();
     if (!this.data || !this.data.drawn || !box.width) return;
     if (!this.follow) {
-      this.apply();
+      if (this.fitted) this.fit();
+      else this.apply();
       return;
     }
     this.fit();
@@ -235,6 +236,7 @@ export class Graph {
     const [px, py] = at || [box.width / 2, box.height / 2];
     const scale = Math.min(3, Math.max(0.08, this.view.scale * factor));
     this.setFollow(false);
+    this.fitted = false;
     this.view.x += px / this.view.scale - px / scale;
     this.view.y += py / this.view.scale - py / scale;
     this.view.scale = scale;
@@ -258,6 +260,7 @@ export class Graph {
         const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
         if (this.follow && Math.abs(dx) + Math.abs(dy) < 2) return;
         this.setFollow(false);
+        this.fitted = false;
         this.view.x -= dx / this.view.scale;
         this.view.y -= dy / this.view.scale;
         this.apply();

@@ -6,6 +6,17 @@ import { remember, remembered } from './alerts.js';
 
 export const machines = { id: 'machines', title: 'Machines', create: (app) => new Machines(app) };
 
+// What a robot's section says, and what its open questions tell: a page that came late has not heard of the failure.
+export function liveOf(store, robot) {
+  const live = store.get('live ' + robot);
+  if (!live) return { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
+  const failed = Object.assign({}, live.failed);
+  for (const question of store.get('questions') || []) {
+    if (question.robot === robot) failed[question.path] = { state: question.state };
+  }
+  return Object.assign({}, live, { failed });
+}
+
 // The drawing of one container, or its list.
 export class MachineView {
   constructor(store, onOpen) {
@@ -25,7 +36,7 @@ export class MachineView {
 
   update() {
     const data = this.store.get('graph ' + this.robot + ' ' + this.path);
-    const live = this.store.get('live ' + this.robot);
+    const live = liveOf(this.store, this.robot);
     if (!data) {
       replace(this.root, h('p', { class: 'empty' }, 'Nothing is known of this machine. It is shown while its introspection is on.'));
       this.shown = '';
@@ -81,7 +92,7 @@ class Machines {
   shown() { this.update(['robots']); }
 
   update(names) {
-    if (!names.some((name) => name === 'robots' || name.startsWith('live ') || name.startsWith('graph '))) return;
+    if (!names.some((name) => name === 'robots' || name === 'questions' || name.startsWith('live ') || name.startsWith('graph '))) return;
     const robots = (this.app.store.get('robots') || []).filter((robot) => this.paths(robot).length);
     if (!robots.includes(this.robot)) {
       this.robot = robots.find((robot) => this.live(robot).alive) || robots[0] || '';
@@ -97,9 +108,9 @@ class Machines {
     if (this.robot) this.view.show(this.robot, this.path);
   }
 
-  live(robot) { return this.app.store.get('live ' + robot) || {}; }
+  live(robot) { return liveOf(this.app.store, robot); }
 
-  paths(robot) { return this.live(robot).paths || []; }
+  paths(robot) { return this.live(robot).paths; }
 
   fillPicker(robots) {
     const shown = robots.map((robot) => {

@@ -161,7 +161,7 @@ export class Detail {
       }
       this.show();
     }
-    if (names.some((name) => name.startsWith('live ') || name.startsWith('graph '))) this.machine.update();
+    if (names.some((name) => name === 'questions' || name.startsWith('live ') || name.startsWith('graph '))) this.machine.update();
     if (this.followUp) this.followUp.update(names);
   }
 

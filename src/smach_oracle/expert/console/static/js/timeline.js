@@ -54,7 +54,8 @@ export class Timeline {
 
 function short(lane, width) {
   const most = Math.floor((width - 8) / 7.7);
-  return lane.length > most ? '…' + lane.slice(1 - most) : lane;
+  const label = lane.split('/').pop();
+  return label.length > most ? label.slice(0, most - 1) + '…' : label;
 }
 
 function laneOf(event) {
