@@ -6,6 +6,7 @@ import unittest
 from pathlib import Path
 
 import rospkg
+import yaml
 from roslib.packages import find_node
 
 from smach_oracle.analysis.trials import TrialSummary, load_trials
@@ -23,8 +24,12 @@ def seed_with(cure: str) -> int:
 
 def run_task(seed: int, *options: str) -> TrialSummary:
     """Run one trial of the script as a user would, and read its bag."""
-    with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([find_node('smach_oracle', 'oracle_run')[0], '--config', str(TASKS / 'pick_and_place.yaml'),
+    settings = yaml.safe_load((TASKS / 'pick_and_place.yaml').read_text())
+    settings['interfaces'] = {'assist': {'action': 'world/assist'}}  # the one that the stub has
+    with tempfile.TemporaryDirectory() as folder, tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
+        yaml.safe_dump(settings, config)
+        config.flush()
+        subprocess.run([find_node('smach_oracle', 'oracle_run')[0], '--config', config.name,
                         '--record', folder, *options, str(TASKS / 'pick_and_place.py'), '--seed', str(seed)],
                        check=True, timeout=60)
         trial, = load_trials([folder]).trials
