@@ -103,7 +103,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--estimator', choices=sorted(ESTIMATORS), help='of failure rates')
     for name, kind, what in OVERRIDES:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
-    parser.add_argument('--answer-delay', type=float, default=0.0, help='s that the scripted expert takes')
+    parser.add_argument('--answer-delay', type=float, default=15.0,
+                        help='s of simulated time that the scripted expert takes, in the median (default: 15)')
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
     parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
                         help='s without the end of a trial, after which it is run anew (default: 300)')
