@@ -8,13 +8,12 @@ from typing import Callable, Dict, Optional, Tuple
 import numpy as np
 
 from ...geometry.transforms import apply, from_rpy, inverse, yaw_of
-from .collision import RobotModel
+from .arm import READY, Arm, Means, SkillError, read_joints, seed_of
 from .door_view import DoorNotSeen, DoorView, find_door
-from .interface import ARMS, GRIPPER_OPEN, Robot, RobotError
+from .interface import ARMS, GRIPPER_OPEN, Robot
 from .kitchen import Kitchen, MapBox, base_from_fridge, door_frame, fridge_boxes, handle_point, odom_from_pose
-from .limb import TRAVEL, Limb, check_arm, stow
-from .planner import straight
 from .swing import Swing, best_swing
+from .travel import TRAVEL, draw_back, drive, stow
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
@@ -29,82 +28,76 @@ AWAY = 0.16  # m that the base takes the hand back from the bar
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
+JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
 BEFORE = 0.10  # m that the hand comes straight
-PUSH_REACH, CLOSE_REACH = 0.50, 0.42  # m from the hinge at which the hand pushes
+PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 GRIP_EFFORT = 100.0  # N
 RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
 APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
-JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
-COMFORT: Dict[str, np.ndarray] = {'left': np.array([0.2, 0.2, 1.0, -1.2, 0.0, -1.0, 0.0]),
-                                  'right': np.array([-0.2, 0.2, -1.0, -1.2, 0.0, -1.0, 0.0])}
 
 ToolAt = Callable[[float, float], np.ndarray]
 
 
-class DoorError(Exception):
-    """The door could not be moved; the text is the reason, for people."""
-
-
-def open_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed: int) -> float:
+def open_door(means: Means, kitchen: Kitchen, arm: str) -> float:
     """Open the fridge, from wherever the base stands in front of it, and leave the base ready to drive in.
 
     :param arm: 'left' or 'right'.
     :returns: rad, the opening that the arm's motion should have brought about.
-    :raises DoorError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
+    :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
-    check_arm(arm)
-    view = _stand_before(robot, model, kitchen, seed)
+    _check_arm(arm)
+    view = _stand_before(means, kitchen)
     if view.angle < AJAR:
-        angle = _pull(robot, model, kitchen, arm, view, seed)
-        _step_back(robot, AWAY)
-        _stow_beside(robot, model, kitchen, angle, seed)
-        view = _stand_before(robot, model, kitchen, seed)
+        angle = _pull(means, kitchen, arm, view)
+        _step_back(means, AWAY)
+        _stow_beside(means, kitchen, angle)
+        view = _stand_before(means, kitchen)
     if view.angle < WIDE - STEP:
-        view = view._replace(angle=_push_open(robot, model, kitchen, arm, view, seed))
-        _stow_beside(robot, model, kitchen, view.angle, seed)
-    robot.drive(odom_from_pose(kitchen, *CLEAR))
+        view = view._replace(angle=_push_open(means, kitchen, arm, view))
+        _stow_beside(means, kitchen, view.angle)
+    drive(means, odom_from_pose(kitchen, *CLEAR))
     return view.angle
 
 
-def close_door(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, seed: int) -> None:
+def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
     """Push the door shut with the back of the hand, and look whether it is.
 
-    :raises DoorError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
+    :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
-    check_arm(arm)
-    robot.drive(odom_from_pose(kitchen, *CLOSING))
-    view = look(robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
+    _check_arm(arm)
+    drive(means, odom_from_pose(kitchen, *CLOSING))
+    view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
     if view.angle >= STEP:
-        _push_shut(robot, model, kitchen, arm, view, seed)
-        view = look(robot, kitchen, np.array([-0.1, 0.05, GRASP_HEIGHT]))
+        _push_shut(means, kitchen, arm, view)
+        view = look(means.robot, kitchen, np.array([-0.1, 0.05, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
-        raise DoorError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
+        raise SkillError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
 
 
-def _stand_before(robot: Robot, model: RobotModel, kitchen: Kitchen, seed: int) -> DoorView:
+def _stand_before(means: Means, kitchen: Kitchen) -> DoorView:
     """Drive to where the door is opened, with the arms out of the way, and look at it."""
-    here = inverse(base_from_fridge(kitchen, robot.odom_from_base()))
+    here = inverse(base_from_fridge(kitchen, means.robot.odom_from_base()))
     if here[0, 3] > CLEAR[0] + 0.05:  # within the door's swing
-        _step_back(robot, here[0, 3] - CLEAR[0])
-    _stow_beside(robot, model, kitchen, WIDE, seed)
-    robot.drive(odom_from_pose(kitchen, *OPENING))
-    return look(robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+        _step_back(means, here[0, 3] - CLEAR[0])
+    _stow_beside(means, kitchen, WIDE)
+    drive(means, odom_from_pose(kitchen, *OPENING))
+    return look(means.robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
 
 
-def _step_back(robot: Robot, length: float) -> None:
+def _step_back(means: Means, length: float) -> None:
     """Drive straight back by `length` m."""
-    robot.drive(robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
+    drive(means, means.robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
 
 
-def _stow_beside(robot: Robot, model: RobotModel, kitchen: Kitchen, angle: float, seed: int) -> None:
+def _stow_beside(means: Means, kitchen: Kitchen, angle: float) -> None:
     """Take both arms to their postures for driving, with the door at `angle`."""
-    boxes = _boxes(kitchen, base_from_fridge(kitchen, robot.odom_from_base()), angle)
-    stow(robot, model, ARMS, boxes, seed)
+    boxes = named_boxes(kitchen, base_from_fridge(kitchen, means.robot.odom_from_base()), angle)
+    stow(means, ARMS, boxes)
 
 
 def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> DoorView:
-    """Look for the door at a point of the fridge's frame. Raises DoorError where it is not seen."""
+    """Look for the door at a point of the fridge's frame. Raises SkillError where it is not seen."""
     expected = base_from_fridge(kitchen, robot.odom_from_base())
     robot.look_at(apply(expected, point))
     for attempt in range(tries):
@@ -112,11 +105,11 @@ def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> D
             return find_door(robot.see(), kitchen, expected)
         except DoorNotSeen as err:
             if attempt == tries - 1:
-                raise DoorError(str(err)) from err
-    raise DoorError('nobody looked')
+                raise SkillError(str(err)) from err
+    raise SkillError('nobody looked')
 
 
-def _pull(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view: DoorView, seed: int) -> float:
+def _pull(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> float:
     """Grasp the handle and pull it around the hinge as far as the arm reaches."""
     fridge = view.base_from_fridge
 
@@ -124,68 +117,68 @@ def _pull(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view: Doo
         bar = apply(fridge, handle_point(kitchen, angle, GRASP_HEIGHT))
         return from_rpy(bar, yaw=turn - angle + yaw_of(fridge)) @ from_rpy((BEYOND, 0.0, 0.0))
 
-    with Limb(robot, model, arm, _boxes(kitchen, fridge, view.angle), seed) as limb:
+    with _limb(means, kitchen, arm, view) as limb:
         swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45), ('handle',),
                        lambda q: _approach(limb, q) is not None)
         if swing is None or swing.angles[-1] < LEAST_PULL:
-            raise DoorError('the handle is out of reach of the {} arm, or cannot be pulled from here'.format(arm))
-        robot.gripper(arm, GRIPPER_OPEN)
+            raise SkillError('the handle is out of reach of the {} arm, or cannot be pulled from here'.format(arm))
+        means.robot.gripper(arm, GRIPPER_OPEN)
         _place_door(limb, kitchen, fridge, view.angle)
         approach = _approach(limb, swing.path[0])
         limb.go(approach[0])
         limb.follow(approach, APPROACH_SPEED)
-        held = robot.gripper(arm, 0.0, GRIP_EFFORT)
+        held = means.robot.gripper(arm, 0.0, GRIP_EFFORT)
         if held.position < LEAST_GAP:
-            limb.back(BEFORE, ('handle',))
-            raise DoorError('the hand closed on nothing: the handle is not where it was seen')
+            draw_back(limb, BEFORE, ('handle',), APPROACH_SPEED)
+            raise SkillError('the hand closed on nothing: the handle is not where it was seen')
         _strain(limb, swing, PULL_SPEED)
-        if sum(robot.joints()[name] for name in JAWS[arm]) < LEAST_GAP:
-            raise DoorError('the handle slipped out of the {} hand'.format(arm))
-        robot.gripper(arm, RELEASE)
+        if sum(read_joints(means.robot)[name] for name in JAWS[arm]) < LEAST_GAP:
+            raise SkillError('the handle slipped out of the {} hand'.format(arm))
+        means.robot.gripper(arm, RELEASE)
     return float(swing.angles[-1])
 
 
-def _push_open(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view: DoorView, seed: int) -> float:
+def _push_open(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> float:
     """Reach behind the door's edge and push it from inside."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
         return _against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
-    with Limb(robot, model, arm, _boxes(kitchen, fridge, view.angle), seed) as limb:
+    with _limb(means, kitchen, arm, view) as limb:
         swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6), ('door',))
         if swing is None or swing.angles[-1] < view.angle + STEP:
-            raise DoorError('the {} arm cannot push the door further from here'.format(arm))
+            raise SkillError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
         limb.go(swing.path[0])
-        robot.gripper(arm, 0.0)
+        means.robot.gripper(arm, 0.0)
         _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
-        limb.back(BEFORE, ('door',))
+        draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
     return float(swing.angles[-1])
 
 
-def _push_shut(robot: Robot, model: RobotModel, kitchen: Kitchen, arm: str, view: DoorView, seed: int) -> None:
+def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None:
     """Push the door from outside until it is shut."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
         return _against(kitchen, fridge, angle, turn, CLOSE_REACH, CLOSE_HEIGHT, inside=False)
 
-    with Limb(robot, model, arm, _boxes(kitchen, fridge, view.angle), seed) as limb:
-        robot.gripper(arm, 0.0)
+    with _limb(means, kitchen, arm, view) as limb:
+        means.robot.gripper(arm, 0.0)
         swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.0, 1.8), ('door',))
         if swing is None or swing.angles[-1] > view.angle - STEP:
-            raise DoorError('the {} arm cannot push the door shut from here'.format(arm))
+            raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
         limb.go(swing.path[0])
         _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
-        limb.back(BEFORE, ('door',))
-        limb.go(np.array(TRAVEL[arm]))
+        draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
+        limb.go(TRAVEL[arm])
 
 
-def _swing(limb: Limb, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float, last: float,
+def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float, last: float,
            turns: Tuple[float, float], touching: Tuple[str, ...],
            may_begin: Callable[[np.ndarray], bool] = lambda q: True) -> Optional[Swing]:
     """The best path of the hand along the door between two angles, with the door where the hand has it."""
@@ -196,23 +189,36 @@ def _swing(limb: Limb, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, fi
         with limb.space.touchable(touching):
             return limb.space.is_free(q)
 
-    return best_swing(limb.space.chain, tool_at, np.linspace(first, last, count), turns, COMFORT[limb.arm],
-                      np.random.default_rng(limb.seed), is_free, may_begin)
+    return best_swing(limb.chain, tool_at, np.linspace(first, last, count), turns, READY[limb.name],
+                      limb.generator, is_free, may_begin)
 
 
-def _strain(limb: Limb, swing: Swing, speed: float) -> None:
+def _strain(limb: Arm, swing: Swing, speed: float) -> None:
     """Follow a swing against what resists; where the arm is held up in the end, it has done what it could."""
+    here = limb.now()
+    turns = limb.chain.nearest_turn(swing.path[0], here) - swing.path[0]
     try:
-        limb.follow(np.vstack([limb.where(), swing.path[1:]]), speed)
-    except RobotError:
+        limb.follow(np.vstack([here, swing.path[1:] + turns]), speed)
+    except SkillError:
         pass
 
 
-def _approach(limb: Limb, grasp: np.ndarray) -> Optional[np.ndarray]:
+def _limb(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
+    """The arm among the parts of the fridge where they were seen."""
+    boxes = named_boxes(kitchen, view.base_from_fridge, view.angle)
+    return Arm(means, arm, boxes, seed_of(arm, view.angle, view.base_from_fridge, read_joints(means.robot)))
+
+
+def _check_arm(arm: str) -> None:
+    if arm not in ARMS:
+        raise SkillError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+
+
+def _approach(limb: Arm, grasp: np.ndarray) -> Optional[np.ndarray]:
     """A straight way (m, 7) of the hand to joint positions at the handle; None where there is none."""
-    before = limb.space.chain.forward(grasp) @ from_rpy((-BEFORE, 0.0, 0.0))
+    before = limb.chain.forward(grasp) @ from_rpy((-BEFORE, 0.0, 0.0))
     with limb.space.touchable(('handle',)):
-        way = straight(limb.space, grasp, before)
+        way = limb.line(grasp, before)
     return None if way is None or not limb.space.is_free(way[-1]) else way[::-1]
 
 
@@ -229,7 +235,7 @@ def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, re
     return from_rpy(point, yaw=turn + outwards + (0.0 if inside else np.pi))
 
 
-def _boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str, MapBox]:
+def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str, MapBox]:
     """The fridge as obstacles by name."""
     boxes = fridge_boxes(kitchen, fridge, angle)
     named = {'fridge_{}'.format(index): box for index, box in enumerate(boxes[:-2])}
@@ -237,7 +243,7 @@ def _boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str, MapB
     return named
 
 
-def _place_door(limb: Limb, kitchen: Kitchen, fridge: np.ndarray, angle: float) -> None:
-    boxes = _boxes(kitchen, fridge, angle)
+def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float) -> None:
+    boxes = named_boxes(kitchen, fridge, angle)
     for name in ('door', 'handle'):
         limb.space.add_box(name, boxes[name])

@@ -4,7 +4,7 @@ from typing import Dict, List, Tuple
 import numpy as np
 
 from ..robot.kitchen import Kitchen
-from ..robot.limb import TRAVEL
+from ..robot.travel import TRAVEL
 from ..robot.interface import ARM_JOINTS, ARMS
 from .fridge import DOOR_JOINT, fridge_urdf
 from .scene import Body, Goal, RobotStart, Scene, Vector

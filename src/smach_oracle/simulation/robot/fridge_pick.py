@@ -1,0 +1,83 @@
+"""Take a drink off a shelf of the refrigerator: grasp, lift, back out of it with the base, carry it beside the body."""
+from typing import Dict, Mapping
+
+import numpy as np
+
+from ...geometry.box import UprightBox
+from ...geometry.transforms import apply, from_rpy, inverse
+from .arm import Arm, Means, SkillError, Unreachable, seed_of
+from .door import named_boxes
+from .interface import GRIPPER_OPEN
+from .kitchen import Kitchen, MapBox, shelf_region
+from .pick import Held, pick
+from .travel import drive, stow
+
+STEP_BACK = 0.40  # m that the base draws back to take the hand out
+CARRY_SPEED = 0.3
+CARRIES = ((0.45, -0.30, -0.2), (0.42, -0.22, 0.0), (0.48, -0.35, -0.4))  # x, y in m, yaw of the hand that carries
+OPEN_DOOR = np.radians(104.0)
+EDGE = 0.02  # m around the space above the shelf in which things seen are things on it
+
+
+def pick_from_fridge(means: Means, kitchen: Kitchen, base_from_fridge: np.ndarray, arm: str, target: UprightBox,
+                     seen: Mapping[str, MapBox]) -> Held:
+    """Pick a drink and take it out, upright; where that fails, the hand leaves the fridge empty.
+
+    :param base_from_fridge: 4x4, where the fridge is.
+    :param seen: boxes of what a frame shows, without the drink; those on the shelf count.
+    :raises SkillError: with the reason.
+    """
+    boxes = named_boxes(kitchen, base_from_fridge, OPEN_DOOR)
+    boxes.update(_on_shelf(kitchen, base_from_fridge, seen))
+    try:
+        held = pick(means, arm, target, boxes)
+        _draw_out(means)
+        with Arm(means, arm, {}, seed_of(arm, held.grasp)) as hand:
+            hand.space.attach(held.half, held.tool_from_object)
+            _carry(hand)
+            if hand.close() == 0:
+                raise SkillError('the drink was lost on the way out of the refrigerator')
+    except SkillError:
+        _leave(means, arm)
+        raise
+    return held
+
+
+def _on_shelf(kitchen: Kitchen, base_from_fridge: np.ndarray, seen: Mapping[str, MapBox]) -> Dict[str, MapBox]:
+    low, high = shelf_region(kitchen)
+    low, high = low + [0.0, EDGE, EDGE], high - [EDGE, EDGE, 0.0]
+    fridge_from_base = inverse(base_from_fridge)
+    local = {name: apply(fridge_from_base, np.asarray(box.centre)) for name, box in seen.items()}
+    return {name: box for name, box in seen.items() if np.all((local[name] > low) & (local[name] < high))}
+
+
+def _draw_out(means: Means) -> None:
+    """The base takes the arm straight out of the fridge, as it is: the arm need not be able to."""
+    drive(means, means.robot.odom_from_base() @ from_rpy((-STEP_BACK, 0.0, 0.0)))
+
+
+def _carry(hand: Arm) -> None:
+    """To the robot's side, level all the way if the arm can."""
+    here = hand.pose()
+    for x, y, yaw in CARRIES:
+        goal = from_rpy((x, y if hand.name == 'right' else -y, here[2, 3]), yaw=yaw)
+        way = hand.line(hand.now(), goal)
+        if way is not None:
+            hand.follow(way, CARRY_SPEED)
+            return
+        try:
+            found = hand.reach(goal, near=hand.now())
+        except Unreachable:
+            continue
+        if found:
+            hand.go(found[0], CARRY_SPEED)
+            return
+
+
+def _leave(means: Means, arm: str) -> None:
+    """Get the hand out of the fridge and to the side, and the base to where it was: the shelf is to be seen again."""
+    here = means.robot.odom_from_base()
+    means.robot.gripper(arm, GRIPPER_OPEN)
+    _draw_out(means)
+    stow(means, (arm,), {})
+    drive(means, here)

@@ -1,0 +1,56 @@
+"""Hand a held object over: look for the palm that waits, set the object down on it, let go."""
+import numpy as np
+
+from ...geometry.depth import points_of
+from .arm import Means, SkillError
+from .interface import Frame
+from .kitchen import MapBox
+from .pick import Held
+from .place import place, stands_there
+from .travel import stow
+
+PALM = 'palm'
+NEAR = 0.16  # m around the place where the palm is expected, horizontally
+LEVEL = 0.06  # m, vertically
+LEAST_POINTS = 150
+LEAST_EXTENT = 0.06  # m that a palm extends
+THICK = 0.03  # m of a hand
+STRIDE = 2
+
+
+def hand_over(means: Means, arm: str, expected: np.ndarray, held: Held) -> None:
+    """Set the held object down on a palm.
+
+    :param expected: (3,) m in base_footprint, the middle of the palm's upper face, right to some 0.1 m.
+    :raises SkillError: where no palm is seen, the object cannot be brought there, or it does not stand there then.
+    """
+    means.robot.look_at(expected)
+    palm = find_palm(means.robot.see(), expected)
+    boxes = {PALM: palm}
+    top = palm.centre + [0.0, 0.0, palm.half[2]]
+    stood = place(means, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM)
+    boxes['given'] = MapBox(stood, held.half, 0.0)
+    stow(means, (arm,), boxes)
+    if not stands_there(means.robot.see(), stood, held):
+        raise SkillError('it was let go, but it does not stand in the hand')
+
+
+def find_palm(frame: Frame, expected: np.ndarray) -> MapBox:
+    """The palm in a frame, as a box. Raises SkillError where there is none near where it is expected."""
+    points = points_of(frame.depth[::STRIDE, ::STRIDE], frame.intrinsics, frame.base_from_camera, stride=STRIDE)
+    points = points.reshape(-1, 3)
+    with np.errstate(invalid='ignore'):
+        near = ((np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) & (np.abs(points[:, 2] - expected[2]) < LEVEL))
+    points = points[near]
+    if len(points) < LEAST_POINTS:
+        raise SkillError('no hand waits where it should: {} points within {:.0f} cm of it'.format(
+            len(points), 100 * NEAR))
+    height = float(np.median(points[:, 2]))
+    level = points[np.abs(points[:, 2] - height) < 0.015]
+    low, high = np.percentile(level[:, :2], [2, 98], axis=0)
+    if np.min(high - low) < LEAST_EXTENT:
+        raise SkillError('what is where the hand should wait is too small for one: {:.0f} x {:.0f} cm'.format(
+            *(100 * (high - low))))
+    centre = (low + high) / 2
+    return MapBox(np.array([centre[0], centre[1], height - THICK / 2]),
+                  np.array([(high - low)[0] / 2, (high - low)[1] / 2, THICK / 2]), 0.0)

@@ -1,0 +1,64 @@
+"""The skills of the second use case over messages: the refrigerator's door, picking inside it, handing over."""
+import numpy as np
+
+from smach_oracle.msg import (CloseDoorGoal, CloseDoorResult, HandOverGoal, HandOverResult, OpenDoorGoal,
+                              OpenDoorResult, PickGoal, PickResult)
+
+from ...geometry.transforms import transform
+from .arm import Means
+from .door import close_door, open_door
+from .frames import box_in_base, pose_in_base, pose_message
+from .fridge_pick import pick_from_fridge
+from .hand_over import hand_over
+from .kitchen import Kitchen, base_from_fridge
+from .manipulation import USUAL, Manipulation, known_arm
+from .pick import Held
+from .skill_server import Say
+
+FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
+
+
+class KitchenSkills(Manipulation):
+    """All of Manipulation, in a kitchen."""
+
+    def __init__(self, means: Means, kitchen: Kitchen) -> None:
+        super().__init__(means)
+        self.kitchen = kitchen
+
+    def open_door(self, goal: OpenDoorGoal, say: Say) -> OpenDoorResult:
+        """Open the refrigerator."""
+        say('opening the refrigerator')
+        return OpenDoorResult(angle=open_door(self.means, self.kitchen, known_arm(goal.arm)))
+
+    def close_door(self, goal: CloseDoorGoal, say: Say) -> CloseDoorResult:
+        """Push its door shut."""
+        say('closing the refrigerator')
+        close_door(self.means, self.kitchen, known_arm(goal.arm))
+        return CloseDoorResult()
+
+    def pick(self, goal: PickGoal, say: Say) -> PickResult:
+        """Grasp an object and lift it; in the refrigerator, also take it out."""
+        if goal.map_id != FRIDGE:
+            return super().pick(goal, say)
+        arm = known_arm(goal.arm)
+        target = box_in_base(goal.object, goal.size, self.means.robot, 'object')
+        fridge = base_from_fridge(self.kitchen, self.means.robot.odom_from_base())
+        say('choosing a grasp in the refrigerator')
+        self.held.pop(arm, None)
+        seen = self._seen(target).boxes
+        self.held[arm] = pick_from_fridge(self.means, self.kitchen, fridge, arm, target, seen)
+        return PickResult(grasp=pose_message(self.held[arm].grasp))
+
+    def hand_over(self, goal: HandOverGoal, say: Say) -> HandOverResult:
+        """Set down what is held on the palm that waits for it."""
+        arm = known_arm(goal.arm)
+        palm = pose_in_base(goal.pose, self.means.robot, 'pose')[:3, 3]
+        say('handing over')
+        hand_over(self.means, arm, palm, self.held.get(arm) or unknown_held())
+        self.held.pop(arm, None)
+        return HandOverResult()
+
+
+def unknown_held() -> Held:
+    """Something of the usual size, held level about its middle: nothing else is known of what a person put there."""
+    return Held(np.eye(4), transform(), USUAL)

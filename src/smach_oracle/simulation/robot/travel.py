@@ -1,0 +1,47 @@
+"""How the arms are held while the base drives: compact, clear of the doors of furniture and of the camera's view."""
+from typing import Iterable, Mapping
+
+import numpy as np
+
+from .arm import Arm, Means, SkillError, read_joints, seed_of
+from .interface import RobotError
+from .kitchen import MapBox
+
+# rad; the left hand folded before the chest, the right arm at the robot's side
+TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
+          'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0])}
+NEAR_ENOUGH = 0.06  # rad
+
+
+def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None:
+    """Take arms to their postures for driving.
+
+    :param boxes: obstacles, in base_footprint.
+    :raises SkillError: for an unknown arm, or where an arm does not get there.
+    """
+    for arm in arms:
+        with Arm(means, arm, boxes, seed_of(arm, read_joints(means.robot))) as limb:
+            now = limb.now()
+            if np.abs(limb.chain.nearest_turn(TRAVEL[arm], now) - now).max() > NEAR_ENOUGH:
+                limb.go(TRAVEL[arm])
+
+
+def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -> None:
+    """Draw the hand back along its own axis by up to `length` m, as far as there is a straight way."""
+    here = limb.pose()
+    for share in (1.0, 0.7, 0.4):
+        goal = here.copy()
+        goal[:3, 3] -= share * length * here[:3, 0]
+        with limb.space.touchable(touching):
+            way = limb.line(limb.now(), goal)
+        if way is not None:
+            limb.follow(way, speed)
+            return
+
+
+def drive(means: Means, odom_from_goal: np.ndarray) -> None:
+    """Drive the base. Raises SkillError where it does not get there."""
+    try:
+        means.robot.drive(odom_from_goal)
+    except RobotError as err:
+        raise SkillError('the base did not get where it should: {}'.format(err)) from err

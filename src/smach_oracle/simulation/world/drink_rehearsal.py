@@ -1,0 +1,63 @@
+"""The second use case in one process, without ROS nodes: for tuning scenes, and for tests.
+
+The steps are those of tasks/drink_retrieval.py, done by the same code as behind the actions.
+"""
+import math
+from typing import Any, Callable, Dict, List, Tuple
+
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Header
+
+from smach_oracle.msg import CloseDoorGoal, DetectDrinkGoal, HandOverGoal, OpenDoorGoal, PickGoal
+
+from ...geometry.chain import read_joints
+from ...geometry.transforms import from_rpy
+from ..robot.arm import Means
+from ..robot.collision import installed_model
+from ..robot.interface import ODOM_FRAME
+from ..robot.kitchen import Kitchen
+from ..robot.kitchen_skills import FRIDGE, KitchenSkills
+from ..robot.perception_node import Perception
+from .direct import DirectRobot
+from .kitchen_scene import PALM
+from .physics import World
+
+TORSO_HEIGHT = 0.25  # m
+MIN_HEIGHT = 0.05  # m
+DRIVES = {'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.65, -0.30, 0.0), 'MOVE_HOME': (0.0, 0.0, -math.pi / 2)}
+
+
+class DrinkTrial:
+    """The states of the task over one world, in order."""
+
+    def __init__(self, world: World) -> None:
+        self.robot = DirectRobot(world)
+        model = installed_model()
+        self.skills = KitchenSkills(Means(self.robot, model), Kitchen())
+        self.eyes = Perception(self.robot, read_joints(model.urdf), Kitchen())
+        self.data: Dict[str, Any] = {}
+        palm = PoseStamped(Header(frame_id=ODOM_FRAME), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
+        self.states: List[Tuple[str, Callable[[], None]]] = [
+            ('RAISE_TORSO', lambda: self.robot.torso(TORSO_HEIGHT)),
+            ('OPEN_FRIDGE', lambda: self._do('open_door', OpenDoorGoal('right'))),
+            ('MOVE_IN', lambda: self._drive('MOVE_IN')),
+            ('DETECT_DRINK', self._detect),
+            ('PICK_DRINK', self._pick),
+            ('MOVE_OUT', lambda: self._drive('MOVE_OUT')),
+            ('CLOSE_FRIDGE', lambda: self._do('close_door', CloseDoorGoal('left'))),
+            ('MOVE_HOME', lambda: self._drive('MOVE_HOME')),
+            ('HAND_OVER', lambda: self._do('hand_over', HandOverGoal('right', palm)))]
+
+    def _do(self, skill: str, goal: Any) -> Any:
+        return getattr(self.skills, skill)(goal, lambda status: None)
+
+    def _drive(self, state: str) -> None:
+        x, y, yaw = DRIVES[state]
+        self.robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
+
+    def _detect(self) -> None:
+        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT), lambda status: None)
+        self.data.update(drink=found.drink, size=found.size)
+
+    def _pick(self) -> None:
+        self.data['grasp'] = self._do('pick', PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)).grasp
