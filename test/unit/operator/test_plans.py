@@ -1,0 +1,62 @@
+"""What the scripted operator answers, from its settings and the situation."""
+import pytest
+
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.simulation.operator.plans import Decision, Means, Plans, Situation, decide
+
+BOTH = ['perception', 'manipulation']
+STATES = ['MOVE_ARMS_ASIDE', 'DETECT', 'PICK', 'PLACE']
+
+
+def situation(state, tried=0, interfaces=BOTH, holds=True, seen=True, states=STATES):
+    return Situation(state, states, interfaces, tried, holds, seen)
+
+
+def test_a_state_gets_its_own_means_and_others_the_default():
+    plans = Plans({'PICK': {'means': 'take', 'arm': 'left', 'what': 'objects'}, 'default': {'means': 'retry'}})
+    assert plans.of('PICK') == Means('take', 'left', 'objects')
+    assert plans.of('DRIVE').means == 'retry' and Plans({}).of('DRIVE').means == 'retry'
+
+
+@pytest.mark.parametrize('means, interface', [('show', 'perception'), ('take', 'manipulation'),
+                                              ('put_down', 'manipulation')])
+def test_what_a_person_can_do_is_done_with_an_interface(means, interface):
+    assert decide(Means(means), situation('PICK')) == Decision(interface=interface)
+
+
+def test_after_some_tries_it_goes_back_and_then_tries_again():
+    means = Means('take', otherwise='DETECT', tries=2)
+    answers = [decide(means, situation('PICK', tried)) for tried in range(4)]
+    assert [(answer.interface, answer.goto) for answer in answers] == [
+        ('manipulation', ''), ('manipulation', ''), ('', 'DETECT'), ('manipulation', '')]
+
+
+def test_without_the_interface_the_state_is_tried_again_and_then_an_earlier_one():
+    means = Means('retry', otherwise='DETECT', tries=1)
+    assert [decide(means, situation('PICK', tried, [])).goto for tried in range(4)] == [
+        'PICK', 'DETECT', 'PICK', 'DETECT']
+
+
+def test_what_cannot_be_seen_is_not_shown_and_what_is_not_held_is_not_put_down():
+    assert decide(Means('show', hidden='MOVE_ARMS_ASIDE'), situation('DETECT', seen=False)).goto == 'MOVE_ARMS_ASIDE'
+    assert decide(Means('put_down', place='p', lost='DETECT'), situation('PLACE', holds=False)).goto == 'DETECT'
+
+
+def test_a_state_that_cannot_be_entered_is_not_chosen_and_with_none_left_it_gives_up():
+    means = Means('show', hidden='MOVE_ARMS_ASIDE')
+    assert decide(means, situation('DETECT', seen=False, states=['DETECT'])).goto == 'DETECT'
+    gave_up = decide(means, situation('DETECT', seen=False, states=[]))
+    assert (gave_up.interface, gave_up.goto) == ('', '')
+
+
+@pytest.mark.parametrize('settings, says', [
+    (7, 'states'), ({'PICK': 'take'}, 'PICK'), ({'PICK': {'means': 'dance'}}, 'PICK.means'),
+    ({'PICK': {'means': 'take', 'arms': 'left'}}, 'PICK.arms'),
+    ({'PICK': {'means': 'take', 'arm': 'third'}}, 'PICK.arm'),
+    ({'PLACE': {'means': 'put_down'}}, 'either place or onto'),
+    ({'PICK': {'means': 'take', 'tries': 0}}, 'PICK.tries'),
+    ({'PICK': {'means': 'take', 'inside': 'yes'}}, 'PICK.inside'),
+    ({'PICK': {'means': 'take', 'what': 3}}, 'PICK.what')])
+def test_settings_that_cannot_be_are_refused_by_name(settings, says):
+    with pytest.raises(ConfigError, match=says):
+        Plans(settings)
