@@ -86,8 +86,9 @@ class Hosts:
     def allows(self, host: str) -> bool:
         """Whether a Host header, with or without a port, names this console."""
         try:
-            name = urlsplit('//' + host).hostname or ''
-            if urlsplit('//' + host).netloc != host or '@' in host:
+            parts = urlsplit('//' + host)
+            name = parts.hostname or ''
+            if parts.netloc != host or '@' in host or (parts.port or 1) < 1:  # the port raises where it is no number
                 return False
         except ValueError:
             return False

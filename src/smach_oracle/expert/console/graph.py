@@ -5,7 +5,7 @@ draws it beside the rest, and its edges as thin curves.
 """
 import json
 from collections import Counter
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 MOST_STATES = 500  # of a container; more are not drawn
 MOST_EDGES = 3000
@@ -54,12 +54,15 @@ def make_structure(path: str, children: Iterable[str], edges: Iterable[Edge], ou
 
 def find_oracle(labels: List[str], edges: List[Edge]) -> str:
     """The meta state: the one whose outcomes are named for where they lead, and that every other state leads to."""
-    others = set(labels)
+    sources: Dict[str, Set[str]] = {}
+    targets: Dict[str, Set[str]] = {}
+    for edge in edges:
+        sources.setdefault(edge.target, set()).add(edge.source)
+        if edge.outcome == edge.target:
+            targets.setdefault(edge.source, set()).add(edge.target)
     for label in labels:
-        sources = {edge.source for edge in edges if edge.target == label}
-        targets = {edge.target for edge in edges if edge.source == label and edge.outcome == edge.target}
-        rest = others - {label}
-        if rest and rest <= sources and rest <= targets:
+        rest = set(labels) - {label} if len(targets.get(label, ())) >= len(labels) - 1 else set()
+        if rest and rest <= sources.get(label, set()) and rest <= targets[label]:
             return label
     return ''
 

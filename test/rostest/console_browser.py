@@ -1,0 +1,178 @@
+#!/usr/bin/env python3
+"""The operator console in a real browser: real node, real master, a real machine under a real oracle."""
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import rosbag
+import rospy
+import rostest
+from roslib.packages import find_node
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
+
+WITH_BROWSER = bool(shutil.which('chromedriver'))
+if WITH_BROWSER:
+    from browser import Browser  # noqa: E402
+QUESTION = '.question-row[data-key^="/alpha/"]'
+YOURS = 'It is yours.'
+
+
+def free_port():
+    """A port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+class Node:
+    """A node of its own process."""
+
+    def __init__(self, *command):
+        self._process = subprocess.Popen(command)
+
+    def stop(self):
+        """Ctrl-C, as from a shell."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            self._process.wait(20)
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class ConsoleInABrowser(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.port = free_port()
+        cls.bags = tempfile.mkdtemp()
+        rospy.set_param('/alpha/record', cls.bags)
+        cls.audited, cls.events = [], []
+        rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
+        rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
+        cls.console = cls.start_console()
+        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)), 'console_robot.py'),
+                         'PICK', '0.1', '0', '3', '__name:=alpha')
+        cls.browser = Browser()
+        cls.page = 'http://localhost:{}/'.format(cls.port)
+        wait_for(cls.page_is_served, 30.0)
+        cls.browser.driver.get(cls.page)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.robot.stop()
+        cls.console.stop()
+        shutil.rmtree(cls.bags, ignore_errors=True)
+
+    @classmethod
+    def start_console(cls):
+        return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
+                    '__name:=expert_console')
+
+    @classmethod
+    def page_is_served(cls):
+        with socket.socket() as probe:
+            return probe.connect_ex(('127.0.0.1', cls.port)) == 0
+
+    def outcomes(self, kind, field):
+        return [getattr(event, field) for event in self.events if event.kind == kind]
+
+    def test_1_a_question_is_shown_whole_and_answered_in_two_actions(self):
+        browser = self.browser
+        browser.find(QUESTION)
+        self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')), 'the title tells of it')
+        browser.click(QUESTION)
+        self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
+        for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'first: DETECT', 'missing: grasp',
+                     'assist', '"mug"'):
+            self.assertIn(told, browser.text())
+        self.assertIsNone(browser.run('return window.hacked || document.querySelector(".failure b") || null'),
+                          'what a robot says is text')
+        self.assertTrue(wait_for(lambda: browser.run(
+            'return document.getElementById("/alpha/KITCHEN/FETCH/PICK").classList.contains("failed")')),
+            'the failed state is marked in its graph')
+        browser.find('[data-output=grasp]').send_keys('{"width_m": 0.04}')
+        browser.click('.choice.supersede[data-name=succeeded]')
+        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'), 'what happened next')
+        self.assertTrue(wait_for(lambda: 'succeeded' in self.outcomes(OracleEvent.TRIAL_END, 'outcome')))
+        self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[0], 'operator')
+        self.assertTrue(wait_for(lambda: 'answer' in [told.command for told in self.audited if told.ok]))
+        self.assertEqual(browser.errors(), [])
+
+    def test_2_a_page_comes_back_with_its_claim_after_the_server_was_restarted(self):
+        browser = self.browser
+        browser.click('.follow-up .primary')
+        browser.find(QUESTION)
+        browser.run('document.activeElement.blur()')
+        browser.find('body').send_keys('n')
+        self.assertTrue(browser.says(YOURS), 'by keyboard, too')
+        browser.find('.why').send_keys('typed before')
+        type(self).console.stop()
+        self.assertTrue(browser.says('connection lost', '#status'))
+        type(self).console = self.start_console()
+        self.assertTrue(browser.says('live', '#status', 40.0))
+        self.assertTrue(browser.says(YOURS, limit_s=40.0), 'the claim is kept')
+        self.assertEqual(browser.find('.why').get_attribute('value'), 'typed before', 'no work is lost')
+
+    def test_3_a_second_console_takes_over_and_answers(self):
+        browser = self.browser
+        browser.driver.switch_to.new_window('tab')
+        browser.driver.get(self.page)
+        browser.click('#person')
+        name = browser.find('#expert')
+        name.clear()
+        name.send_keys('bob')
+        browser.click('#save-name')
+        self.assertTrue(browser.says('bob', '#person'))
+        browser.click(QUESTION)
+        self.assertTrue(browser.says('operator works on it.'))
+        self.assertFalse(browser.find('.choice.goto').is_enabled(), 'nobody answers what another one holds')
+        browser.click('[data-action=take-over]')
+        self.assertTrue(browser.says(YOURS))
+        first, second = browser.driver.window_handles
+        browser.driver.switch_to.window(first)
+        self.assertTrue(browser.says('bob has taken this question over.'))
+        browser.driver.switch_to.window(second)
+        browser.find('.stage').click()
+        browser.find('body').send_keys('3')
+        self.assertTrue(browser.says('The machine goes to PLACE.', '.follow-up'))
+        self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
+        self.assertIn(('take_over', 'bob', True), [(told.command, told.expert, told.ok) for told in self.audited])
+
+    def test_4_machines_and_trials_are_shown(self):
+        browser = self.browser
+        browser.click('#tab-machines')
+        browser.find('[id="/alpha/KITCHEN/MOVE_ARMS_ASIDE"].known')
+        browser.click('[id="/alpha/KITCHEN/FETCH"] .box')
+        browser.find('[id="/alpha/KITCHEN/FETCH/DETECT"]')
+        browser.find('.used > .oracle-edge')
+        browser.click('#tab-trials')
+        self.assertTrue(browser.says('with oracle', '.panel.trials table'))
+        browser.click('.trial:first-child')
+        self.assertTrue(browser.says('failed', '.event-log'))
+        browser.find('.timeline .mark')
+        self.assertEqual(browser.errors(), [])
+
+    def test_5_every_command_about_a_trial_is_in_its_bag(self):
+        def told():
+            commands = []
+            for path in sorted(os.listdir(self.bags)):
+                if path.endswith('.bag'):
+                    with rosbag.Bag(os.path.join(self.bags, path)) as bag:
+                        commands += [message.command
+                                     for _, message, _ in bag.read_messages('/alpha/expert_query/audit')]
+            return commands
+        self.assertTrue(wait_for(lambda: 'take_over' in told()))
+        self.assertEqual(told()[:2], ['claim', 'answer'])
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_browser')
+    rostest.rosrun('smach_oracle', 'console_browser', ConsoleInABrowser)

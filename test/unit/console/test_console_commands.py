@@ -1,0 +1,70 @@
+"""What a browser may say to the console: a closed set, every bit of it checked."""
+import json
+
+import pytest
+
+from smach_oracle.expert.console.commands import COMMANDS, MOST_BYTES, BadCommand, Output, needed_role, parse
+
+
+def text(**fields):
+    return json.dumps(dict({'id': 1}, **fields))
+
+
+ANSWER = {'do': 'answer', 'question': 'q', 'kind': 'goto', 'name': 'PICK'}
+
+
+def test_an_answer_is_taken_apart():
+    command = parse(text(**ANSWER, outputs=[{'key': 'grasp', 'value': [1, {'a': None}]}], why='it slipped'))
+    assert (command.number, command.name) == (1, 'answer')
+    assert command.arguments == {'question': 'q', 'kind': 'goto', 'name': 'PICK', 'why': 'it slipped',
+                                 'outputs': [Output('grasp', [1, {'a': None}], '')]}
+
+
+def test_what_is_left_out_is_empty():
+    assert parse(text(**ANSWER)).arguments['outputs'] == []
+
+
+@pytest.mark.parametrize('message', [
+    '', 'null', '[]', '{', '1', '"x"', b'{"id": 1}', '{"id": 1, "do": "claim", "question": NaN}', '[' * 60000,
+    'x' * (MOST_BYTES + 1), text(), text(do=None), text(do='publish'), text(do='__class__'), text(do=['claim']),
+    text(do={'claim': 1}),
+    text(do='claim'), text(do='claim', question=''), text(do='claim', question=5),
+    text(do='claim', question='q', topic='/cmd_vel'),
+    text(do='claim', question='q\u0000'), text(do='claim', question='q' * 1001),
+    json.dumps({'do': 'claim', 'question': 'q'}), text(id=0, do='claim', question='q'),
+    text(id=True, do='claim', question='q'),
+    text(id=1.5, do='claim', question='q'), text(id=2 ** 60, do='claim', question='q'),
+    text(**dict(ANSWER, kind='shell')), text(**dict(ANSWER, kind=None)), text(**dict(ANSWER, kind=['goto'])),
+    text(**dict(ANSWER, name=7)), text(**ANSWER, outputs={}), text(**ANSWER, outputs=[1]),
+    text(**ANSWER, outputs=[{'key': 'a'}]),
+    text(**ANSWER, outputs=[{'key': 'a', 'value': 1, 'pickle': 'x'}]),
+    text(**ANSWER, outputs=[{'key': 'a', 'value': 1}] * 2),
+    text(**ANSWER, outputs=[{'key': str(number), 'value': 1} for number in range(65)]),
+    text(**ANSWER, outputs=[{'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}]),
+    text(**ANSWER, outputs=[{'key': 'a', 'value': 1e999}]).replace('Infinity', '1e999'),
+    text(do='hello', xsrf='x', expert='\u202egro.live'), text(do='hello', xsrf='', expert='ann'),
+    text(do='hello', xsrf='x', expert='a' * 61)])
+def test_anything_else_is_refused_with_a_reason(message):
+    with pytest.raises(BadCommand) as error:
+        parse(message)
+    assert 0 < len(str(error.value)) < 500
+
+
+def test_the_refusal_carries_the_number_so_that_the_page_knows_what_was_refused():
+    with pytest.raises(BadCommand) as error:
+        parse(text(do='nothing'))
+    assert error.value.number == 1
+
+
+def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
+    parse('{"id": 1, "do": "claim", "question": "\\ud800"}').arguments['question'].encode('utf-8')
+
+
+def test_viewers_may_only_look():
+    assert {name for name in COMMANDS if needed_role(name) == 'viewer'} == {'hello', 'watch'}
+    assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator'}
+
+
+def test_no_command_names_a_topic_a_service_or_a_type():
+    fields = {field for spec in COMMANDS.values() for field in spec.checks}
+    assert fields == {'xsrf', 'expert', 'trial', 'question', 'kind', 'name', 'outputs', 'why'}

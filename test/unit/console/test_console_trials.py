@@ -1,0 +1,140 @@
+"""Trials as a console counts them: as the analysis of their bags does, bounded, and with what has helped."""
+import random
+
+import pytest
+import smach
+
+from smach_oracle.analysis.trials import summarise
+from smach_oracle.expert.console import trial_log
+from smach_oracle.expert.console.helped import HelpScores
+from smach_oracle.expert.console.tally import Tally, table
+from smach_oracle.expert.console.trial_log import TrialLog
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.events import Event, EventKind
+from smach_oracle.oracle.question import Answer, AnswerKind, Expert
+
+
+class Chancy(smach.State):
+    """Fails with a chance."""
+
+    def __init__(self, draw, share):
+        smach.State.__init__(self, ['succeeded', 'aborted'])
+        self._draw, self._share = draw, share
+
+    def execute(self, ud):
+        return 'aborted' if self._draw.random() < self._share else 'succeeded'
+
+
+class SomeExpert(Expert):
+    """Answers sometimes."""
+
+    def __init__(self, draw):
+        self._draw = draw
+
+    def ask(self, question, cancelled, progress):
+        kind = self._draw.choice(['goto', 'supersede', 'give_up', 'none'])
+        return {'goto': Answer(AnswerKind.GOTO, state='A', by='ann'), 'give_up': Answer(AnswerKind.GIVE_UP, by='ann'),
+                'supersede': Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')}.get(kind)
+
+
+def run_trials(count, share=0.4, seed=1, **options):
+    """Events of real trials, one list each."""
+    draw = random.Random(seed)
+    inner = smach.StateMachine(['succeeded', 'aborted'])
+    with inner:
+        smach.StateMachine.add('C', Chancy(draw, share), {'succeeded': 'D'})
+        smach.StateMachine.add('D', Chancy(draw, share))
+    sm = smach.StateMachine(['succeeded', 'aborted'])
+    with sm:
+        smach.StateMachine.add('A', Chancy(draw, share), {'succeeded': 'B'})
+        smach.StateMachine.add('B', inner)
+    oracle = OracleContainer.wrap(sm, name='TASK', settings={'max_recoveries': 2}, **options)
+    oracle.expert = SomeExpert(draw)
+    trials = []
+    oracle.events.observers.append(lambda event: trials[-1].append(event))
+    for _ in range(count):
+        trials.append([])
+        oracle.execute()
+    return trials
+
+
+def tally_of(events):
+    tally = Tally(events[0])
+    for event in events:
+        tally.add(event)
+    return tally
+
+
+@pytest.mark.parametrize('share', [0.0, 0.4, 1.0])
+def test_a_trial_is_counted_as_the_analysis_of_its_bag_counts_it(share):
+    for events in run_trials(25, share):
+        tally, summary = tally_of(events), summarise(events)
+        for name in ('experiment', 'outcome', 'failures', 'recoveries', 'questions', 'answered'):
+            assert getattr(tally, name) == getattr(summary, name), name
+        assert (tally.ending, tally.lost, tally.recovers) == (
+            summary.ending.value, summary.lost_events, summary.recovers)
+
+
+def test_the_table_counts_trials_in_which_it_happened_and_how_often():
+    trials = run_trials(40)
+    row, = table(map(tally_of, trials))
+    of_bags = [summarise(events) for events in trials]
+    assert row['runs'] == 40
+    for name in ('failures', 'recoveries', 'questions', 'answered'):
+        numbers = [getattr(summary, name) for summary in of_bags]
+        assert row['counts'][name] == {'trials': sum(map(bool, numbers)), 'events': sum(numbers)}, name
+    assert row['counts']['answered']['trials'] > 0
+    assert row['endings']['failure'] == sum(summary.ending.value == 'failure' for summary in of_bags) > 0
+
+
+def test_a_trial_that_runs_is_not_in_the_table_and_one_heard_of_late_says_so():
+    events = run_trials(1)[0]
+    assert table([tally_of(events[:-1])]) == []
+    assert tally_of(events[3:]).lost == 3
+
+
+def event(kind, state='PICK', trial='t', path='TASK', **fields):
+    return Event(kind, trial, 0, 0.0, path, state, **fields)
+
+
+def scored(*events):
+    scores = HelpScores()
+    for each in events:
+        scores.add('/robot', each, each.outcome == 'aborted')
+    return scores.score(('/robot', 'TASK', 'PICK'), 'DETECT')
+
+
+FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT')
+
+
+@pytest.mark.parametrize('events, score', [
+    ([FAILED, JUMPED], (0, 0)),
+    ([FAILED, JUMPED, event(EventKind.TRANSITION, 'DETECT'), event(EventKind.TRANSITION)], (1, 1)),
+    ([FAILED, JUMPED, FAILED], (0, 1)),
+    ([FAILED, JUMPED, FAILED, JUMPED, event(EventKind.TRANSITION)], (1, 2)),
+    ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
+    ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
+    ([FAILED, JUMPED, event(EventKind.TRANSITION, path='OTHER'), event(EventKind.TRANSITION, trial='u')], (0, 0)),
+    ([event(EventKind.TRANSITION)], (0, 0))])
+def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, score):
+    assert scored(*events) == score
+
+
+def test_the_log_is_bounded_and_forgets_details_first(monkeypatch):
+    monkeypatch.setattr(trial_log, 'MOST_TRIALS', 5)
+    monkeypatch.setattr(trial_log, 'MOST_DETAILED', 2)
+    monkeypatch.setattr(trial_log, 'MOST_EVENTS', 3)
+    log = TrialLog()
+    for number in range(9):
+        for seq in range(6):
+            log.add('/robot', event(EventKind.STATE_START, trial=str(number))._replace(seq=seq))
+    assert [trial['id'] for trial in log.overview()['trials']] == ['8', '7', '6', '5', '4']
+    assert [len(log.events(str(number), 0).events) for number in range(3, 9)] == [0, 0, 0, 0, 3, 3]
+    assert len(log.events('8', 2).events) == 1 and log.events('unknown', 0).events == []
+
+
+def test_a_robot_that_dies_leaves_its_trial_marked():
+    log = TrialLog()
+    log.add('/robot', event(EventKind.TRIAL_START))
+    log.end_missing('/robot')
+    assert log.overview()['trials'][0]['outcome'] == 'the robot is gone'
