@@ -16,8 +16,8 @@ TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.06, 'glare': 0.04, 'dim_light': 0.03, 'crowded': 0.09, 'slippery_object': 0.05,
-          'object_moved': 0.05, 'goal_occupied': 0.05, 'edge_of_reach': 0.05}
+CHANCE = {'arm_in_view': 0.07, 'glare': 0.06, 'dim_light': 0.04, 'crowded': 0.10, 'slippery_object': 0.07,
+          'object_moved': 0.06, 'goal_occupied': 0.02, 'edge_of_reach': 0.03}
 
 
 class Draft(NamedTuple):
@@ -46,12 +46,12 @@ def _arm_in_view(draft: Draft, generator: np.random.Generator) -> Optional[Draft
     """Somebody pushes the left arm between the camera and the nearest thing, after the head has turned there."""
     thing = draft.things[TARGET]
     chain = _left_arm()
-    for _ in range(20):
+    for _ in range(60):
         top = np.array(thing.position) + [0.0, 0.0, thing.size[2] / 2]
         point = top + generator.uniform(0.3, 0.5) * (EYE - top) + [0.0, generator.uniform(-0.06, 0.02), 0.0]
         pose = from_rpy(point, yaw=generator.uniform(-1.2, -0.2))
         q = chain.inverse(pose, np.array([0.6, 0.2, 1.2, -1.6, 0.0, -0.8, 0.0]), generator)
-        if q is not None and point[2] > TABLE_TOP + 0.28:
+        if q is not None and point[2] > TABLE_TOP + 0.24:
             turned = chain.nearest_turn(q, np.zeros(len(q)))
             values = tuple(zip(ARM_JOINTS['left'], (float(each) for each in turned)))
             return _caused(draft, 'arm_in_view', 'the left arm is pushed over the table, its hand {:.0f} cm above it'
@@ -66,7 +66,7 @@ def _left_arm() -> Chain:
 
 def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
     frames = int(generator.integers(1, 3))
-    dropout = float(generator.uniform(0.85, 0.97))
+    dropout = float(generator.uniform(0.92, 0.99))
     return _caused(draft, 'glare', 'light falls into the camera for {} frames: {:.0f}% of the depth is lost'.format(
         frames, 100 * dropout), Disturbance('glare', 'look_at', (('dropout', dropout), ('frames', frames))))
 
@@ -91,7 +91,7 @@ def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
-    friction = float(generator.uniform(0.04, 0.16))
+    friction = float(generator.uniform(0.03, 0.09))
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
     return _caused(draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
@@ -101,27 +101,29 @@ def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
 def _object_moved(draft: Draft, generator: np.random.Generator) -> Draft:
     """Somebody moves the nearest thing after it has been detected."""
     way = float(generator.uniform(0.05, 0.08))
-    heading = float(generator.uniform(2.2, 4.1))
+    heading = float(generator.uniform(-0.9, 0.9))  # away from the robot
     values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration', 0.8))
     return _caused(draft, 'object_moved', 'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(
         100 * way), Disturbance('nudge:' + draft.things[TARGET].name, 'see', values))
 
 
 def _goal_occupied(draft: Draft, generator: np.random.Generator) -> Draft:
-    """A thing stands beside the place where the object shall go."""
-    away = float(generator.uniform(0.075, 0.12))
-    heading = float(generator.uniform(-1.6, 1.6))
-    other = draft.things[-1]
-    moved = other._replace(position=(float(GOAL[0] + away * np.cos(heading)), float(GOAL[1] + away * np.sin(heading)),
-                                     other.position[2]))
-    return _caused(draft._replace(things=draft.things[:-1] + (moved,)), 'goal_occupied',
-                   'a thing stands {:.0f} cm beside the place for the object'.format(100 * away))
+    """Things stand on both sides of the place where the object shall go."""
+    heading = float(generator.uniform(-np.pi, np.pi))
+    distances = [float(generator.uniform(0.07, 0.11)) for _ in range(2)]
+    moved = []
+    for other, away, side in zip(draft.things[-2:], distances, (heading, heading + np.pi)):
+        spot = (float(GOAL[0] + away * np.cos(side)), float(GOAL[1] + away * np.sin(side)), other.position[2])
+        moved.append(other._replace(position=spot))
+    return _caused(draft._replace(things=draft.things[:-2] + tuple(moved)), 'goal_occupied',
+                   'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
+                       *(100 * away for away in distances)))
 
 
 def _edge_of_reach(draft: Draft, generator: np.random.Generator) -> Draft:
     """The nearest thing stands where the right arm gets to from few sides; the others are beyond it."""
     thing = draft.things[TARGET]
-    spot = (float(generator.uniform(0.50, 0.60)), float(generator.uniform(0.26, 0.36)))
+    spot = (float(generator.uniform(0.50, 0.60)), float(generator.uniform(0.34, 0.50)))
     moved = thing._replace(position=(spot[0], spot[1], thing.position[2]))
     others = tuple(other for other in draft.things[1:]
                    if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
