@@ -167,7 +167,7 @@ def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None
 
     with _limb(means, kitchen, arm, view) as limb:
         means.robot.gripper(arm, 0.0)
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.0, 1.8), ('door',))
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4), ('door',))
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)

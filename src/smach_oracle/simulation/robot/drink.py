@@ -50,6 +50,18 @@ def find_drink(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray, min
     raise NotSeen('no drink: ' + (reasons[0] if reasons else 'there is nothing on the shelf'))
 
 
+def things_on_shelf(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray,
+                    limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
+    """Everything that is seen to stand on the drinks' shelf, foremost first; [] where the shelf is not seen."""
+    view = view_of(frame, limbs)
+    points = _about_shelf(view, kitchen, base_from_fridge)
+    plane = find_plane(points, generator_of(frame), tolerance=OFF_SHELF, least=LEAST_SHELF)
+    if plane is None:
+        return []
+    patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SHELF])
+    return [each.box for each in _in_front(view, plane, patch, kitchen, base_from_fridge, 0.0)]
+
+
 def _about_shelf(view: View, kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
     """(n, 3): the points that may be of the shelf, in the frame of the base."""
     points = view.points[np.isfinite(view.points[..., 2])]

@@ -1,14 +1,14 @@
 """Take a drink off a shelf of the refrigerator: grasp, lift, back out of it with the base, carry it beside the body."""
-from typing import Dict, Mapping
+from typing import Sequence
 
 import numpy as np
 
 from ...geometry.box import UprightBox
-from ...geometry.transforms import apply, from_rpy, inverse
+from ...geometry.transforms import from_rpy
 from .arm import Arm, Means, SkillError, Unreachable, seed_of
 from .door import named_boxes
 from .interface import GRIPPER_OPEN
-from .kitchen import Kitchen, MapBox, shelf_region
+from .kitchen import Kitchen, MapBox
 from .pick import Held, pick
 from .travel import drive, stow
 
@@ -16,19 +16,22 @@ STEP_BACK = 0.40  # m that the base draws back to take the hand out
 CARRY_SPEED = 0.3
 CARRIES = ((0.45, -0.30, -0.2), (0.42, -0.22, 0.0), (0.48, -0.35, -0.4))  # x, y in m, yaw of the hand that carries
 OPEN_DOOR = np.radians(104.0)
-EDGE = 0.02  # m around the space above the shelf in which things seen are things on it
+PADDING = 0.015  # m
+BESIDE = 0.004  # m around things on the shelf
+SAME = 0.03  # m between the middles of two boxes that are the same thing
 
 
 def pick_from_fridge(means: Means, kitchen: Kitchen, base_from_fridge: np.ndarray, arm: str, target: UprightBox,
-                     seen: Mapping[str, MapBox]) -> Held:
+                     others: Sequence[UprightBox]) -> Held:
     """Pick a drink and take it out, upright; where that fails, the hand leaves the fridge empty.
 
     :param base_from_fridge: 4x4, where the fridge is.
-    :param seen: boxes of what a frame shows, without the drink; those on the shelf count.
+    :param others: what else stands on the shelf; the drink itself may be among it.
     :raises SkillError: with the reason.
     """
-    boxes = named_boxes(kitchen, base_from_fridge, OPEN_DOOR)
-    boxes.update(_on_shelf(kitchen, base_from_fridge, seen))
+    boxes = {name: _padded(box) for name, box in named_boxes(kitchen, base_from_fridge, OPEN_DOOR).items()}
+    boxes.update({'thing {}'.format(k): MapBox(box.centre, box.size / 2 + BESIDE, box.yaw)
+                  for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME})
     try:
         held = pick(means, arm, target, boxes)
         _draw_out(means)
@@ -43,12 +46,9 @@ def pick_from_fridge(means: Means, kitchen: Kitchen, base_from_fridge: np.ndarra
     return held
 
 
-def _on_shelf(kitchen: Kitchen, base_from_fridge: np.ndarray, seen: Mapping[str, MapBox]) -> Dict[str, MapBox]:
-    low, high = shelf_region(kitchen)
-    low, high = low + [0.0, EDGE, EDGE], high - [EDGE, EDGE, 0.0]
-    fridge_from_base = inverse(base_from_fridge)
-    local = {name: apply(fridge_from_base, np.asarray(box.centre)) for name, box in seen.items()}
-    return {name: box for name, box in seen.items() if np.all((local[name] > low) & (local[name] < high))}
+def _padded(box: MapBox) -> MapBox:
+    """Wider by what the base may stand beside where it believes to; not higher, for things stand on shelves."""
+    return box._replace(half=box.half + [PADDING, PADDING, 0.0])
 
 
 def _draw_out(means: Means) -> None:

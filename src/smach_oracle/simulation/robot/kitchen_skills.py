@@ -5,13 +5,15 @@ from smach_oracle.msg import (CloseDoorGoal, CloseDoorResult, HandOverGoal, Hand
                               OpenDoorResult, PickGoal, PickResult)
 
 from ...geometry.transforms import transform
-from .arm import Means
+from .arm import Means, read_joints
 from .door import close_door, open_door
+from .drink import things_on_shelf
 from .frames import box_in_base, pose_in_base, pose_message
 from .fridge_pick import pick_from_fridge
 from .hand_over import hand_over
 from .kitchen import Kitchen, base_from_fridge
 from .manipulation import USUAL, Manipulation, known_arm
+from .own_limbs import limbs_of
 from .pick import Held
 from .skill_server import Say
 
@@ -45,8 +47,9 @@ class KitchenSkills(Manipulation):
         fridge = base_from_fridge(self.kitchen, self.means.robot.odom_from_base())
         say('choosing a grasp in the refrigerator')
         self.held.pop(arm, None)
-        seen = self._seen(target).boxes
-        self.held[arm] = pick_from_fridge(self.means, self.kitchen, fridge, arm, target, seen)
+        limbs = limbs_of(self._links, read_joints(self.means.robot))
+        others = things_on_shelf(self.means.robot.see(), self.kitchen, fridge, limbs)
+        self.held[arm] = pick_from_fridge(self.means, self.kitchen, fridge, arm, target, others)
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def hand_over(self, goal: HandOverGoal, say: Say) -> HandOverResult:

@@ -1,12 +1,14 @@
 """Node: what the PR2's arms, hands and head can do, as actions."""
 import rospy
 
-from smach_oracle.msg import (BuildCollisionMapAction, MoveArmsAsideAction, PickAction, PlaceAction, PointHeadAction)
+from smach_oracle.msg import (BuildCollisionMapAction, CloseDoorAction, HandOverAction, MoveArmsAsideAction,
+                              OpenDoorAction, PickAction, PlaceAction, PointHeadAction)
 from smach_oracle.ros.command_line import parameters_only
 
 from .arm import Means
 from .collision import RobotModel, installed_model, model_from
-from .manipulation import Manipulation
+from .kitchen_skills import KitchenSkills
+from .perception_node import kitchen_at
 from .pr2_model import ModelError
 from .ros_robot import RosRobot
 from .skill_server import SkillServer
@@ -19,27 +21,30 @@ def robot_model() -> RobotModel:
     return model_from(urdf.replace('file://', ''), srdf) if urdf and srdf else installed_model()
 
 
-def serve(skills: Manipulation, server: SkillServer) -> None:
+def serve(skills: KitchenSkills, server: SkillServer) -> None:
     """Offer all skills."""
     server.offer('move_arms_aside', MoveArmsAsideAction, skills.move_arms_aside)
     server.offer('point_head', PointHeadAction, skills.point_head)
     server.offer('build_collision_map', BuildCollisionMapAction, skills.build_collision_map)
     server.offer('pick', PickAction, skills.pick)
     server.offer('place', PlaceAction, skills.place)
+    server.offer('open_door', OpenDoorAction, skills.open_door)
+    server.offer('close_door', CloseDoorAction, skills.close_door)
+    server.offer('hand_over', HandOverAction, skills.hand_over)
 
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_only('Node: move_arms_aside, point_head, build_collision_map, pick and place as actions. '
-                    'Parameters: ~snapshot; see doc/simulation.md.')
+    parameters_only('Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, close_door and '
+                    'hand_over as actions. Parameters: ~snapshot, ~kitchen; see doc/simulation.md.')
     rospy.init_node('pr2_manipulation')
     robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
     try:
-        model = robot_model()
+        model, kitchen = robot_model(), kitchen_at('~kitchen')
     except (ValueError, ModelError) as err:
         rospy.logfatal('pr2_manipulation: %s', err)
         raise SystemExit(2) from err
     server = SkillServer(robot.abort, robot.resume)
-    serve(Manipulation(Means(robot, model)), server)
+    serve(KitchenSkills(Means(robot, model), kitchen), server)
     rospy.loginfo('pr2_manipulation: %d actions ready', server.names())
     rospy.spin()

@@ -3,10 +3,11 @@ from typing import Dict, List, Tuple
 
 import numpy as np
 
+from ..robot.interface import ARM_JOINTS, ARMS
 from ..robot.kitchen import Kitchen
 from ..robot.travel import TRAVEL
-from ..robot.interface import ARM_JOINTS, ARMS
 from .fridge import DOOR_JOINT, fridge_urdf
+from .kitchen_causes import Draft, with_causes
 from .scene import Body, Goal, RobotStart, Scene, Vector
 
 TASK = 'drink_retrieval'
@@ -29,10 +30,12 @@ def draw(seed: int, benign: bool = False) -> Scene:
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
     generator = np.random.default_rng([seed, 2])
     kitchen = Kitchen()
-    drinks = _drinks(generator, kitchen)
-    return Scene(TASK, seed, (_fridge(kitchen),) + tuple(drinks) + _person(),
-                 Goal('in_hand', '', PALM, PALM_SIZE[0] / 2),
-                 RobotStart(_posture(), drive_error=(0.01, 0.01, 0.01)))
+    draft = Draft(tuple(_drinks(generator, kitchen)), kitchen.place[:2])
+    if not benign:
+        draft = with_causes(draft, seed)
+    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + _person(), Goal('in_hand', '', PALM, PALM_SIZE[0] / 2),
+                 RobotStart(_posture(), drive_error=draft.drive_error), disturbances=draft.disturbances,
+                 causes=draft.causes)
 
 
 def _fridge(kitchen: Kitchen) -> Body:
@@ -42,12 +45,13 @@ def _fridge(kitchen: Kitchen) -> Body:
 
 
 def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
-    """Upright on the shelf, apart from each other, near the front."""
+    """Upright on the shelf, apart from each other, near the front; the foremost comes first."""
     places: List[Tuple[float, float]] = []
     while len(places) < 3:
         x, y = generator.uniform(0.06, 0.16), generator.uniform(-0.20, 0.02)
         if all(np.hypot(x - other[0], y - other[1]) > 0.10 for other in places):
-            places.append((x, y))
+            places.append((float(x), float(y)))
+    places.sort()
     floor = kitchen.shelves[kitchen.drinks_shelf]
     return [Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
                  (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001), mass=DRINK_MASS,

@@ -1,0 +1,106 @@
+"""Why a trial in the kitchen may fail: each cause is physical, is drawn from the trial's seed, and is told to nobody."""
+from typing import Callable, Dict, List, NamedTuple, Tuple
+
+import numpy as np
+
+from .scene import Body, Cause, Disturbance, Vector
+
+CHANCE = {'base_misplaced': 0.12, 'door_swings_back': 0.10, 'crowded': 0.07, 'glare': 0.08, 'dim_light': 0.05,
+          'slippery_drink': 0.05, 'drink_moved': 0.06, 'drink_at_the_back': 0.03}
+TARGET = 0  # the drink that stands nearest to the front
+STEADY: Vector = (0.008, 0.008, 0.006)  # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
+
+
+class Draft(NamedTuple):
+    """A kitchen in the making."""
+
+    drinks: Tuple[Body, ...]
+    front: Tuple[float, float]  # x, y of the middle of the fridge's opening, m
+    drive_error: Vector = STEADY
+    disturbances: Tuple[Disturbance, ...] = ()
+    causes: Tuple[Cause, ...] = ()
+
+
+def with_causes(draft: Draft, seed: int) -> Draft:
+    """A kitchen with the causes that its seed has for it."""
+    for number, kind in enumerate(sorted(CHANCE)):
+        generator = np.random.default_rng([seed, 72, number])
+        if generator.random() < CHANCE[kind]:
+            draft = MAKERS[kind](draft, generator)
+    return draft
+
+
+def _caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> Draft:
+    return draft._replace(disturbances=draft.disturbances + disturbances, causes=draft.causes + (Cause(kind, text),))
+
+
+def _base_misplaced(draft: Draft, generator: np.random.Generator) -> Draft:
+    """Every drive ends some centimetres beside its goal: too near, and the base itself is in the door's way."""
+    sigma = float(generator.uniform(0.04, 0.06))
+    return _caused(draft._replace(drive_error=(sigma, sigma, 0.5 * sigma)), 'base_misplaced',
+                   'drives end {:.1f} cm beside their goals (sigma)'.format(100 * sigma))
+
+
+def _door_swings_back(draft: Draft, generator: np.random.Generator) -> Draft:
+    """The opened door falls back, half shut, while the robot drives in."""
+    angle = float(generator.uniform(0.5, 0.9))
+    return _caused(draft, 'door_swings_back', 'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
+                   Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
+
+
+def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
+    """A further drink stands right beside the nearest one."""
+    gap = float(generator.uniform(0.0, 0.012))
+    heading = float(generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2))
+    target, other = draft.drinks[TARGET], draft.drinks[-1]
+    far = target.size[0] + other.size[0] + gap
+    moved = other._replace(position=(target.position[0] + far * float(np.cos(heading)),
+                                     target.position[1] + far * float(np.sin(heading)), other.position[2]))
+    return _caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
+                   'two drinks stand {:.1f} cm beside each other'.format(100 * gap))
+
+
+def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
+    dropout = float(generator.uniform(0.93, 0.99))
+    frames = int(generator.integers(1, 4))
+    return _caused(draft, 'glare', 'the sun shines into the camera for {} frames: {:.0f}% of the depth is lost'.format(
+        frames, 100 * dropout), Disturbance('glare', 'see:2', (('dropout', dropout), ('frames', frames))))
+
+
+def _dim_light(draft: Draft, generator: np.random.Generator) -> Draft:
+    brightness = float(generator.uniform(0.02, 0.06))
+    return _caused(draft, 'dim_light', 'the lamp of the refrigerator flickers, down to {:.0f}%'.format(
+        100 * brightness), Disturbance('dim', 'see:2', (('brightness', brightness), ('frames', 1))))
+
+
+def _slippery_drink(draft: Draft, generator: np.random.Generator) -> Draft:
+    friction, mass = float(generator.uniform(0.05, 0.15)), float(generator.uniform(0.5, 0.7))
+    drinks = tuple(drink._replace(friction=friction, mass=mass) for drink in draft.drinks[:1]) + draft.drinks[1:]
+    return _caused(draft._replace(drinks=drinks), 'slippery_drink',
+                   'the nearest drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
+
+
+def _drink_moved(draft: Draft, generator: np.random.Generator) -> Draft:
+    """Somebody reaches in and moves the nearest drink after it has been detected."""
+    way = float(generator.uniform(0.05, 0.08))
+    side = 1.0 if generator.random() < 0.5 else -1.0
+    values = (('dx', 0.02), ('dy', side * way), ('duration', 0.8))
+    return _caused(draft, 'drink_moved', 'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
+        100 * way), Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:3', values))
+
+
+def _drink_at_the_back(draft: Draft, generator: np.random.Generator) -> Draft:
+    """There is one drink, and it stands in a corner at the back."""
+    spot = (draft.front[0] + float(generator.uniform(0.36, 0.42)), draft.front[1] + float(generator.uniform(0.14, 0.2)))
+    target = draft.drinks[TARGET]
+    moved = target._replace(position=(spot[0], spot[1], target.position[2]))
+    return _caused(draft._replace(drinks=(moved,)), 'drink_at_the_back',
+                   'the only drink stands {:.0f} cm deep in the fridge'.format(100 * (spot[0] - draft.front[0])))
+
+
+Maker = Callable[[Draft, np.random.Generator], Draft]
+MAKERS: Dict[str, Maker] = {'base_misplaced': _base_misplaced, 'door_swings_back': _door_swings_back,
+                            'crowded': _crowded, 'glare': _glare, 'dim_light': _dim_light,
+                            'slippery_drink': _slippery_drink, 'drink_moved': _drink_moved,
+                            'drink_at_the_back': _drink_at_the_back}
+KINDS: List[str] = sorted(CHANCE)
