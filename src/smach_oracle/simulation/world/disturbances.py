@@ -4,6 +4,7 @@ Kinds, with their values (a scene's Disturbance.values) and what these are where
 * ``arm``: joints by name, rad: somebody moves an arm there, in ``duration`` s (1.5).
 * ``dim``: the light falls to ``brightness`` (0.15) for the next ``frames`` (2) of the camera.
 * ``glare``: the share ``dropout`` (0.9) of the depth is lost in the next ``frames`` (2).
+* ``swing:BODY``: the joints of a body that is a URDF, a door, swing to ``angle`` rad (0) in ``duration`` s (1.5).
 * ``nudge:BODY``: a body is pushed over what it stands on by ``dx``, ``dy`` m (0) in ``duration`` s (0.4).
 
 Events are counted since the reset: ``see`` or ``see:1`` is the first frame, ``drive:2`` the end of the second drive.
@@ -30,6 +31,7 @@ OPTIONS: Dict[str, Dict[str, float]] = {
     'arm': {'duration': 1.5},
     'dim': {'brightness': 0.15, 'frames': 2},
     'glare': {'dropout': 0.9, 'frames': 2},
+    'swing': {'angle': 0.0, 'duration': 1.5},
     'nudge': {'dx': 0.0, 'dy': 0.0, 'duration': 0.4},
 }
 
@@ -150,6 +152,8 @@ def _check(disturbance: Disturbance, scene: Scene, robot: Pr2Body) -> None:
         wrong = 'unknown kind; allowed: {}'.format(', '.join(OPTIONS))
     elif event not in EVENTS or not number.isdigit() or int(number) < 1:
         wrong = 'unknown event {!r}; allowed: {}, each with :NUMBER'.format(disturbance.after, ', '.join(EVENTS))
+    elif kind == 'swing' and body not in [each.name for each in scene.bodies if each.shape == 'urdf']:
+        wrong = 'no body {!r} with joints'.format(body)
     elif kind == 'nudge' and body not in [each.name for each in scene.bodies if each.mass > 0]:
         wrong = 'no body {!r} that can be moved'.format(body)
     else:

@@ -17,6 +17,7 @@ from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 from .scene import Body, Goal, Scene
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
+TURNING_FORCE = 30.0  # N m, of what swings a door
 SETTLING = 30  # control periods after a reset, in which things come to rest
 
 
