@@ -27,7 +27,7 @@ from .scene import Scene
 
 BASE = 'base_link'
 HEAD = PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75))
-PLACE = PoseStamped(Header(frame_id=BASE), Pose(Point(0.6, -0.35, 0.73), Quaternion(0.0, 0.0, 0.0, 1.0)))
+PLACE = PoseStamped(Header(frame_id=BASE), Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
 FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
 
 

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""The first use case on the simulated PR2, over its nodes: as the task does it, and with goals that cannot be."""
+import math
+import unittest
+
+import actionlib
+import rospy
+import rostest
+import smach
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from std_msgs.msg import Header
+
+from smach_oracle.msg import (MoveArmsAsideAction, MoveArmsAsideGoal, PickAction, PickGoal, PlaceAction, PlaceGoal,
+                              PointHeadAction, PointHeadGoal)
+from smach_oracle.srv import Judge, ResetWorld
+from smach_oracle.tasks import pick_and_place
+
+LIMIT = rospy.Duration(900.0)  # of ROS time, which runs fast while nothing moves
+BASE = 'base_footprint'
+SIZE = Vector3(0.06, 0.06, 0.12)
+
+
+def pose(x, y, z, frame=BASE):
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0.0, 0.0, 0.0, 1.0)))
+
+
+class PickAndPlaceTest(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.wait_for_service('world/reset', 60.0)
+        cls.reset = rospy.ServiceProxy('world/reset', ResetWorld)
+        cls.judge = rospy.ServiceProxy('world/judge', Judge)
+
+    def done(self, name, spec, goal):
+        """How an action ended: (status, result)."""
+        client = actionlib.SimpleActionClient(name, spec)
+        self.assertTrue(client.wait_for_server(LIMIT), name)
+        client.send_goal(goal)
+        self.assertTrue(client.wait_for_result(LIMIT), name)
+        return client.get_state(), client.get_result()
+
+    def test_1_bad_goals_are_aborted_and_say_why(self):
+        self.assertTrue(self.reset(seed=3).ok)
+        good = pose(0.6, -0.1, 0.78)
+        for name, spec, goal, text in [
+                ('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal(['third']), "unknown arm 'third'"),
+                ('point_head', PointHeadAction,
+                 PointHeadGoal(PointStamped(Header(frame_id='moon'), Point(1, 0, 1))), "frame 'moon'; allowed"),
+                ('pick', PickAction, PickGoal('right', pose(math.nan, 0, 0), SIZE, ''), 'not finite'),
+                ('pick', PickAction, PickGoal('right', good, SIZE, 'map of the moon'), 'no collision map'),
+                ('place', PlaceAction, PlaceGoal('up', good, good, ''), "unknown arm 'up'")]:
+            with self.subTest(text):
+                status, result = self.done(name, spec, goal)
+                self.assertEqual(status, GoalStatus.ABORTED)
+                self.assertIn(text, result.reason)
+
+    def test_2_the_task_succeeds_and_the_object_truly_stands_there(self):
+        self.assertTrue(self.reset(seed=4).ok)
+        machine = pick_and_place.make_machine()
+        machine.userdata = smach.UserData()
+        machine.userdata.place_pose = pick_and_place.place_pose()
+        self.assertEqual(machine.execute(), 'succeeded')
+        verdict = self.judge()
+        self.assertTrue(verdict.success, verdict.why)
+
+
+if __name__ == '__main__':
+    rospy.init_node('pr2_pick_and_place_test')
+    rostest.rosrun('smach_oracle', 'pr2_pick_and_place', PickAndPlaceTest)
