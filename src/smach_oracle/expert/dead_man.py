@@ -31,7 +31,3 @@ class DeadMan:
     def drop(self) -> None:
         """Let go whoever holds it."""
         self._until_s = -math.inf
-
-    def remaining_s(self, now_s: float) -> float:
-        """How long it is held without another command; 0 where nobody holds it."""
-        return max(0.0, self._until_s - now_s)

@@ -101,6 +101,8 @@ class CartesianDrive:
         :raises ValueError: for joints, a twist or a period that is not finite or has the wrong shape; a period of 0.
         """
         joints, twist = _checked(joints, twist, period, len(self.arm.names))
+        if turn_freely:
+            twist = np.concatenate([twist[:3], np.zeros(3)])
         nearest = self._near(joints) if self._near is not None else ()
         clearance = min((each.distance for each in nearest), default=float('inf'))
         if not (turn_freely or twist.any()):

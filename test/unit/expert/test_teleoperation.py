@@ -156,3 +156,22 @@ def test_what_is_not_finite_or_has_the_wrong_shape_is_refused(arm, joints, twist
 
 def test_targets_do_not_run_away_from_an_arm_that_is_blocked():
     assert pulled_back(np.array([1.0, 0.05]), np.zeros(2), 0.1) == pytest.approx([0.1, 0.05])
+
+
+def test_a_hand_that_may_turn_freely_keeps_its_place_while_the_arm_comes_to_its_ease(arm):
+    ease = np.array([-0.76, 0.2, -1.57, -1.6, 0.8, -1.0, 0.3])
+    drive = CartesianDrive(arm, posture=ease)
+    begin = arm.forward(READY)[:3, 3]
+    joints = READY
+    for _ in range(400):
+        joints = drive.step(joints, np.zeros(6), PERIOD, turn_freely=True).joints
+        assert np.linalg.norm(arm.forward(joints)[:3, 3] - begin) < 0.01
+    assert np.linalg.norm(joints - ease) < 0.7 * np.linalg.norm(READY - ease)
+    moved = run_freely(drive, READY, np.array([0.1, 0.0, 0.0, 5.0, 5.0, 5.0]), 25)
+    assert arm.forward(moved)[:3, 3] - begin == pytest.approx([0.05, 0.0, 0.0], abs=4e-3)
+
+
+def run_freely(drive, joints, twist, steps):
+    for _ in range(steps):
+        joints = drive.step(joints, twist, PERIOD, turn_freely=True).joints
+    return joints

@@ -11,6 +11,7 @@ from .kitchen_skills import KitchenSkills
 from .perception_node import kitchen_at
 from .pr2_model import ModelError
 from .ros_robot import RosRobot
+from .shown_maps import ShownMaps
 from .skill_server import SkillServer
 
 
@@ -25,7 +26,7 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
     """Offer all skills."""
     server.offer('move_arms_aside', MoveArmsAsideAction, skills.move_arms_aside)
     server.offer('point_head', PointHeadAction, skills.point_head)
-    server.offer('build_collision_map', BuildCollisionMapAction, skills.build_collision_map)
+    server.offer('build_collision_map', BuildCollisionMapAction, ShownMaps(skills.build_collision_map, skills.maps))
     server.offer('pick', PickAction, skills.pick)
     server.offer('place', PlaceAction, skills.place)
     server.offer('open_door', OpenDoorAction, skills.open_door)
