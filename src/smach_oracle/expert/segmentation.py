@@ -75,7 +75,7 @@ def segment(picture: Picture, region: np.ndarray, strokes: Sequence[Stroke] = ()
     """
     inside = _filled(picture, region)
     crop, surroundings = _around(inside, 0.35, 12), _around(inside, 0.8, 40)
-    surface = _surface(picture, surroundings)
+    surface = _surface(picture, inside, surroundings)
     mask = _grab_cut(picture, inside, crop, strokes, surface)
     return _with_depth(picture, mask, surface)
 
@@ -115,9 +115,10 @@ def _points(picture: Picture, crop: Corners) -> np.ndarray:
     return points_of(picture.depth[top:bottom, left:right], picture.intrinsics, picture.base_from_camera, (left, top))
 
 
-def _surface(picture: Picture, crop: Corners) -> Optional[Plane]:
-    """What the object stands on, where some of it can be seen around the region."""
-    points = _points(picture, crop).reshape(-1, 3)
+def _surface(picture: Picture, inside: np.ndarray, crop: Corners) -> Optional[Plane]:
+    """What the object stands on, where enough of it is seen around the region; inside, its own top may be level too."""
+    left, top, right, bottom = crop
+    points = _points(picture, crop)[~inside[top:bottom, left:right]]
     points = points[np.isfinite(points[:, 2])]
     return find_plane(points, np.random.default_rng(1), least=max(150, len(points) // 12))
 

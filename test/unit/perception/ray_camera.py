@@ -3,7 +3,8 @@ from typing import NamedTuple, Sequence
 
 import numpy as np
 
-from smach_oracle.geometry.transforms import transform
+from smach_oracle.geometry.depth import pixels_of
+from smach_oracle.geometry.transforms import apply, from_rpy, transform
 from smach_oracle.simulation.robot.interface import Frame
 from smach_oracle.simulation.world.scene import Body
 
@@ -31,17 +32,18 @@ def camera_at(eye: Sequence[float], target: Sequence[float]) -> np.ndarray:
 def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generator, noise: float = 1.0,
         colour_noise: float = 6.0) -> Seen:
     """What a Kinect-like camera sees: `noise` scales that of depth, 0 is a perfect one."""
-    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    rays = np.stack([(columns - INTRINSICS[0, 2]) / FOCAL, (rows - INTRINSICS[1, 2]) / FOCAL,
-                     np.ones((HEIGHT, WIDTH))], axis=-1) @ camera[:3, :3].T
     depth, whose = np.full((HEIGHT, WIDTH), np.inf), np.full((HEIGHT, WIDTH), -1)
     colour = np.full((HEIGHT, WIDTH, 3), 0.75)
     for index, body in enumerate(bodies):
+        part = _part_of_image(body, camera)
+        rows, columns = (each[part] for each in np.indices((HEIGHT, WIDTH)))
+        rays = np.stack([(columns - INTRINSICS[0, 2]) / FOCAL, (rows - INTRINSICS[1, 2]) / FOCAL,
+                         np.ones(rows.shape)], axis=-1) @ camera[:3, :3].T
         found, normal = _cast(body, camera[:3, 3], rays)
-        nearer = found < depth
-        depth[nearer], whose[nearer] = found[nearer], index
+        nearer = found < depth[part]
+        depth[part][nearer], whose[part][nearer] = found[nearer], index
         shade = 0.55 + 0.45 * np.clip(normal @ LIGHT, 0, 1)
-        colour[nearer] = (np.array(body.colour) * shade[..., None])[nearer]
+        colour[part][nearer] = (np.array(body.colour) * shade[..., None])[nearer]
     image = 255 * colour + generator.normal(0, colour_noise, colour.shape)
     return Seen(Frame(1.0, np.clip(image, 0, 255).astype(np.uint8), _measured(depth, generator, noise), INTRINSICS,
                       camera), whose)
@@ -57,6 +59,19 @@ def _measured(depth: np.ndarray, generator: np.random.Generator, noise: float) -
     measured[jump & (generator.random(depth.shape) < 0.7)] = np.nan
     steps = 0.075 * FOCAL * 8  # the disparity of a Kinect comes in eighths of a pixel
     return (steps / np.round(steps / measured)).astype(np.float32)
+
+
+def _part_of_image(body: Body, camera: np.ndarray):
+    """Rows and columns of which all that the body covers lies; the whole image where it reaches behind the camera."""
+    size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    corners = apply(from_rpy(body.position, yaw=body.yaw), signs * size / 2)
+    seen = pixels_of(corners, INTRINSICS, camera)
+    if seen[:, 2].min() < 0.05:
+        return slice(None), slice(None)
+    low = np.clip(np.floor(seen[:, :2].min(axis=0)).astype(int), 0, (WIDTH, HEIGHT))
+    high = np.clip(np.ceil(seen[:, :2].max(axis=0)).astype(int) + 1, 0, (WIDTH, HEIGHT))
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def _cast(body: Body, eye: np.ndarray, rays: np.ndarray):

@@ -20,6 +20,7 @@ OFF_SHELF = 0.012  # m
 MARGIN = 0.018  # m from the shelf's edge: there are walls
 NARROW = (0.035, 0.085)  # m: a drink's smaller horizontal extent, as far as the gripper takes it
 WIDEST = 0.11  # m
+SHEET = 0.015  # m: what is thinner is a piece of a wall
 HEIGHTS = (0.05, 0.32)  # m
 HIDDEN = 0.5  # share of the shelf from which its being hidden is the reason
 
@@ -79,7 +80,7 @@ def _in_front(view: View, plane: Plane, patch: np.ndarray, kitchen: Kitchen, bas
     lowest = max(OFF_SHELF, min_height if min_height > 0 else 0.03)
     found = clusters_on(view, plane, patch, lowest, float(high[2] - low[2]) - 0.02, MARGIN)
     inwards = base_from_fridge[:3, 0]
-    return sorted(found, key=lambda cluster: float(cluster.box.centre @ inwards))
+    return sorted((each for each in found if each.box.narrow > SHEET), key=lambda cluster: float(cluster.box.centre @ inwards))
 
 
 def _why_no_drink(view: View, cluster: Cluster) -> str:
