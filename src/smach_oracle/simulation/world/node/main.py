@@ -3,7 +3,7 @@ import importlib
 import sys
 import threading
 import traceback
-from typing import Dict, List, Optional
+from typing import Dict, Optional
 
 import rosgraph
 import rospy
@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 from smach_oracle.msg import TrialCause
 from smach_oracle.oracle.errors import ConfigError
 from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.shutdown import ShutdownGuard
 from smach_oracle.simulation.robot.pr2_model import ModelError
 from smach_oracle.simulation.world.camera import FRAME_PERIODS, shoot
 from smach_oracle.simulation.world.judge import Verdict, judge
@@ -34,6 +35,7 @@ from .trial import Trial, append_line
 SCENES: Dict[str, str] = {'pick_and_place': 'tabletop_scene', 'drink_retrieval': 'kitchen_scene'}
 SETTLING_S = 1.0  # after a trial, before it is judged
 LAST_WORDS_S = 1.5  # for the last trial's line, at the end
+UNREGISTERING_S = 0.7  # for taking back some sixty topics from a master that may be busy, or gone
 SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
 
 
@@ -50,6 +52,7 @@ class WorldNode:
     def __init__(self, settings: WorldSettings) -> None:
         """Raises ModelError where the PR2's model cannot be had, ValueError where a scene cannot be built."""
         self._settings = settings
+        self.exit_code = 0  # of the process; 1 where the world failed
         self._world = World(draw(settings.task, settings.seed, settings.benign))
         self._trial: Optional[Trial] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
@@ -75,8 +78,9 @@ class WorldNode:
         self._loop.run(self._end)
 
     def close(self) -> None:
-        """Stop serving; returns when the last trial's line is written."""
+        """Stop serving; when the last trial's line is written, the process has UNREGISTERING_S left."""
         self._loop.stop(LAST_WORDS_S)
+        ShutdownGuard(lambda: None, lambda limit_s: None, limit_s=UNREGISTERING_S).arm(self.exit_code)
 
     # in the world's thread
 
@@ -195,21 +199,19 @@ def main() -> None:
     except (ConfigError, ModelError, ValueError) as err:
         rospy.logfatal('pr2_world: %s', err)
         raise SystemExit(2) from err
-    broken: List[BaseException] = []
-    thread = threading.Thread(target=_run, args=(node, broken), name='world')
+    thread = threading.Thread(target=_run, args=(node,), name='world')
     rospy.on_shutdown(node.close)
     thread.start()
     rospy.spin()
     thread.join()
-    if broken:
-        raise SystemExit(1) from broken[0]
+    raise SystemExit(node.exit_code)
 
 
-def _run(node: WorldNode, broken: List[BaseException]) -> None:
+def _run(node: WorldNode) -> None:
     """A world that fails takes its node along: it must not stand there without answering."""
     try:
         node.run()
-    except Exception as err:  # whatever it is, the node cannot go on
-        broken.append(err)
+    except Exception:  # whatever it is, the node cannot go on
+        node.exit_code = 1
         rospy.logfatal('pr2_world: %s', traceback.format_exc())
         rospy.signal_shutdown('the world failed')
