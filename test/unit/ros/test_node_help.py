@@ -13,7 +13,7 @@ def run(node: str, *arguments: str) -> 'subprocess.CompletedProcess[str]':
                           stderr=subprocess.PIPE, universal_newlines=True, timeout=60)
 
 
-@pytest.mark.parametrize('node', ['stub_world', 'expert_query_server', 'scripted_expert'])
+@pytest.mark.parametrize('node', ['expert_query_server', 'scripted_expert'])
 def test_help_tells_the_parameters_and_a_wrong_argument_is_named(node: str) -> None:
     told = run(node, '--help', '__name:=other')
     assert told.returncode == 0
