@@ -12,7 +12,7 @@ from .scene import Body, Goal, RobotStart, Scene, Vector
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
-PALM: Vector = (-0.10, -0.62, 0.85)  # the middle of its upper face
+PALM: Vector = (0.10, 0.62, 0.85)  # the middle of its upper face
 PALM_SIZE: Vector = (0.20, 0.20, 0.03)
 SKIN, SHIRT, TROUSERS = (0.87, 0.68, 0.55), (0.25, 0.42, 0.62), (0.20, 0.22, 0.27)
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
@@ -63,11 +63,11 @@ def _person() -> Tuple[Body, ...]:
     x, y, top = PALM
     parts: List[Dict] = [
         dict(name='palm', shape='box', size=PALM_SIZE, position=(x, y, top - PALM_SIZE[2] / 2), colour=SKIN),
-        dict(name='person_arm', shape='box', size=(0.07, 0.34, 0.07), position=(x, y - 0.24, top - 0.06), colour=SHIRT),
-        dict(name='person_body', shape='cylinder', size=(0.17, 0.17, 0.62), position=(x, y - 0.52, 1.14), colour=SHIRT),
-        dict(name='person_legs', shape='cylinder', size=(0.15, 0.15, 0.83), position=(x, y - 0.52, 0.415),
+        dict(name='person_arm', shape='box', size=(0.07, 0.34, 0.07), position=(x, y + 0.24, top - 0.06), colour=SHIRT),
+        dict(name='person_body', shape='cylinder', size=(0.17, 0.17, 0.62), position=(x, y + 0.52, 1.14), colour=SHIRT),
+        dict(name='person_legs', shape='cylinder', size=(0.15, 0.15, 0.83), position=(x, y + 0.52, 0.415),
              colour=TROUSERS),
-        dict(name='person_head', shape='cylinder', size=(0.10, 0.10, 0.24), position=(x, y - 0.52, 1.60), colour=SKIN)]
+        dict(name='person_head', shape='cylinder', size=(0.10, 0.10, 0.24), position=(x, y + 0.52, 1.60), colour=SKIN)]
     return tuple(Body(**part) for part in parts)
 
 
