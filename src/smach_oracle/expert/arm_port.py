@@ -71,6 +71,11 @@ class JointListener:
         with self._changed:
             return self._changed.wait_for(passed, limit_s)
 
+    def catch_up(self, stamp: rospy.Time, limit_s: float) -> bool:
+        """Wait until the joints of `stamp` or later are known; whether they are."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._stamp >= stamp, limit_s)
+
     def _heard(self, message: JointState) -> None:
         with self._changed:
             self._positions.update(zip(message.name, message.position))

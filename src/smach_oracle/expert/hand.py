@@ -2,6 +2,7 @@
 from typing import Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
+import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
@@ -104,6 +105,10 @@ class Hand:
             self._port.send(step.joints, step.velocities, period_s)
         moved = before if step.velocities.any() else None
         return step, self._robot.listener.wait_for_period(moved, since, period_s, limit_s)
+
+    def catch_up(self, stamp: rospy.Time, limit_s: float) -> bool:
+        """Wait until the joints of `stamp` or later are known; whether they are."""
+        return self._robot.listener.catch_up(stamp, limit_s)
 
     def measured(self, positions: Mapping[str, float]) -> np.ndarray:
         """(n,) rad, of this arm's joints."""

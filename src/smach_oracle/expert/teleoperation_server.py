@@ -13,6 +13,7 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Header
 
 from smach_oracle.msg import CollisionBoxes, SharedAutonomyGoal, TeleopCommand, TeleopState
+from smach_oracle.srv import Snapshot
 
 from ..oracle.errors import ConfigError
 from ..ros.command_line import parameters_only
@@ -22,7 +23,7 @@ from .hand import Hand
 from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
 from .surroundings import Surroundings
 from .teleoperation import standing
-from .teleoperation_settings import GRASP_POSE, TeleoperationSettings
+from .teleoperation_settings import GRASP_POSE, NO_SNAPSHOT, TeleoperationSettings
 
 _IDLE_S = 0.2  # how often the state is published while a goal is active and nothing moves
 _APPLIED_S = 2.0  # wall time that a world in lock-step has for one period
@@ -47,6 +48,9 @@ class TeleoperationServer:
         self._held: Optional[TeleopCommand] = None
         self._commands: 'queue.Queue[TeleopCommand]' = queue.Queue()
         self._told_s = 0.0
+        self._unsure = True  # whether others may have moved the robot since our last command
+        self._snapshot = (rospy.ServiceProxy(settings.snapshot, Snapshot)
+                          if settings.lock_step and settings.snapshot != NO_SNAPSHOT else None)
         self._seq, self._refused, self._step = 0, '', standing()
         self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True, tcp_nodelay=True)
         self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
@@ -71,6 +75,7 @@ class TeleoperationServer:
     def _begun(self, goal: SharedAutonomyGoal) -> None:
         self._seq, self._refused, self._step = 0, '', standing()
         self._arm = self._settings.arm_of(goal.state, self._arm)
+        self._unsure = True
         for hand in self._hands.values():
             hand.forget()
 
@@ -152,12 +157,27 @@ class TeleoperationServer:
         until_s = time.monotonic() + _GRIPPER_S
         while hand.gripper.moving and time.monotonic() < until_s and not rospy.is_shutdown():
             self._poll_gripper(hand, 0.02)
+        if self._unsure or command.move_gripper:
+            self._catch_up(hand)
         if self._surroundings is not None:
             self._surroundings.update()
         self._step, done = hand.move_and_wait(command, self._settings.period_s, _APPLIED_S)
         if not done:
             self._refused = 'the world has not carried it out within {:g} s'.format(_APPLIED_S)
         self._tell()
+
+    def _catch_up(self, hand: Hand) -> None:
+        """Others have moved the world, or the gripper has: make sure that it is known where everything is now."""
+        self._unsure = False
+        if self._snapshot is None:
+            return
+        try:
+            stamp = self._snapshot(False).stamp
+        except (rospy.ServiceException, rospy.ROSException, OSError) as err:
+            rospy.logwarn('%s: %s', self._settings.snapshot, err)
+            return
+        if not hand.catch_up(stamp, _APPLIED_S):
+            rospy.logwarn('joint_states of %s did not come', stamp)
 
     def _move_on(self, now_s: float) -> None:
         """One period of a command that is held."""

@@ -10,6 +10,7 @@ from .hand import Hand, Robot
 from .surroundings import Surroundings
 from .teleoperation import DriveLimits
 
+NO_SNAPSHOT = 'none'
 GRASP_POSE = 'grasp_pose'  # of the tool, when the gripper last closed on something; else where it is now
 TOOL_POSE = 'tool_pose'  # of the tool, now
 _DESCRIPTION_S = 60.0
@@ -29,6 +30,7 @@ class TeleoperationSettings(NamedTuple):
     lead: float
     gripper_effort: float
     lock_step: bool
+    snapshot: str  # service of a world in lock-step that tells the joints as they are now, or none
     clearance: bool
 
     @classmethod
@@ -46,7 +48,8 @@ class TeleoperationSettings(NamedTuple):
         return cls(names, str(rospy.get_param('~base_frame', 'base_footprint')), _limits(), states,
                    _names('~success', ['succeeded']), _number('~rate_hz', 60.0, 30.0, 500.0),
                    _number('~watchdog_s', 0.06, 0.01, 0.5), _number('~lead', 0.12, 0.01, 1.0),
-                   _number('~gripper_effort', 60.0, 1.0, 500.0), _flag('~lock_step', False), _flag('~clearance', True))
+                   _number('~gripper_effort', 60.0, 1.0, 500.0), _flag('~lock_step', False),
+                   str(rospy.get_param('~snapshot', NO_SNAPSHOT)), _flag('~clearance', True))
 
     @property
     def period_s(self) -> float:
