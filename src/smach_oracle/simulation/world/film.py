@@ -1,0 +1,96 @@
+"""A picture and a video of the robot at work, for people: a trial of pick and place in one process, without ROS."""
+import argparse
+import sys
+from pathlib import Path
+from typing import List, Optional, Tuple
+
+import cv2
+import numpy as np
+
+from .physics import World
+from .portrait import portrait
+from .rehearsal import rehearse
+from .tabletop_scene import draw
+
+FRAME = (480, 320)  # pixels, of the video
+PICTURE = (960, 640)
+PERIODS_S = 60  # control periods in a simulated second
+CARRIED = 2 * PERIODS_S  # by when what was picked is well above the table
+
+
+class FilmedWorld(World):
+    """A world with somebody beside it who takes pictures of it while its time goes on."""
+
+    def __init__(self, frames_s: float) -> None:
+        """`frames_s`: frames of the video per simulated s; 0: no video."""
+        self._every = int(round(PERIODS_S / frames_s)) if frames_s else 0
+        self._held = 0  # control periods for which something has been in a hand
+        self._count = 0
+        self.shots: List[np.ndarray] = []  # (h, w, 3) uint8 RGB
+        self.picture: Optional[np.ndarray] = None  # when something has been carried for a while
+        super().__init__()
+        self.shots.clear()  # it has begun with a scene of its own
+
+    def step(self, count: int = 1) -> None:
+        """See World."""
+        for _ in range(count):
+            super().step(1)
+            self._count += 1
+            if self._every and self._count % self._every == 0:
+                self.shots.append(portrait(self, FRAME))
+            self._watch()
+
+    def _watch(self) -> None:
+        if self._count % 10 or self.picture is not None:
+            return
+        self._held = self._held + 10 if any(map(self.holding, self.movable())) else 0
+        if self._held >= CARRIED:
+            self.picture = portrait(self, PICTURE)
+
+
+def film(seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
+    """The picture and the frames of one trial. Raises RuntimeError where nothing was carried in it."""
+    world = FilmedWorld(frames_s)
+    try:
+        done = rehearse(draw(seed, benign=True), world)
+        if world.picture is None:
+            raise RuntimeError('seed {}: {} failed: {}'.format(seed, done.failed or 'nothing', done.reason))
+        return world.picture, world.shots
+    finally:
+        world.close()
+
+
+def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
+    """Write the frames as a video; whether this OpenCV can."""
+    height, width = frames[0].shape[:2]
+    video = cv2.VideoWriter(path, cv2.VideoWriter_fourcc(*'mp4v'), frames_s, (width, height))
+    if not video.isOpened():
+        return False
+    for frame in frames:
+        video.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+    video.release()
+    return Path(path).stat().st_size > 0
+
+
+def main(argv: Optional[List[str]] = None) -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog='pr2_film', description=__doc__)
+    parser.add_argument('picture', help='file of the picture (.png or .jpg)')
+    parser.add_argument('--video', metavar='FILE', help='also write a video (.mp4), at simulated time')
+    parser.add_argument('--fps', type=float, default=5.0, help='frames of the video per simulated s (default: 5)')
+    parser.add_argument('--seed', type=int, default=3, help='of the scene (default: %(default)s)')
+    args = parser.parse_args(argv)
+    if not 0.5 <= args.fps <= 60 or args.seed < 0:
+        parser.error('--fps must be from 0.5 to 60, --seed 0 or more')
+    try:
+        picture, frames = film(args.seed, args.fps if args.video else 0.0)
+    except RuntimeError as err:
+        print('pr2_film: {}'.format(err), file=sys.stderr)
+        return 1
+    if not cv2.imwrite(args.picture, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)):
+        print('pr2_film: {}: cannot be written'.format(args.picture), file=sys.stderr)
+        return 1
+    print('Picture: {}'.format(args.picture))
+    if args.video:
+        print('Video: {}'.format(args.video if write_video(args.video, frames, args.fps) else 'no codec here for one'))
+    return 0
