@@ -53,13 +53,13 @@ def make_machine(failing, time_s, size):
 
 
 def main(argv):
-    """Arguments: failing labels with commas, s that a state takes, further states, trials."""
+    """Arguments: failing labels with commas, s that a state takes, further states, trials, prior failure rate."""
     failing, time_s, size, trials = argv[1].split(','), float(argv[2]), int(argv[3]), int(argv[4])
+    prior = float(argv[5]) if len(argv) > 5 else 0.8  # so high that every failure is a question at once
     rospy.init_node('robot')
     sm = make_machine(failing, time_s, size)
-    # prior: every failure is a question at once
     OracleContainer.wrap(sm, name='KITCHEN', settings={
-        'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
+        'prior': prior, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
         'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
         'interfaces': {'assist': {'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']}}})
     for _ in range(trials):
