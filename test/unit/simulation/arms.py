@@ -28,8 +28,8 @@ def clutter(seed: int) -> Dict[str, MapBox]:
     generator = np.random.default_rng(seed)
     boxes = {'table': box(0.85, 0.0, 0.7, 0.35, 0.7, 0.02)}
     for k in range(6):
-        boxes['thing {}'.format(k)] = box(generator.uniform(0.55, 0.95), generator.uniform(-0.5, 0.35), 0.79, 0.03, 0.03,
-                                          0.07)
+        x, y = generator.uniform(0.55, 0.95), generator.uniform(-0.5, 0.35)
+        boxes['thing {}'.format(k)] = box(x, y, 0.79, 0.03, 0.03, 0.07)
     return boxes
 
 
