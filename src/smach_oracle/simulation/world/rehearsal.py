@@ -5,7 +5,7 @@ The steps are those of tasks/pick_and_place.py, done by the same code as behind 
 import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 
-from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
 from smach_oracle.msg import (BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal)

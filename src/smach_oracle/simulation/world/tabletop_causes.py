@@ -16,8 +16,8 @@ TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.07, 'glare': 0.06, 'dim_light': 0.04, 'crowded': 0.10, 'slippery_object': 0.07,
-          'object_moved': 0.06, 'goal_occupied': 0.02, 'edge_of_reach': 0.03}
+CHANCE = {'arm_in_view': 0.09, 'glare': 0.07, 'dim_light': 0.05, 'crowded': 0.07, 'slippery_object': 0.09,
+          'object_moved': 0.08, 'goal_occupied': 0.012, 'edge_of_reach': 0.012}
 
 
 class Draft(NamedTuple):
@@ -81,7 +81,7 @@ def _dim_light(draft: Draft, generator: np.random.Generator) -> Draft:
 def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
     """A further thing stands close behind the nearest one, or beside it."""
     thing, other = draft.things[TARGET], draft.things[-1]
-    gap = float(generator.uniform(0.008, 0.032))
+    gap = float(generator.uniform(0.014, 0.032))
     away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
     far = _radius(thing) + _radius(other) + gap
     spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
@@ -91,7 +91,7 @@ def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
-    friction = float(generator.uniform(0.03, 0.09))
+    friction = float(generator.uniform(0.025, 0.075))
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
     return _caused(draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
