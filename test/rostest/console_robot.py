@@ -7,6 +7,7 @@ import smach
 
 from smach_oracle import OracleContainer
 
+MARKUP = 'no grasp found for <b>mug</b> & <script>window.hacked = 1</script>'
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
 
 
@@ -23,7 +24,7 @@ class Work(smach.State):
     def execute(self, ud):
         rospy.sleep(self._time_s)
         if self._label in self._failing:
-            raise RuntimeError('no grasp found for <b>mug</b> & <script>window.hacked = 1</script>')
+            raise RuntimeError(rospy.get_param('~reason', MARKUP))
         for key in self._outputs:
             ud[key] = 'done by ' + self._label
         return 'succeeded'

@@ -115,6 +115,7 @@ FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT'
     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
     ([FAILED, JUMPED, event(EventKind.TRANSITION, path='OTHER'), event(EventKind.TRANSITION, trial='u')], (0, 0)),
+    ([FAILED, event(EventKind.SUPERSEDE), JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (0, 0)),
     ([event(EventKind.TRANSITION)], (0, 0))])
 def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, score):
     assert scored(*events) == score

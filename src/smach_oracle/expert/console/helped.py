@@ -28,7 +28,9 @@ class HelpScores:
         trying = self._trying.setdefault((event.trial_id, event.path), {})
         if event.kind == EventKind.FAILURE:
             self._settle(robot, event.path, event.state, trying.pop(event.state, None), False)
-        elif event.kind == EventKind.JUMP:
+        elif event.kind == EventKind.SUPERSEDE:
+            trying[event.state] = ''  # the jump that follows is where its outcome leads, and no try
+        elif event.kind == EventKind.JUMP and trying.pop(event.state, None) is None:
             trying[event.state] = event.target
         elif event.kind == EventKind.TRANSITION:
             self._settle(robot, event.path, event.state, trying.pop(event.state, None), True)
@@ -46,7 +48,8 @@ class HelpScores:
         return Score(*self._scores.get((place, target), (0, 0)))
 
     def _settle(self, robot: str, path: str, state: str, target: Optional[str], helped: bool) -> None:
-        if target is not None:
+        """Count a try, if there was one."""
+        if target:
             score = self._scores.setdefault(((robot, path, state), target), [0, 0])
             score[0] += helped
             score[1] += 1
