@@ -31,7 +31,8 @@ class DirectRobot:
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
         """See Robot."""
         state = self._do(lambda: Gripper(arm, position, max_effort)).gripper
-        assert state is not None
+        if state is None:
+            raise RobotError('the {} gripper does not tell its state'.format(arm))
         return state
 
     def torso(self, height: float) -> None:
