@@ -2,7 +2,7 @@
 import collections
 import threading
 import time
-from typing import Any, Callable, Deque, Dict, List, Optional, Tuple
+from typing import Any, Callable, Deque, Dict, List, Optional
 
 import numpy as np
 import rospy
@@ -15,7 +15,8 @@ from ...geometry.transforms import from_quaternion
 from ...ros.images import ImageError, colour_of, depth_of, intrinsics_of
 from .interface import Frame, RobotError
 
-KEPT = 4  # messages of a topic
+KEPT = {Image: 4}  # messages of a topic
+KEPT_OTHERS = 200
 SHAKE_S = 0.1  # after a subscriber knows of its publisher, until surely the publisher knows of it
 
 
@@ -25,8 +26,9 @@ class Recent:
     def __init__(self, topic: str, kind: Any) -> None:
         self.name = rospy.resolve_name(topic)
         self._arrived = threading.Condition()
-        self._messages: Deque[Any] = collections.deque(maxlen=KEPT)
-        self._subscriber = rospy.Subscriber(topic, kind, self._heard, queue_size=KEPT, buff_size=1 << 24,
+        kept = KEPT.get(kind, KEPT_OTHERS)
+        self._messages: Deque[Any] = collections.deque(maxlen=kept)
+        self._subscriber = rospy.Subscriber(topic, kind, self._heard, queue_size=kept, buff_size=1 << 24,
                                             tcp_nodelay=True)
 
     @property
@@ -46,7 +48,7 @@ class Recent:
 
     def _wait(self, fits: Callable[[Any], bool], timeout_s: float) -> Any:
         def found() -> Optional[Any]:
-            return next((message for message in self._messages if fits(message)), None)
+            return next((message for message in reversed(self._messages) if fits(message)), None)
         with self._arrived:
             message = self._arrived.wait_for(found, timeout_s)
         if message is None:
@@ -77,18 +79,19 @@ class RosSenses:
 
     def joints(self) -> Dict[str, float]:
         """Joint positions, rad or m, now."""
-        message = self._moment(False)[0]
+        message = self._states.at(self._shot(False), self._timeout_s) if self._snapshot else self._next_states()
         return dict(zip(message.name, message.position))
 
     def transform(self, target: str, source: str) -> np.ndarray:
         """4x4, target from source, now."""
-        return self._looked_up(target, source, self._moment(False)[1])
+        stamp = self._shot(False) if self._snapshot else self._next_states().header.stamp
+        return self._looked_up(target, source, stamp)
 
     def see(self, base: str, camera: str) -> Frame:
         """A frame of the camera, with the pose of the frame `camera` in `base` at its moment."""
         topics = self._camera_topics()
         if self._snapshot:
-            stamp = self._moment(True)[1]
+            stamp = self._shot(True)
             colour, depth, info = (topic.at(stamp, self._timeout_s) for topic in topics)
         else:
             depth = topics[1].next(self._timeout_s)
@@ -113,11 +116,11 @@ class RosSenses:
         return [Recent('head_camera/rgb/image_raw', Image), Recent('head_camera/depth_registered/image_raw', Image),
                 Recent('head_camera/rgb/camera_info', CameraInfo)]
 
-    def _moment(self, camera: bool) -> Tuple[JointState, rospy.Time]:
-        """Joint states of now, and their time."""
-        if not self._snapshot:
-            message = self._states.next(self._timeout_s)
-            return message, message.header.stamp
+    def _next_states(self) -> JointState:
+        return self._states.next(self._timeout_s)
+
+    def _shot(self, camera: bool) -> rospy.Time:
+        """Have the world publish a snapshot; its stamp."""
         self._connected(self._states)
         try:
             self._snapshot.wait_for_service(self._timeout_s)
@@ -126,7 +129,7 @@ class RosSenses:
             raise RobotError('{}: {}'.format(self._snapshot.resolved_name, err)) from err
         if not answer.ok:
             raise RobotError('{}: {}'.format(self._snapshot.resolved_name, answer.message))
-        return self._states.at(answer.stamp, self._timeout_s), answer.stamp
+        return answer.stamp
 
     def _connected(self, topic: Recent) -> None:
         if topic.connected:
