@@ -7,6 +7,7 @@ from smach_oracle.simulation.operator.showing import Marked, looks_wrong, rectan
 from smach_oracle.simulation.operator.sight import Seen, Sight
 
 IMAGE = (640, 480)
+FRAMES = []  # that were asked for
 
 
 def thing(name='can', x=0.6, region=(300, 200, 40, 60), visible=0.9, held=''):
@@ -19,6 +20,11 @@ def marked(seen, beside=0.0, larger=0.0, ok=True, message=''):
 
 def sight(*things, goal=''):
     return Sight({each.name: each for each in things}, 1, goal)
+
+
+def showing():
+    """What `show` is told beside the interface."""
+    return thing(), IMAGE, np.random.default_rng(1), lambda: FRAMES.append(1)
 
 
 def test_the_nearest_thing_that_can_be_seen_is_shown():
@@ -41,7 +47,7 @@ def test_rectangles_are_drawn_by_hand_about_the_thing_and_stay_in_the_image():
 
 def test_a_good_mask_is_accepted_at_once():
     calls = []
-    assert show(lambda *drawn: calls.append(drawn) or marked(thing()), thing(), IMAGE, np.random.default_rng(1)) == ''
+    assert show(lambda *drawn: calls.append(drawn) or marked(thing()), *showing()) == ''
     assert len(calls) == 1 and not calls[0][1]
 
 
@@ -49,15 +55,17 @@ def test_a_bad_mask_is_mended_with_strokes():
     def segment(_region, strokes):
         return marked(thing()) if strokes else marked(thing(), beside=0.06)
     calls = []
-    assert show(lambda *drawn: calls.append(drawn) or segment(*drawn), thing(), IMAGE, np.random.default_rng(1)) == ''
+    FRAMES.clear()
+    assert show(lambda *drawn: calls.append(drawn) or segment(*drawn), *showing()) == ''
     assert [bool(strokes) for _, strokes in calls] == [False, True]
+    assert len(FRAMES) == 1, 'the second try is on another frame'
     assert {line.foreground for line in calls[1][1]} == {True, False}
 
 
 @pytest.mark.parametrize('wrong, says', [({'beside': 0.05}, '5 cm beside'), ({'larger': 0.06}, '6 cm larger'),
                                          ({'ok': False, 'message': 'no depth'}, 'no depth')])
 def test_what_stays_wrong_is_given_up_with_its_reason(wrong, says):
-    assert says in show(lambda *_: marked(thing(), **wrong), thing(), IMAGE, np.random.default_rng(1))
+    assert says in show(lambda *_: marked(thing(), **wrong), *showing())
 
 
 def test_an_eye_lets_pass_what_a_person_would():

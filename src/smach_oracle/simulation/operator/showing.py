@@ -42,13 +42,17 @@ def what_to_show(sight: Sight) -> Optional[Seen]:
     return min(seen, key=lambda body: float(np.hypot(*body.centre[:2])), default=None)
 
 
-def show(segment: Segment, thing: Seen, image: Tuple[int, int], generator: np.random.Generator) -> str:
+def show(segment: Segment, thing: Seen, image: Tuple[int, int], generator: np.random.Generator,
+         refresh: Callable[[], None]) -> str:
     """Mark a thing until the mask looks right; '' then, else what is wrong with the last one.
 
     :param image: its width and height, px.
+    :param refresh: asks for another frame, between two tries: glare passes.
     """
     wrong = ''
     for number in range(_TRIES):
+        if number:
+            refresh()
         strokes = strokes_on(thing.region, generator) if number % 2 else ()
         marked = segment(rectangle(thing.region, image, generator), strokes)
         wrong = marked.message or 'no object' if not marked.ok else looks_wrong(marked, thing)

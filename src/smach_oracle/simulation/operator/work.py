@@ -65,7 +65,8 @@ def _shown(job: Job, interfaces: Interfaces, eye: Eye) -> str:
         return str(err)
     if thing is None:
         return 'nothing of it can be seen'
-    return show(interfaces.drawing.segment, thing, interfaces.image, job.generator)
+    return show(interfaces.drawing.segment, thing, interfaces.image, job.generator,
+                lambda: interfaces.drawing.take_frame(_BEGIN_S))
 
 
 def _driven(job: Job, interfaces: Interfaces, eye: Eye) -> str:
