@@ -72,14 +72,19 @@ class ConsoleInABrowser(unittest.TestCase):
         shutil.rmtree(cls.bags, ignore_errors=True)
 
     @classmethod
-    def start_console(cls):
+    def start_console(cls, *more):
         return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
-                    '__name:=expert_console')
+                    '__name:=expert_console', *more)
 
     @classmethod
     def page_is_served(cls):
         with socket.socket() as probe:
             return probe.connect_ex(('127.0.0.1', cls.port)) == 0
+
+    @staticmethod
+    def token_of(role, path):
+        with open(path) as file:
+            return next(line.split()[1] for line in file if line.startswith(role))
 
     def outcomes(self, kind, field):
         return [getattr(event, field) for event in self.events if event.kind == kind]
@@ -171,6 +176,21 @@ class ConsoleInABrowser(unittest.TestCase):
             return commands
         self.assertTrue(wait_for(lambda: 'take_over' in told()))
         self.assertEqual(told()[:2], ['claim', 'answer'])
+
+    def test_6_with_tokens_a_viewer_signs_in_and_only_watches(self):
+        browser, tokens = self.browser, os.path.join(self.bags, 'tokens')
+        type(self).console.stop()
+        type(self).console = self.start_console('_token_file:=' + tokens)
+        for token, told in (('no such token', 'There is no such token.'), (None, 'bob (viewer)')):
+            field = browser.find('#token', 40.0)
+            field.clear()
+            field.send_keys(token or self.token_of('viewer', tokens))
+            browser.click('#sign-in')
+            self.assertTrue(browser.says(told), told)
+        browser.click('#tab-questions')
+        browser.click(QUESTION)
+        self.assertTrue(browser.says('You are signed in as a viewer'))
+        self.assertFalse(browser.find('.choice.goto').is_enabled())
 
 
 if __name__ == '__main__':
