@@ -7,12 +7,13 @@ from expert_fixtures import make_question
 from geometry_msgs.msg import PointStamped
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
-from smach_oracle.expert.console import sessions
+from smach_oracle.expert.console import robots, sessions
 from smach_oracle.expert.console.commands import Output
 from smach_oracle.expert.console.desk import BadOutput, items
 from smach_oracle.expert.console.helped import Score
 from smach_oracle.expert.console.robot import Robot
 from smach_oracle.expert.console.sections import Sections
+from smach_oracle.expert.console.trial_log import TrialLog
 from smach_oracle.expert.console.views import event_of, event_view, question_view
 from smach_oracle.expert.followed_server import Listed
 from smach_oracle.msg import OpenQuery, OracleEvent, OracleRates, StateRate, TransitionCount
@@ -129,6 +130,40 @@ def test_a_robot_s_topics_become_its_sections():
     assert sections.get('live /robot')['failed'] == {}
     robot.forget(sections)
     assert sections.since(0)[1] == []
+
+
+class FakeSubscriber:
+    made, unregistered = [], []
+
+    def __init__(self, topic, message, callback, queue_size):
+        self.topic, self.callback = topic, callback
+        self.made.append(self)
+
+    def unregister(self):
+        self.unregistered.append(self.topic)
+
+
+def test_robots_are_found_by_name_and_type_and_the_oldest_of_many_that_are_gone_are_forgotten(monkeypatch):
+    monkeypatch.setattr(robots.rospy, 'Subscriber', FakeSubscriber)
+    monkeypatch.setattr(robots, 'MOST_ROBOTS', 2)
+    sections, log = Sections(), TrialLog()
+    found = robots.Robots(sections, log, NoLayouter())
+    events = OracleEvent._type
+    found.follow([['/a/oracle/events', events], ['/b/oracle/events', 'std_msgs/String'], ['/c/other', events],
+                  ['/oracle/events', events]])
+    found.draw()
+    assert sections.get('robots') == ['/a']
+    next(each for each in FakeSubscriber.made if each.topic == '/a/oracle/events').callback(
+        OracleEvent(kind=OracleEvent.STATE_START, trial_id='t', path='TASK', state='A'))
+    found.draw()
+    assert sections.get('live /a')['alive'] and log.overview()['trials'][0]['robot'] == '/a'
+    for name in 'defg':
+        found.follow([['/{}/oracle/events'.format(name), events]])
+    found.follow([])
+    found.follow([])
+    found.draw()
+    assert sections.get('robots') == ['/f', '/g'] and sections.get('live /a') is None
+    assert '/a/oracle/events' in FakeSubscriber.unregistered and not sections.get('live /g')['alive']
 
 
 def test_a_session_survives_its_cookie_and_nothing_else_becomes_one():

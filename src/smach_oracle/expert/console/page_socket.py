@@ -6,6 +6,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Callable, Optional, Set
 
+import tornado.iostream
 import tornado.web
 import tornado.websocket
 

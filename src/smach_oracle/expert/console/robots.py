@@ -48,21 +48,20 @@ class Robots:
         self.follow(published)
 
     def follow(self, published: Sequence[Sequence[str]]) -> None:
-        """Subscribe to what is new; `published`: topics and their types."""
+        """Subscribe to what is new; `published`: topics and their types. One thread calls it."""
         seen = set()
         for topic, kind in published:
             for suffix, (message, _) in _TOPICS.items():
                 if topic.endswith(suffix) and kind == message._type and len(topic) > len(suffix):
                     seen.add(topic[:-len(suffix)])
-        with self._lock:
-            for name in sorted(seen - set(self._robots)):
-                self._begin(name)
-            for name, robot in list(self._robots.items()):
-                self._unseen[name] = 0 if name in seen else self._unseen.get(name, 0) + 1
-                robot.set_alive(self._unseen[name] < _GONE_AFTER)
-                if self._unseen[name] == _GONE_AFTER:
-                    self._log.end_missing(name)
-            self._forget_gone()
+        for name in sorted(seen - set(self._robots)):
+            self._begin(name)
+        for name, robot in list(self._robots.items()):
+            self._unseen[name] = 0 if name in seen else self._unseen.get(name, 0) + 1
+            robot.set_alive(self._unseen[name] < _GONE_AFTER)
+            if self._unseen[name] == _GONE_AFTER:
+                self._log.end_missing(name)
+        self._forget_gone()
 
     def draw(self) -> None:
         """Bring the sections up to date."""
@@ -79,10 +78,13 @@ class Robots:
             time.sleep(DISCOVERY_PERIOD_S)
 
     def _begin(self, name: str) -> None:
-        robot = self._robots[name] = Robot(name)
+        """Without the lock: a master that hangs while it is told must not hold the drawing up."""
+        robot = Robot(name)
         self._subscribers[name] = [
             rospy.Subscriber(name + suffix, message, self._receiver(robot, method), queue_size=_QUEUE)
             for suffix, (message, method) in _TOPICS.items()]
+        with self._lock:
+            self._robots[name] = robot
 
     def _receiver(self, robot: Robot, method: str) -> Callable[[Any], None]:
         take = getattr(robot, method)
@@ -100,5 +102,6 @@ class Robots:
         for name in gone[:max(0, len(self._robots) - MOST_ROBOTS)]:
             for subscriber in self._subscribers.pop(name):
                 subscriber.unregister()
-            self._robots.pop(name).forget(self._sections)
             del self._unseen[name]
+            with self._lock:
+                self._robots.pop(name).forget(self._sections)
