@@ -30,6 +30,7 @@ GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
 JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
 BEFORE = 0.10  # m that the hand comes straight
+PUSHES = 2  # until the door is shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 GRIP_EFFORT = 100.0  # N
 RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
@@ -68,9 +69,10 @@ def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
     _check_arm(arm)
     drive(means, odom_from_pose(kitchen, *CLOSING))
     view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
-    if view.angle >= STEP:
-        _push_shut(means, kitchen, arm, view)
-        view = look(means.robot, kitchen, np.array([-0.1, 0.05, GRASP_HEIGHT]))
+    for _ in range(PUSHES):
+        if view.angle >= STEP:
+            _push_shut(means, kitchen, arm, view)
+            view = look(means.robot, kitchen, np.array([-0.1, 0.05, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
         raise SkillError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
 
@@ -146,7 +148,8 @@ def _push_open(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> floa
         return _against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
     with _limb(means, kitchen, arm, view) as limb:
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6), ('door',))
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6), ('door',),
+                       lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
@@ -167,7 +170,8 @@ def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None
 
     with _limb(means, kitchen, arm, view) as limb:
         means.robot.gripper(arm, 0.0)
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4), ('door',))
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4), ('door',),
+                       lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle)
@@ -212,6 +216,12 @@ def _limb(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
 def _check_arm(arm: str) -> None:
     if arm not in ARMS:
         raise SkillError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+
+
+def _is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bool:
+    """Whether the arm touches nothing at joint positions, with the door where it was seen."""
+    _place_door(limb, kitchen, view.base_from_fridge, view.angle)
+    return limb.space.is_free(q)
 
 
 def _approach(limb: Arm, grasp: np.ndarray) -> Optional[np.ndarray]:

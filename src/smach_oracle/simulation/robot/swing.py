@@ -25,7 +25,7 @@ class Swing(NamedTuple):
 
 def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tuple[float, float], seed: np.ndarray,
                generator: np.random.Generator, is_free: IsFree,
-               may_begin: Callable[[np.ndarray], bool] = lambda q: True, tries: int = 15) -> Optional[Swing]:
+               may_begin: Callable[[np.ndarray], bool] = lambda q: True, tries: int = 45) -> Optional[Swing]:
     """The longest path found along `angles` (rad, in order, evenly spaced).
 
     :param turns: rad, the least and most that the hand may be turned against the door.

@@ -1,0 +1,169 @@
+"""The kitchen of the second use case: its map, its scenes, the door as it is seen, and the task from end to end."""
+import collections
+import itertools
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Header
+
+from smach_oracle.geometry.transforms import apply, from_rpy
+from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal
+from smach_oracle.simulation.robot.arm import Means, SkillError
+from smach_oracle.simulation.robot.collision import installed_model
+from smach_oracle.simulation.robot.door_view import DoorNotSeen, find_door
+from smach_oracle.simulation.robot.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
+from smach_oracle.simulation.robot.kitchen_skills import KitchenSkills
+from smach_oracle.simulation.world import drink_rehearsal
+from smach_oracle.simulation.world.direct import DirectRobot
+from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
+from smach_oracle.simulation.world.judge import judge
+from smach_oracle.simulation.world.kitchen_causes import CHANCE
+from smach_oracle.simulation.world.kitchen_scene import PALM, draw
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.tasks import drink_retrieval
+
+OPENING = (0.62, 0.02, 0.0)  # x, y, yaw from where the door is in view
+
+
+def door_at(degrees, base=OPENING, seed=1):
+    """A benign kitchen with the robot before the fridge and its door open by so much."""
+    scene = draw(seed, benign=True)
+    fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(degrees)),))
+    return scene._replace(bodies=(fridge,) + scene.bodies[1:], robot=scene.robot._replace(base=base))
+
+
+@pytest.mark.parametrize('settings, words', [
+    ({'widht': 0.6}, 'widht'), ({'width': -1}, 'width'), ({'width': 'wide'}, 'width'), ({'place': [1, 2]}, 'place'),
+    ({'drinks_shelf': 7}, 'drinks_shelf'), ({'shelves': []}, 'shelves'), ([1], 'dictionary')])
+def test_a_wrong_map_is_refused_by_the_name_of_what_is_wrong(settings, words):
+    with pytest.raises(ValueError, match=words):
+        kitchen_from(settings)
+
+
+def test_a_map_takes_what_is_given_and_the_usual_for_the_rest():
+    kitchen = kitchen_from({'place': [2, 0.5, 0.1], 'height': 1.6})
+    assert kitchen == Kitchen(place=(2.0, 0.5, 0.1), height=1.6)
+
+
+@pytest.mark.parametrize('degrees', [0, 55, 104])
+def test_the_handle_is_where_the_map_computes_it(degrees):
+    world = World(door_at(degrees))
+    inside = (-Kitchen().door_thickness - Kitchen().handle_stand_off, -(Kitchen().width - Kitchen().handle_inset), 1.0)
+    truth = apply(world.body_pose('fridge', 'door'), np.array(inside))
+    fridge = from_rpy((Kitchen().place[0], Kitchen().place[1], 0.0))
+    angle = world.body_joint('fridge', DOOR_JOINT)
+    assert np.allclose(truth, apply(fridge, handle_point(Kitchen(), angle, 1.0)), atol=1e-3)
+    world.close()
+
+
+def test_the_same_seed_gives_the_same_kitchen_and_a_benign_one_has_no_cause():
+    assert draw(7) == draw(7)
+    assert draw(7, benign=True).bodies != draw(8, benign=True).bodies
+    for seed in range(20):
+        assert not draw(seed, benign=True).causes and not draw(seed, benign=True).disturbances
+        if not draw(seed).causes:
+            assert draw(seed) == draw(seed, benign=True)
+    with pytest.raises(ValueError, match='-1'):
+        draw(-1)
+
+
+def test_all_causes_come_up_and_each_kitchen_can_be_built():
+    scenes = [draw(seed) for seed in range(300)]
+    counts = collections.Counter(cause.kind for scene in scenes for cause in scene.causes)
+    assert set(counts) == set(CHANCE)
+    assert all(cause.text for scene in scenes for cause in scene.causes)
+    world = World()
+    for kind in counts:
+        world.reset(next(scene for scene in scenes if kind in [cause.kind for cause in scene.causes]))
+        assert not judge(world, world.scene.goal).success
+    world.close()
+
+
+def test_drinks_stand_apart_on_their_shelf():
+    world = World()
+    for seed in (1, 2):
+        world.reset(draw(seed, benign=True))
+        places = [world.body_pose(name) for name in world.movable()]
+        assert len(places) >= 2
+        assert all(place[2, 2] > 0.999 and abs(place[2, 3] - 0.86) < 0.01 for place in places)
+        assert min(np.linalg.norm(one[:2, 3] - other[:2, 3]) for one, other in itertools.combinations(places, 2)) > 0.09
+    world.close()
+
+
+@pytest.mark.parametrize('degrees', [0, 45, 70])
+def test_the_door_is_seen_at_its_angle_though_the_map_is_a_little_wrong(degrees):
+    world = World(door_at(degrees))
+    robot = DirectRobot(world)
+    believed = base_from_fridge(Kitchen(), robot.odom_from_base()) @ from_rpy((0.03, -0.02, 0.0))
+    robot.look_at(apply(believed, np.array([-0.15, 0.05, 1.0])))
+    view = find_door(robot.see(), Kitchen(), believed)
+    truth = base_from_fridge(Kitchen(), world.true_base())
+    assert abs(view.angle - world.body_joint('fridge', DOOR_JOINT)) < np.radians(3.0)
+    seen, real = (apply(frame, handle_point(Kitchen(), view.angle, 1.0)) for frame in (view.base_from_fridge, truth))
+    assert view.handle_seen and np.linalg.norm(seen - real) < 0.015
+    world.close()
+
+
+def test_a_door_that_is_not_in_view_is_not_seen():
+    world = World(door_at(0))
+    robot = DirectRobot(world)
+    robot.look_at((0.5, -2.0, 1.0))
+    with pytest.raises(DoorNotSeen, match='not in view'):
+        find_door(robot.see(), Kitchen(), base_from_fridge(Kitchen(), robot.odom_from_base()))
+    world.close()
+
+
+def test_bad_goals_are_refused_with_what_is_allowed():
+    world = World(draw(1, benign=True))
+    skills = KitchenSkills(Means(DirectRobot(world), installed_model()), Kitchen())
+    for work, goal in ((skills.open_door, OpenDoorGoal('upper')), (skills.close_door, CloseDoorGoal('upper')),
+                       (skills.hand_over, HandOverGoal('upper', PoseStamped()))):
+        with pytest.raises(SkillError, match='left, right'):
+            work(goal, lambda status: None)
+    nowhere = PoseStamped(Header(frame_id='base_link'), Pose(Point(0.8, -0.6, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    with pytest.raises(SkillError, match='no hand waits'):
+        skills.hand_over(HandOverGoal('right', nowhere), lambda status: None)
+    nowhere.header.frame_id = 'kitchen'
+    with pytest.raises(SkillError, match="'kitchen'; allowed: base_footprint"):
+        skills.hand_over(HandOverGoal('right', nowhere), lambda status: None)
+    world.close()
+
+
+def test_the_rehearsal_goes_the_way_of_the_script():
+    assert drink_retrieval.PALM == PALM
+    assert drink_rehearsal.DRIVES == {'MOVE_IN': drink_retrieval.IN_THE_FRIDGE, 'MOVE_HOME': drink_retrieval.HOME,
+                                      'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE}
+    assert drink_rehearsal.TORSO_HEIGHT == drink_retrieval.TORSO_HEIGHT
+    world = World(draw(1, benign=True))
+    states = [name for name, _ in drink_rehearsal.DrinkTrial(world).states]
+    machine = drink_retrieval.make_machine()
+    label = machine.get_initial_states()[0]
+    for name in states:
+        assert label == name
+        label = next_of(machine, label)
+    assert label == 'succeeded'
+    world.close()
+
+
+def next_of(machine, label):
+    """Where a state's success leads."""
+    return next(edge[2] for edge in machine.get_internal_edges() if edge[0] == 'succeeded' and edge[1] == label)
+
+
+def test_a_drink_goes_from_the_closed_fridge_into_the_hand():
+    world = World(draw(3, benign=True))
+    for name, work in drink_rehearsal.DrinkTrial(world).states:
+        work()
+        if name == 'OPEN_FRIDGE':
+            assert world.body_joint('fridge', DOOR_JOINT) > np.radians(85.0)
+    world.step(60)
+    assert world.body_joint('fridge', DOOR_JOINT) < np.radians(8.0)
+    verdict = judge(world, world.scene.goal)
+    assert verdict.success, verdict.why
+    world.close()
+
+
+def test_the_fridge_is_a_model_of_its_map():
+    text = fridge_urdf(Kitchen(width=0.7, shelves=(0.5, 0.9)))
+    assert text.count('<link') == 2 and DOOR_JOINT in text and '0.7 ' in text
