@@ -1,9 +1,11 @@
 """Roles, tokens, hosts, origins and limits of the console, each tried as an attacker would."""
 import os
+import socket
 import stat
 
 import pytest
 
+from smach_oracle.expert.console import server
 from smach_oracle.expert.console.access import (Bucket, Buckets, Hosts, Identity, TokenBook, is_loopback, load_tokens,
                                                 may)
 from smach_oracle.expert.console.settings import read_settings
@@ -140,3 +142,11 @@ def test_a_wrong_parameter_is_named(parameters, problem):
 def test_loopback_is_told_by_address_not_by_looks():
     assert is_loopback('127.0.0.1') and is_loopback('::1') and is_loopback('localhost')
     assert not is_loopback('0.0.0.0') and not is_loopback('127.0.0.1.evil.example')
+
+
+def test_a_port_that_is_taken_is_named():
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen(1)
+        with pytest.raises(ConfigError, match='port that is free'):
+            server.Console(settings(port=taken.getsockname()[1]))

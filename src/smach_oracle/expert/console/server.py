@@ -1,10 +1,11 @@
 """The node `expert_console`: a web page from which people watch robots and answer their questions."""
 import secrets
+import socket
 import ssl
 import threading
 import time
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any, List, Optional
 
 import rospy
 import tornado.httpserver
@@ -58,9 +59,12 @@ class Console:
     """Everything behind the page."""
 
     def __init__(self, settings: ConsoleSettings) -> None:
-        """:raises OSError: where the address cannot be listened on, or the certificate not be read."""
+        """:raises ConfigError: where the address cannot be listened on.
+
+        :raises OSError: where the certificate cannot be read.
+        """
         tls = _tls(settings)
-        sockets = tornado.netutil.bind_sockets(settings.port, settings.address)
+        sockets = _listen(settings)
         port = sockets[0].getsockname()[1]
         self.url = '{}://{}:{}/'.format(settings.scheme, _shown(settings.address), port)
         self._sections = Sections()
@@ -100,6 +104,14 @@ class Console:
             except Exception as err:  # what one robot sends must not take the others' pages away
                 rospy.logerr_throttle(10, 'The page could not be brought up to date: {!r}'.format(err))
             time.sleep(DRAW_PERIOD_S)
+
+
+def _listen(settings: ConsoleSettings) -> List[socket.socket]:
+    try:
+        return tornado.netutil.bind_sockets(settings.port, settings.address)
+    except OSError as err:
+        raise ConfigError('~address, ~port', '{}, {}'.format(settings.address, settings.port),
+                          'an address of this machine and a port that is free ({})'.format(err)) from err
 
 
 def _tls(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
