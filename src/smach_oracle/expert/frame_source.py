@@ -42,7 +42,7 @@ class FrameSource:
         """
         :param rgb: topics; depth must be registered to colour.
         :param base_frame: the frame in which objects are told; its z axis points up.
-        :param snapshot: service (Snapshot) that publishes one frame and says its stamp; `none`: take the next that comes.
+        :param snapshot: service (Snapshot) that publishes a frame and says its stamp; `none`: take the next one.
         :param limit_s: wall time that a frame may take.
         """
         self.base_frame = base_frame

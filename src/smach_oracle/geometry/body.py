@@ -19,7 +19,7 @@ class Body(NamedTuple):
 
 
 def body_above(points: np.ndarray, surface: Optional[Plane], clearance: float) -> Optional[Body]:
-    """The largest piece that hangs together of points (n, 3), n >= 1, which are the object and some of what is behind it.
+    """The largest piece that hangs together of points (n, 3), n >= 1, of an object and some of what is behind it.
 
     :param surface: what it stands on, where that is known; else it reaches down to its lowest points.
     :param clearance: m above the surface; lower points belong to that.

@@ -1,4 +1,4 @@
-"""Between a depth image and points: a pinhole camera, z forward, x right, y down; pixel (u, v) is that pixel's centre."""
+"""Between a depth image and points: a pinhole camera, z forward, x right, y down; (u, v) is the centre of a pixel."""
 from typing import Tuple
 
 import numpy as np

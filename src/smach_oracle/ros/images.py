@@ -58,7 +58,7 @@ def mask_image(mask: np.ndarray, header: Header) -> Image:
 
 
 def cloud_message(points: np.ndarray, header: Header, colours: Optional[np.ndarray] = None) -> PointCloud2:
-    """Cloud of points (n, 3) in m, or (h, w, 3) for an organised one; `colours`, uint8 of the same shape, become `rgb`."""
+    """Cloud of points (n, 3) in m, or organised (h, w, 3); `colours`, uint8 of the same shape, become `rgb`."""
     fields = [(name, '<f4') for name in 'xyz'] + ([('rgb', '<u4')] if colours is not None else [])
     shape = points.shape[:-1]
     packed = np.zeros(shape, fields)
@@ -69,7 +69,8 @@ def cloud_message(points: np.ndarray, header: Header, colours: Optional[np.ndarr
         packed['rgb'] = red << 16 | green << 8 | blue
     height, width = (1, shape[0]) if len(shape) == 1 else shape
     return PointCloud2(header=header, height=height, width=width, is_bigendian=False, point_step=packed.itemsize,
-                       row_step=packed.itemsize * width, data=packed.tobytes(), is_dense=bool(np.isfinite(points).all()),
+                       row_step=packed.itemsize * width, data=packed.tobytes(),
+                       is_dense=bool(np.isfinite(points).all()),
                        fields=[PointField(name, 4 * index, PointField.FLOAT32, 1)  # rgb, too: so RViz and PCL have it
                                for index, (name, _) in enumerate(fields)])
 

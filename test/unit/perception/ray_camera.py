@@ -1,4 +1,4 @@
-"""A camera that sees boxes and upright cylinders by casting a ray per pixel: exact depth, colour, and whose pixel it is."""
+"""A camera that sees boxes and upright cylinders, a ray per pixel: exact depth, colour, and whose pixel it is."""
 from typing import NamedTuple, Sequence
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What a person draws on a frame becomes an object: masks against true pixels, centres against true places, refusals."""
+"""What a person draws on a frame becomes an object: masks against true pixels, centres against places, refusals."""
 import contextlib
 import time
 

@@ -121,7 +121,8 @@ def test_an_arm_that_is_not_known_of_is_no_object():
 
 def arm_body():
     middle, along = (ARM.start + ARM.end) / 2, ARM.end - ARM.start
-    return Body('arm', 'box', (np.linalg.norm(along), 0.1, 0.1), tuple(middle), yaw=float(np.arctan2(along[1], along[0])))
+    yaw = float(np.arctan2(along[1], along[0]))
+    return Body('arm', 'box', (np.linalg.norm(along), 0.1, 0.1), tuple(middle), yaw=yaw)
 
 
 def test_the_robot_takes_its_own_arm_out_of_what_it_sees():

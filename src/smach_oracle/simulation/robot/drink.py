@@ -1,4 +1,4 @@
-"""A drink in the open refrigerator in what the head camera sees: the shelf, about where the map has it, and what is on it."""
+"""A drink in the open refrigerator as the head camera sees it: the shelf, about where the map has it, what is on it."""
 from typing import List, Sequence, Tuple
 
 import numpy as np
@@ -80,7 +80,8 @@ def _in_front(view: View, plane: Plane, patch: np.ndarray, kitchen: Kitchen, bas
     lowest = max(OFF_SHELF, min_height if min_height > 0 else 0.03)
     found = clusters_on(view, plane, patch, lowest, float(high[2] - low[2]) - 0.02, MARGIN)
     inwards = base_from_fridge[:3, 0]
-    return sorted((each for each in found if each.box.narrow > SHEET), key=lambda cluster: float(cluster.box.centre @ inwards))
+    things = (each for each in found if each.box.narrow > SHEET)
+    return sorted(things, key=lambda cluster: float(cluster.box.centre @ inwards))
 
 
 def _why_no_drink(view: View, cluster: Cluster) -> str:
