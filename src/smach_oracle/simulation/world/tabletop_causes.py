@@ -16,7 +16,7 @@ TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.09, 'glare': 0.07, 'dim_light': 0.05, 'crowded': 0.07, 'slippery_object': 0.09,
+CHANCE = {'arm_in_view': 0.10, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.08, 'slippery_object': 0.06,
           'object_moved': 0.08, 'goal_occupied': 0.012, 'edge_of_reach': 0.012}
 
 
@@ -91,7 +91,7 @@ def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
-    friction = float(generator.uniform(0.025, 0.075))
+    friction = float(generator.uniform(0.05, 0.085))
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
     return _caused(draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
