@@ -137,7 +137,8 @@ class PerceptionInterface(unittest.TestCase):
     def corners(self):
         box = self.around()
         right, bottom = box.x_offset + box.width, box.y_offset + box.height
-        return [(box.x_offset, box.y_offset, 0), (right, box.y_offset, 0), (right, bottom, 0), (box.x_offset, bottom, 0)]
+        left, top = box.x_offset, box.y_offset
+        return [(left, top, 0), (right, top, 0), (right, bottom, 0), (left, bottom, 0)]
 
     def test_the_frame_of_the_goal_stays_while_the_world_goes_on(self):
         first = self.begin()
