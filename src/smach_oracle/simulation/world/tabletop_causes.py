@@ -16,7 +16,7 @@ TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.10, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.08, 'slippery_object': 0.06,
+CHANCE = {'arm_in_view': 0.08, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.08, 'slippery_object': 0.06,
           'object_moved': 0.08, 'goal_occupied': 0.012, 'edge_of_reach': 0.012}
 
 
@@ -48,10 +48,11 @@ def _arm_in_view(draft: Draft, generator: np.random.Generator) -> Optional[Draft
     chain = _left_arm()
     for _ in range(60):
         top = np.array(thing.position) + [0.0, 0.0, thing.size[2] / 2]
-        point = top + generator.uniform(0.3, 0.5) * (EYE - top) + [0.0, generator.uniform(-0.06, 0.02), 0.0]
-        pose = from_rpy(point, yaw=generator.uniform(-1.2, -0.2))
+        point = top + generator.uniform(0.2, 0.45) * (EYE - top) + [0.0, generator.uniform(-0.06, 0.02), 0.0]
+        angles = generator.uniform((-1.5, -0.2, -1.6), (1.5, 0.6, -0.2))
+        pose = from_rpy(point, *angles)
         q = chain.inverse(pose, np.array([0.6, 0.2, 1.2, -1.6, 0.0, -0.8, 0.0]), generator)
-        if q is not None and point[2] > TABLE_TOP + 0.24:
+        if q is not None and point[2] > TABLE_TOP + 0.22:
             turned = chain.nearest_turn(q, np.zeros(len(q)))
             values = tuple(zip(ARM_JOINTS['left'], (float(each) for each in turned)))
             return _caused(draft, 'arm_in_view', 'the left arm is pushed over the table, its hand {:.0f} cm above it'
@@ -91,7 +92,7 @@ def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
-    friction = float(generator.uniform(0.05, 0.085))
+    friction = float(generator.uniform(0.04, 0.07))
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
     return _caused(draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
