@@ -2,7 +2,7 @@
 """The simulated PR2 in lock-step, as its users meet it: actions, topics, transforms, snapshots."""
 import unittest
 import xml.etree.ElementTree as ElementTree
-from typing import Any, List
+from typing import Any, Dict, List
 
 import actionlib
 import numpy as np
@@ -48,7 +48,7 @@ class Heard:
 class Goal:
     """A goal that was sent, until it ends."""
 
-    clients = {}
+    clients: Dict[str, Any] = {}
 
     def __init__(self, name: str, spec: Any, goal: Any) -> None:
         if name not in self.clients:
@@ -131,7 +131,8 @@ class Pr2World(unittest.TestCase):
 
     def test_a_snapshot_is_of_one_moment_and_no_two_have_the_same(self) -> None:
         topics = [Heard(name, kind) for name, kind in (
-            ('joint_states', JointState), ('head_camera/rgb/image_raw', Image), ('head_camera/rgb/camera_info', CameraInfo),
+            ('joint_states', JointState), ('head_camera/rgb/image_raw', Image),
+            ('head_camera/rgb/camera_info', CameraInfo),
             ('head_camera/depth_registered/image_raw', Image), ('head_camera/depth_registered/points', PointCloud2))]
         self.assertTrue(wait_for(lambda: all(topic.subscriber.get_num_connections() for topic in topics)))
         first, second = (call('world/snapshot', Snapshot, camera) for camera in (False, True))
@@ -154,7 +155,7 @@ class Pr2World(unittest.TestCase):
         def missing() -> List[str]:
             stamp = call('world/snapshot', Snapshot, False).stamp
             return [link for link in links if not wait_for(
-                lambda: buffer.can_transform('odom_combined', link, stamp), 0.5)][:3]
+                lambda link=link: buffer.can_transform('odom_combined', link, stamp), 0.5)][:3]
         self.assertTrue(wait_for(lambda: not missing(), LIMIT_S), missing())
         listener.unregister()
 
@@ -168,8 +169,10 @@ class Pr2World(unittest.TestCase):
 
     def test_bad_goals_are_rejected_in_words(self) -> None:
         here = [0.0] * 7
-        bad = [(arm_goal([here], [1.0], ['elbow'] + RIGHT[1:]), "unknown joint 'elbow'"), (arm_goal([], []), 'no points'),
-               (arm_goal([[float('nan')] * 7], [1.0]), 'cannot be at nan'), (arm_goal([here[:3]], [1.0]), '3 positions'),
+        bad = [(arm_goal([here], [1.0], ['elbow'] + RIGHT[1:]), "unknown joint 'elbow'"),
+               (arm_goal([], []), 'no points'),
+               (arm_goal([[float('nan')] * 7], [1.0]), 'cannot be at nan'),
+               (arm_goal([here[:3]], [1.0]), '3 positions'),
                (arm_goal([[-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0], [0.5, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]], [0.1, 0.2]),
                 'its limit is')]
         for goal, words in bad:
