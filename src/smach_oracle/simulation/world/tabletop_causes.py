@@ -16,8 +16,8 @@ TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.08, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.08, 'slippery_object': 0.06,
-          'object_moved': 0.08, 'goal_occupied': 0.012, 'edge_of_reach': 0.012}
+CHANCE = {'arm_in_view': 0.085, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.04, 'slippery_object': 0.025,
+          'object_moved': 0.075, 'goal_occupied': 0.01, 'edge_of_reach': 0.008}
 
 
 class Draft(NamedTuple):
@@ -66,16 +66,16 @@ def _left_arm() -> Chain:
 
 
 def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
-    frames = int(generator.integers(1, 3))
+    frames = 2 if generator.random() < 0.25 else 1
     dropout = float(generator.uniform(0.92, 0.99))
-    return _caused(draft, 'glare', 'light falls into the camera for {} frames: {:.0f}% of the depth is lost'.format(
+    return _caused(draft, 'glare', 'light falls into the camera for {} frame(s): {:.0f}% of the depth is lost'.format(
         frames, 100 * dropout), Disturbance('glare', 'look_at', (('dropout', dropout), ('frames', frames))))
 
 
 def _dim_light(draft: Draft, generator: np.random.Generator) -> Draft:
     frames = int(generator.integers(1, 3))
     brightness = float(generator.uniform(0.02, 0.12))
-    return _caused(draft, 'dim_light', 'the light fails for {} frames, down to {:.0f}%'.format(
+    return _caused(draft, 'dim_light', 'the light fails for {} frame(s), down to {:.0f}%'.format(
         frames, 100 * brightness), Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', frames))))
 
 
