@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 from .plane import Plane
 
 PATCH_CELL = 0.02  # m, of the grid in which a surface is connected
+PATCH_SHARE = 0.1  # of the points of the largest piece that another one must have to count
 CLUSTER_CELL = 0.01  # m: things closer than this to each other are one piece
 LEAST_POINTS = 60  # of a thing
 FARTHEST = 6.0  # m from the first corner; whatever is further away is taken to be there
@@ -31,7 +32,10 @@ def largest_piece(points: np.ndarray, cell: float) -> np.ndarray:
 
 
 def largest_patch(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 3) of a level surface that belong to its largest connected piece, seen from above."""
+    """Those of the points (n, 3) of a level surface that belong to its largest connected piece, seen from above.
+
+    And to others that are not small against it: an arm in front of a table parts what is seen of it.
+    """
     if not len(points):
         return points
     cells = np.floor(np.minimum(points[:, :2] - points[:, :2].min(axis=0), FARTHEST) / PATCH_CELL).astype(int)
@@ -40,7 +44,7 @@ def largest_patch(points: np.ndarray) -> np.ndarray:
     labels = ndimage.label(ndimage.binary_closing(grid, iterations=2), np.ones((3, 3)))[0][tuple(cells.T + 2)]
     sizes = np.bincount(labels)
     sizes[0] = 0
-    return points[labels == sizes.argmax()] if sizes.any() else points[:0]
+    return points[(sizes >= max(1, PATCH_SHARE * sizes.max()))[labels]]
 
 
 def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
