@@ -18,7 +18,7 @@ import numpy as np
 
 from .rigid_links import inertia_of, merge_rigid_links, set_inertia
 
-MENDED = 3  # raise it when what is derived here changes: it names the cache's folder
+MENDED = 4  # raise it when what is derived here changes: it names the cache's folder
 BASE_JOINTS = ('base_x', 'base_y', 'base_theta')  # of the mobile model: m, m, rad in the world
 JAW_OPEN = 0.045  # m, each finger from its closed place
 JAW_SHIFT = 0.00187  # m outwards, of each closed finger: as they are, the tips are within each other
@@ -123,6 +123,8 @@ def _write(share: Path, draft: Path, folder: Path) -> None:
     for joint in robot.findall('joint'):
         _mend_joint(joint)
     tree.write(str(draft / 'pr2.urdf'))
+    for link in robot.findall('link'):
+        _drop_placeholders(link)
     merge_rigid_links(robot)
     _put_on_wheels(robot)
     tree.write(str(draft / 'pr2_mobile.urdf'))
@@ -150,6 +152,13 @@ def _give_inertia(link: ElementTree.Element) -> None:
     moments = np.linalg.eigvalsh(inertia_of(inertial))
     if moments[0] < LEAST_INERTIA or moments[2] > moments[0] + moments[1]:  # no body has such
         set_inertia(inertial, np.eye(3) * max(LEAST_INERTIA, moments[2]))
+
+
+def _drop_placeholders(link: ElementTree.Element) -> None:
+    """Boxes that stand for cameras: some are around the very eye, where the renderer divides by their depth of 0."""
+    for visual in link.findall('visual'):
+        if visual.find('geometry/mesh') is None:
+            link.remove(visual)
 
 
 def _inertial(link: ElementTree.Element, mass: float, inertia: float) -> None:

@@ -14,6 +14,7 @@ RESERVED = ('robot', 'floor')  # names that no body of a scene may have
 SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER}
 FLOOR_COLOUR = (0.62, 0.60, 0.57, 1.0)
 FLOOR_SIZE = 12.0  # m, of what is seen of it
+SIDES = 36  # of what is seen of a cylinder
 TURNING_FRICTION = 0.002  # m, against spinning and rolling
 
 
@@ -103,11 +104,28 @@ def _create(client: int, body: Body, turn: Sequence[float]) -> int:
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
     else:
         solid = {'radius': body.size[0], 'height': body.size[2]}
-        seen = {'radius': body.size[0], 'length': body.size[2]}
+        seen = _drum(body.size[0], body.size[2])
     shape = pybullet.createCollisionShape(SHAPES[body.shape], physicsClientId=client, **solid)
-    skin = pybullet.createVisualShape(SHAPES[body.shape], rgbaColor=[*body.colour, 1.0], physicsClientId=client, **seen)
+    skin = pybullet.createVisualShape(pybullet.GEOM_BOX if body.shape == 'box' else pybullet.GEOM_MESH,
+                                      rgbaColor=[*body.colour, 1.0], physicsClientId=client, **seen)
     index: int = pybullet.createMultiBody(body.mass, shape, skin, list(body.position), turn, physicsClientId=client)
     return index
+
+
+def _drum(radius: float, height: float) -> Dict[str, Any]:
+    """A cylinder as a mesh whose edges are edges: PyBullet's own is shaded as if they were round."""
+    angles = np.arange(SIDES) * 2 * np.pi / SIDES
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    vertices, normals, indices = [], [], []
+    for z, up in ((-height / 2, 0.0), (height / 2, 0.0), (-height / 2, -1.0), (height / 2, 1.0)):
+        vertices.append(np.column_stack([radius * circle, np.full(SIDES, z)]))
+        normals.append(np.column_stack([circle * (up == 0.0), np.full(SIDES, up)]))
+    for k in range(SIDES):
+        after = (k + 1) % SIDES
+        indices += [k, after, SIDES + after, k, SIDES + after, SIDES + k]
+        if 0 < k < SIDES - 1:
+            indices += [2 * SIDES, 2 * SIDES + after, 2 * SIDES + k, 3 * SIDES, 3 * SIDES + k, 3 * SIDES + after]
+    return {'vertices': np.vstack(vertices).tolist(), 'normals': np.vstack(normals).tolist(), 'indices': indices}
 
 
 def _load(client: int, body: Body, turn: Sequence[float]) -> int:
