@@ -27,7 +27,7 @@ TORSO_HEIGHT = 0.25  # m
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
 OUT_OF_THE_FRIDGE = (0.65, -0.30, 0.0)
 HOME = (0.0, 0.0, math.pi / 2)
-PALM = (0.10, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
+PALM = (0.0, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
 
 
 def make_machine() -> smach.StateMachine:

@@ -13,7 +13,7 @@ from .door_view import DoorNotSeen, DoorView, find_door
 from .interface import ARMS, GRIPPER_OPEN, Robot
 from .kitchen import Kitchen, MapBox, base_from_fridge, door_frame, fridge_boxes, handle_point, odom_from_pose
 from .swing import Swing, best_swing
-from .travel import TRAVEL, draw_back, drive, stow
+from .travel import TRAVEL, carry, draw_back, drive, stow
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
@@ -24,6 +24,7 @@ AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
 PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside
 WIDE = np.radians(104.0)  # as far as the door is opened
 STEP = np.radians(4.0)
+AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 AWAY = 0.16  # m that the base takes the hand back from the bar
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
@@ -68,6 +69,7 @@ def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
     """
     _check_arm(arm)
     drive(means, odom_from_pose(kitchen, *CLOSING))
+    _clear_of_door(means, next(other for other in ARMS if other != arm))
     view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
     for _ in range(PUSHES):
         if view.angle >= STEP:
@@ -85,6 +87,13 @@ def _stand_before(means: Means, kitchen: Kitchen) -> DoorView:
     _stow_beside(means, kitchen, WIDE)
     drive(means, odom_from_pose(kitchen, *OPENING))
     return look(means.robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+
+
+def _clear_of_door(means: Means, arm: str) -> None:
+    """Take a hand that reaches ahead into the door's way to the side, with what it may hold."""
+    with Arm(means, arm, {}, seed_of(arm, read_joints(means.robot))) as limb:
+        if limb.pose()[0, 3] > AHEAD:
+            carry(limb)
 
 
 def _step_back(means: Means, length: float) -> None:

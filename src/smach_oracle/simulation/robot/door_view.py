@@ -1,4 +1,4 @@
-"""Where the refrigerator's door stands, from what the camera sees of it: its angle, and its handle where it is in view."""
+"""Where the refrigerator's door stands, from what the camera sees: its angle, and its handle where it is in view."""
 from typing import NamedTuple, Optional
 
 import numpy as np

@@ -5,16 +5,14 @@ import numpy as np
 
 from ...geometry.box import UprightBox
 from ...geometry.transforms import from_rpy
-from .arm import Arm, Means, SkillError, Unreachable, seed_of
+from .arm import Arm, Means, SkillError, seed_of
 from .door import named_boxes
 from .interface import GRIPPER_OPEN
 from .kitchen import Kitchen, MapBox
 from .pick import Held, pick
-from .travel import drive, stow
+from .travel import carry, drive, stow
 
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
-CARRY_SPEED = 0.3
-CARRIES = ((0.45, -0.30, -0.2), (0.42, -0.22, 0.0), (0.48, -0.35, -0.4))  # x, y in m, yaw of the hand that carries
 OPEN_DOOR = np.radians(104.0)
 PADDING = 0.015  # m
 BESIDE = 0.004  # m around things on the shelf
@@ -37,7 +35,7 @@ def pick_from_fridge(means: Means, kitchen: Kitchen, base_from_fridge: np.ndarra
         _draw_out(means)
         with Arm(means, arm, {}, seed_of(arm, held.grasp)) as hand:
             hand.space.attach(held.half, held.tool_from_object)
-            _carry(hand)
+            carry(hand)
             if hand.close() == 0:
                 raise SkillError('the drink was lost on the way out of the refrigerator')
     except SkillError:
@@ -54,24 +52,6 @@ def _padded(box: MapBox) -> MapBox:
 def _draw_out(means: Means) -> None:
     """The base takes the arm straight out of the fridge, as it is: the arm need not be able to."""
     drive(means, means.robot.odom_from_base() @ from_rpy((-STEP_BACK, 0.0, 0.0)))
-
-
-def _carry(hand: Arm) -> None:
-    """To the robot's side, level all the way if the arm can."""
-    here = hand.pose()
-    for x, y, yaw in CARRIES:
-        goal = from_rpy((x, y if hand.name == 'right' else -y, here[2, 3]), yaw=yaw)
-        way = hand.line(hand.now(), goal)
-        if way is not None:
-            hand.follow(way, CARRY_SPEED)
-            return
-        try:
-            found = hand.reach(goal, near=hand.now())
-        except Unreachable:
-            continue
-        if found:
-            hand.go(found[0], CARRY_SPEED)
-            return
 
 
 def _leave(means: Means, arm: str) -> None:

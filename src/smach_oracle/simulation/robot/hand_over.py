@@ -14,6 +14,7 @@ NEAR = 0.16  # m around the place where the palm is expected, horizontally
 LEVEL = 0.06  # m, vertically
 LEAST_POINTS = 150
 LEAST_EXTENT = 0.06  # m that a palm extends
+LEAST_HALF = 0.11  # m: part of it may be hidden
 THICK = 0.03  # m of a hand
 STRIDE = 2
 
@@ -53,4 +54,4 @@ def find_palm(frame: Frame, expected: np.ndarray) -> MapBox:
             *(100 * (high - low))))
     centre = (low + high) / 2
     return MapBox(np.array([centre[0], centre[1], height - THICK / 2]),
-                  np.array([(high - low)[0] / 2, (high - low)[1] / 2, THICK / 2]), 0.0)
+                  np.array([*np.maximum((high - low) / 2, LEAST_HALF), THICK / 2]), 0.0)

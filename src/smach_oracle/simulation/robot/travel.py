@@ -3,7 +3,8 @@ from typing import Iterable, Mapping
 
 import numpy as np
 
-from .arm import Arm, Means, SkillError, read_joints, seed_of
+from ...geometry.transforms import from_rpy
+from .arm import Arm, Means, SkillError, Unreachable, read_joints, seed_of
 from .interface import RobotError
 from .kitchen import MapBox
 
@@ -11,6 +12,9 @@ from .kitchen import MapBox
 TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
           'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0])}
 NEAR_ENOUGH = 0.06  # rad
+CARRIES = ((0.45, -0.38, -0.2), (0.45, -0.38, 0.2), (0.45, -0.32, -0.2), (0.48, -0.42, -0.5))  # m, m, rad: where the right hand carries
+CARRY_HEIGHTS = (0.85, 1.00)  # m
+CARRY_SPEED = 0.3
 
 
 def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None:
@@ -24,6 +28,24 @@ def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None
             now = limb.now()
             if np.abs(limb.chain.nearest_turn(TRAVEL[arm], now) - now).max() > NEAR_ENOUGH:
                 limb.go(TRAVEL[arm])
+
+
+def carry(limb: Arm) -> None:
+    """Take the hand to the robot's side, level in the end, the elbow low and out of the camera's view.
+
+    :raises SkillError: where the arm does not get there.
+    """
+    height = min(max(limb.pose()[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
+    for x, y, yaw in CARRIES:
+        side = 1.0 if limb.name == 'right' else -1.0
+        try:
+            found = limb.reach(from_rpy((x, side * y, height), yaw=side * yaw), near=TRAVEL[limb.name])
+        except Unreachable:
+            continue
+        if found:
+            limb.go(found[0], CARRY_SPEED)
+            return
+    raise SkillError('the {} arm cannot take what it holds to the side'.format(limb.name))
 
 
 def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -> None:

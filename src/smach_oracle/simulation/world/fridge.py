@@ -1,4 +1,4 @@
-"""The refrigerator as a URDF model of our own: a body with shelves, a door on a hinge with a vertical bar for a handle."""
+"""The refrigerator as a URDF model of our own: a body with shelves, a door on a hinge, a vertical bar for a handle."""
 import xml.etree.ElementTree as ElementTree
 from typing import Tuple
 

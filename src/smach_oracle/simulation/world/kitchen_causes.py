@@ -1,4 +1,4 @@
-"""Why a trial in the kitchen may fail: each cause is physical, is drawn from the trial's seed, and is told to nobody."""
+"""Why a trial in the kitchen may fail: each cause is physical, drawn from the trial's seed, and told to nobody."""
 from typing import Callable, Dict, List, NamedTuple, Tuple
 
 import numpy as np

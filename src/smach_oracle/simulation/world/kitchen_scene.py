@@ -12,7 +12,7 @@ from .scene import Body, Goal, RobotStart, Scene, Vector
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
-PALM: Vector = (0.10, 0.62, 0.85)  # the middle of its upper face
+PALM: Vector = (0.0, 0.62, 0.85)  # the middle of its upper face
 PALM_SIZE: Vector = (0.20, 0.20, 0.03)
 SKIN, SHIRT, TROUSERS = (0.87, 0.68, 0.55), (0.25, 0.42, 0.62), (0.20, 0.22, 0.27)
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
@@ -33,7 +33,8 @@ def draw(seed: int, benign: bool = False) -> Scene:
     draft = Draft(tuple(_drinks(generator, kitchen)), kitchen.place[:2])
     if not benign:
         draft = with_causes(draft, seed)
-    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + _person(), Goal('in_hand', '', PALM, PALM_SIZE[0] / 2),
+    goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
+    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + _person(), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error), disturbances=draft.disturbances,
                  causes=draft.causes)
 
