@@ -126,6 +126,7 @@ def test_clients_are_given_back(world):
     (scene(CAN._replace(shape='urdf', urdf='<robot')), "'can': its urdf cannot be read"),
     (scene(CAN._replace(shape='urdf', urdf='<robot name="a"><link name="b"/></robot>', joints=(('hinge', 0.0),))),
      "'can': no joint 'hinge'"),
+    (scene(CAN._replace(shape='urdf', joints=(('hinge', math.nan),))), "'can': joint 'hinge' is given nan"),
     (scene()._replace(goal=scene().goal._replace(body='cup')), "'cup'.*can, carton"),
     (scene(sensor=Sensor(dropout=1.5)), 'dropout'),
     (scene(robot=RobotStart((('r_elbow_joint', 0.0),))), "no joint 'r_elbow_joint'"),

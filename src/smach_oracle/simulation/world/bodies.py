@@ -64,6 +64,10 @@ def _check_body(body: Body) -> None:
     if not (_finite((body.mass, body.friction)) and body.mass >= 0 and body.friction >= 0):
         raise SceneError('body {!r}: mass {} or friction {}; allowed: 0 or more'.format(
             body.name, body.mass, body.friction))
+    for joint, value in body.joints + body.joint_friction:
+        if not _finite([value]):
+            raise SceneError('body {!r}: joint {!r} is given {}; allowed: finite numbers'.format(
+                body.name, joint, value))
     if body.shape != 'urdf' and not (len(body.size) == 3 and _finite(body.size) and min(body.size) > 0):
         raise SceneError('body {!r}: size is {}; allowed: three lengths above 0 m'.format(body.name, body.size))
 

@@ -11,7 +11,7 @@ import pybullet
 
 from ...geometry.transforms import from_rpy, inverse
 from ..robot.interface import ARMS, TOOL_FRAME
-from .bodies import Placed, SceneError, add_body, add_floor, check_scene, pose_of
+from .bodies import Placed, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 from .scene import Body, Goal, Scene
@@ -49,7 +49,7 @@ class World:
         try:
             floor, robot, placed = self._build(client, scene)
             disturbances = Disturbances(scene, robot)
-        except (SceneError, pybullet.error):
+        except Exception:
             pybullet.disconnect(client)
             raise
         self.close()

@@ -1,5 +1,5 @@
 """Pictures of the world from a camera that nobody carries: for people, not for the robot."""
-from typing import List, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from .camera import View
 from .physics import World
 
 SIZE = (960, 640)  # pixels
-EYE, TARGET = (2.6, -2.2, 1.9), (0.45, -0.05, 0.78)  # m, in the world
 LIGHT = {'shadow': 1, 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.48, 'lightSpecularCoeff': 0.12,
          'lightDistance': 6.0}
 LIGHT_TURN, LIGHT_HEIGHT = np.radians(40.0), 4.0  # where it stands: to the left of the camera, rad, and m above
@@ -17,14 +16,27 @@ BACKGROUND = (236, 238, 241)
 FINER = 2  # times more pixels are drawn, each way, than shown
 
 
-def portrait(world: World, size: Tuple[int, int] = SIZE, eye: Sequence[float] = EYE,
-             target: Sequence[float] = TARGET, field_of_view: float = 34.0) -> np.ndarray:
-    """(h, w, 3) uint8 RGB: the world as seen from `eye` towards `target` (m, in the world).
+class Viewpoint(NamedTuple):
+    """Where somebody stands with a camera."""
+
+    eye: Tuple[float, float, float]  # m, in the world
+    target: Tuple[float, float, float]  # m, what is in the middle of the picture
+    field_of_view: float  # degrees, from top to bottom
+
+
+AT_TABLE = Viewpoint((2.6, -2.2, 1.9), (0.45, -0.05, 0.78), 34.0)
+AT_FRIDGE = Viewpoint((0.75, -2.75, 1.95), (1.05, 0.0, 0.8), 38.0)
+AT_HOME = Viewpoint((2.5, -2.9, 2.0), (0.45, -0.15, 0.8), 42.0)  # with the person and the fridge
+USUAL = {'drink_retrieval': AT_FRIDGE}  # by task; others: AT_TABLE
+
+
+def portrait(world: World, size: Tuple[int, int] = SIZE, viewpoint: Optional[Viewpoint] = None) -> np.ndarray:
+    """(h, w, 3) uint8 RGB: the world as seen from a viewpoint, or from the usual one of its task.
 
     :param size: width and height, pixels.
-    :param field_of_view: degrees, from top to bottom.
     """
     width, height = size
+    eye, target, field_of_view = USUAL.get(world.scene.task, AT_TABLE) if viewpoint is None else viewpoint
     view = View(world, _looking(eye, target), (FINER * width, FINER * height), field_of_view, FAR,
                 lightDirection=_light(eye, target), **LIGHT)
     view.colour[view.bodies < 0] = BACKGROUND
