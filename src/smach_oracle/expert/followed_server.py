@@ -70,6 +70,14 @@ class _ServiceCall(threading.Thread):
         return self._response
 
 
+def call_service(name: str, kind: type, request: object, limit_s: float = CALL_LIMIT_S) -> Any:
+    """Call a service, waiting no longer than `limit_s`.
+
+    :raises ServerGoneError: if there is no such service now, or no answer in time.
+    """
+    return _ServiceCall(name, kind, request).result(limit_s)
+
+
 class FollowedServer:
     """Follows the open list of one server and calls its services.
 

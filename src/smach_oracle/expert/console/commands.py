@@ -5,16 +5,16 @@ or a type to call: questions are named by their keys, and must be open ones.
 """
 import json
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Tuple
+from typing import Any, Dict, List, NamedTuple
 
 from ...oracle.errors import OracleError
+from .checks import QUESTION, Spec, one_of, shown, text
+from .eye_commands import EYE_COMMANDS
 
 MOST_BYTES = 65536
 _MOST_OUTPUTS = 64
 _DEEPEST = 32
 KINDS = ('goto', 'supersede', 'give_up', 'interface')
-
-Check = Callable[[Any], Any]
 
 
 class BadCommand(OracleError):
@@ -52,12 +52,12 @@ def parse(text: Any) -> Command:
         raise BadCommand('"id" must be a whole number from 1')
     name = data.pop('do', None)
     if not isinstance(name, str) or name not in COMMANDS:
-        raise BadCommand('there is no command {}; allowed: {}'.format(_shown(name), ', '.join(sorted(COMMANDS))),
+        raise BadCommand('there is no command {}; allowed: {}'.format(shown(name), ', '.join(sorted(COMMANDS))),
                          number)
     checks = COMMANDS[name].checks
     unknown = sorted(set(data) - set(checks))
     if unknown:
-        raise BadCommand('{} takes no {}'.format(name, _shown(unknown[0])), number)
+        raise BadCommand('{} takes no {}'.format(name, shown(unknown[0])), number)
     try:
         return Command(number, name, {field: check(data.get(field)) for field, check in checks.items()})
     except ValueError as err:
@@ -87,32 +87,11 @@ def _refuse(name: str) -> float:
     raise ValueError('{} is not a JSON number'.format(name))
 
 
-def _text(longest: int, least: int = 0) -> Check:
-    def check(value: Any) -> str:
-        if value is None and not least:
-            return ''
-        if not isinstance(value, str) or not least <= len(value) <= longest:
-            raise ValueError('{} is not allowed; allowed: text of {} to {} characters'.format(
-                _shown(value), least, longest))
-        if any(ord(character) < 32 and character not in '\n\t' for character in value):
-            raise ValueError('control characters are not allowed')
-        return value.encode('utf-8', 'replace').decode('utf-8')
-    return check
-
-
 def _person(value: Any) -> str:
-    name = ' '.join(_text(60)(value).split())
+    name = ' '.join(text(60)(value).split())
     if not name.isprintable():
         raise ValueError('a name is made of printable characters')
     return name
-
-
-def _one_of(allowed: Tuple[str, ...]) -> Check:
-    def check(value: Any) -> str:
-        if value not in allowed:
-            raise ValueError('{} is not allowed; allowed: {}'.format(_shown(value), ', '.join(allowed)))
-        return str(value)
-    return check
 
 
 def _outputs(value: Any) -> List[Output]:
@@ -130,7 +109,7 @@ def _output(value: Any) -> Output:
     if not isinstance(value, dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
         raise ValueError('an output is {"key": ..., "value": ..., "type": ...}')
     _check_depth(value['value'])
-    return Output(_text(200, 1)(value['key']), value['value'], _text(200)(value.get('type')))
+    return Output(text(200, 1)(value['key']), value['value'], text(200)(value.get('type')))
 
 
 def _check_depth(value: Any) -> None:
@@ -149,23 +128,13 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 < value < 2 ** 53
 
 
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:60] + '…'
-
-
-class _Spec(NamedTuple):
-    role: str
-    checks: Dict[str, Check]
-
-
-_QUESTION = {'question': _text(1000, 1)}
-COMMANDS = {
-    'hello': _Spec('viewer', {'xsrf': _text(200, 1), 'expert': _person}),
-    'watch': _Spec('viewer', {'trial': _text(400)}),
-    'claim': _Spec('operator', _QUESTION),
-    'take_over': _Spec('operator', _QUESTION),
-    'release': _Spec('operator', _QUESTION),
-    'answer': _Spec('operator', dict(_QUESTION, kind=_one_of(KINDS), name=_text(400), outputs=_outputs,
-                                     why=_text(2000))),
+COMMANDS: Dict[str, Spec] = {
+    'hello': Spec('viewer', {'xsrf': text(200, 1), 'expert': _person}),
+    'watch': Spec('viewer', {'trial': text(400)}),
+    'claim': Spec('operator', QUESTION),
+    'take_over': Spec('operator', QUESTION),
+    'release': Spec('operator', QUESTION),
+    'answer': Spec('operator', dict(QUESTION, kind=one_of(KINDS), name=text(400), outputs=_outputs,
+                                    why=text(2000))),
+    **EYE_COMMANDS,
 }

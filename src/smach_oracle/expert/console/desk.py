@@ -1,7 +1,7 @@
 """Carries out what people say to questions: claims, which it keeps alive as long as their browsers are there, and
 answers. Called from several threads; a call may take as long as a robot's service does (5 s at most)."""
 import threading
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import genpy
 import roslib.message
@@ -30,6 +30,10 @@ class Reply(NamedTuple):
 
     ok: bool
     message: str = ''
+    data: Any = None  # plain; None where there is nothing more to tell
+
+
+Worker = Callable[[Command, Person, Listed], Reply]  # may raise ServerGoneError
 
 
 class BadOutput(OracleError):
@@ -39,15 +43,17 @@ class BadOutput(OracleError):
 class Desk:
     """Works on the open questions of a front end, for several people at once."""
 
-    def __init__(self, front_end: FrontEnd, audit: Audit) -> None:
+    def __init__(self, front_end: FrontEnd, audit: Audit, others: Mapping[str, Worker]) -> None:
+        """`others`: who carries out further commands about questions, by the commands' names."""
         self._front_end = front_end
+        self._others = others
         self._audit = audit
         self._lock = threading.Lock()
         self._held: Dict[Tuple[str, str], Set[int]] = {}  # question, expert -> browsers that show it
         threading.Thread(target=self._keep_claims, name='keep claims', daemon=True).start()
 
     def carry_out(self, command: Command, person: Person, browser: int) -> Reply:
-        """Do one of claim, take_over, release and answer, and tell the audit."""
+        """Do one of claim, take_over, release, answer and the others' commands, and tell the audit."""
         listed = self._front_end.find(command.arguments['question'])
         reply = self._try(command, person, browser, listed)
         arguments = {name: value for name, value in command.arguments.items() if name != 'question'}
@@ -64,6 +70,8 @@ class Desk:
         if listed is None:
             return Reply(False, 'This question is open no longer.')
         try:
+            if command.name in self._others:
+                return self._others[command.name](command, person, listed)
             if command.name == 'answer':
                 return self._answer(command, person, listed)
             return self._claim(command.name, person, browser, listed)

@@ -158,7 +158,8 @@ class Socket(tornado.websocket.WebSocketHandler):
         return reply
 
     def _reply(self, number: int, reply: Reply) -> None:
-        self._send(json.dumps({'re': number, 'ok': reply.ok, 'message': reply.message}))
+        told = {'re': number, 'ok': reply.ok, 'message': reply.message}
+        self._send(json.dumps(told if reply.data is None else dict(told, data=reply.data), allow_nan=False))
 
     def push(self) -> None:
         """Send what has changed, unless the last batch is still on its way: a slow link never builds up lag."""

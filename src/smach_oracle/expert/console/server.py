@@ -73,7 +73,7 @@ class Console:
         self._robots = Robots(self._sections, self._log, Layouter())
         self._front_end = FrontEnd('expert_console')
         self._board = QuestionBoard(self._front_end, self._log)
-        self._office = Office(self._sections, self._log, Desk(self._front_end, self._audit))
+        self._office = Office(self._sections, self._log, Desk(self._front_end, self._audit, {}))
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office)
         server = tornado.httpserver.HTTPServer(
