@@ -14,10 +14,11 @@ TABLE_TOP = 0.72  # m
 GOAL = (0.60, -0.35)  # m, where the task puts the object
 TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
+ROOM = 0.12  # m, around where the nearest thing is moved to
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {'arm_in_view': 0.085, 'glare': 0.08, 'dim_light': 0.06, 'crowded': 0.04, 'slippery_object': 0.025,
-          'object_moved': 0.075, 'goal_occupied': 0.01, 'edge_of_reach': 0.008}
+CHANCE = {'arm_in_view': 0.075, 'glare': 0.07, 'dim_light': 0.05, 'crowded': 0.03, 'slippery_object': 0.02,
+          'object_moved': 0.07, 'goal_occupied': 0.006, 'edge_of_reach': 0.005}
 
 
 class Draft(NamedTuple):
@@ -66,17 +67,16 @@ def _left_arm() -> Chain:
 
 
 def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
-    frames = 2 if generator.random() < 0.25 else 1
+    frames = 2 if generator.random() < 0.15 else 1
     dropout = float(generator.uniform(0.92, 0.99))
     return _caused(draft, 'glare', 'light falls into the camera for {} frame(s): {:.0f}% of the depth is lost'.format(
         frames, 100 * dropout), Disturbance('glare', 'look_at', (('dropout', dropout), ('frames', frames))))
 
 
 def _dim_light(draft: Draft, generator: np.random.Generator) -> Draft:
-    frames = int(generator.integers(1, 3))
     brightness = float(generator.uniform(0.02, 0.12))
-    return _caused(draft, 'dim_light', 'the light fails for {} frame(s), down to {:.0f}%'.format(
-        frames, 100 * brightness), Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', frames))))
+    return _caused(draft, 'dim_light', 'the light fails for one frame, down to {:.0f}%'.format(100 * brightness),
+                   Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', 1))))
 
 
 def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
@@ -99,13 +99,19 @@ def _slippery_object(draft: Draft, generator: np.random.Generator) -> Draft:
                    'the nearest thing is slippery and heavy: friction {:.2f}, {:.2f} kg'.format(friction, mass))
 
 
-def _object_moved(draft: Draft, generator: np.random.Generator) -> Draft:
-    """Somebody moves the nearest thing after it has been detected."""
-    way = float(generator.uniform(0.05, 0.08))
-    heading = float(generator.uniform(-0.9, 0.9))  # away from the robot
-    values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration', 0.8))
-    return _caused(draft, 'object_moved', 'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(
-        100 * way), Disturbance('nudge:' + draft.things[TARGET].name, 'see', values))
+def _object_moved(draft: Draft, generator: np.random.Generator) -> Optional[Draft]:
+    """Somebody moves the nearest thing after it has been detected, to where there is room."""
+    thing = draft.things[TARGET]
+    for _ in range(20):
+        way = float(generator.uniform(0.05, 0.08))
+        heading = float(generator.uniform(-0.9, 0.9))  # away from the robot
+        spot = (thing.position[0] + way * np.cos(heading), thing.position[1] + way * np.sin(heading))
+        if all(np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > ROOM for other in draft.things[1:]):
+            values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration', 0.8))
+            return _caused(draft, 'object_moved',
+                           'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(100 * way),
+                           Disturbance('nudge:' + thing.name, 'see', values))
+    return None
 
 
 def _goal_occupied(draft: Draft, generator: np.random.Generator) -> Draft:
