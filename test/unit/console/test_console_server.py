@@ -14,6 +14,7 @@ from smach_oracle.expert.console.desk import Reply
 from smach_oracle.expert.console.handlers import Gate
 from smach_oracle.expert.console.page_socket import Office
 from smach_oracle.expert.console.sections import Sections
+from smach_oracle.expert.console.sensors import Sensors
 from smach_oracle.expert.console.server import make_app
 from smach_oracle.expert.console.settings import ConsoleSettings
 from smach_oracle.expert.console.trial_log import TrialLog
@@ -59,7 +60,8 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), '', '')
         self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
         self.office = Office(self.sections, self.log, self.desk)
-        return make_app(self.gate, self.office)
+        self.sensors = Sensors()
+        return make_app(self.gate, self.office, self.sensors)
 
     @property
     def origin(self):

@@ -73,6 +73,6 @@ def _stamp(value: Any) -> genpy.Time:
 EYE_COMMANDS: Dict[str, Spec] = {
     'mark': Spec('operator', dict(QUESTION, stamp=_stamp, region=_points(3, MOST_CORNERS), strokes=_strokes)),
     'use_frame': Spec('operator', dict(QUESTION, frame=one_of((AT_GOAL, FRESH)))),
-    'hand_over': Spec('operator', dict(QUESTION, outcome=text(400), why=text(2000))),
+    'hand_over': Spec('operator', dict(QUESTION, outcome=text(400, 1), why=text(2000))),
     'give_up_interface': Spec('operator', dict(QUESTION, why=text(2000))),
 }

@@ -43,12 +43,12 @@ class Gate:
             return Identity('teleoperator') if session else None
         return Identity(session.role, session.name) if session and session.role else None
 
-    def refusal(self, handler: tornado.web.RequestHandler) -> int:
-        """The status with which a request is refused; 0 where it may go on."""
+    def refusal(self, handler: tornado.web.RequestHandler, limits: Optional[Buckets] = None) -> int:
+        """The status with which a request is refused; 0 where it may go on. `limits`: of its own, where it has any."""
         request = handler.request
         if not self.settings.hosts.allows(request.headers.get('Host', '')):
             return 421
-        if not self.requests.take(request.remote_ip or ''):
+        if not (limits or self.requests).take(request.remote_ip or ''):
             return 429
         if not self.from_own_page(handler, must_say=request.method not in ('GET', 'HEAD')):
             return 403

@@ -20,13 +20,17 @@ from ..front_end import FrontEnd
 from .audit import Audit
 from .commands import MOST_BYTES
 from .desk import Desk
+from .eye import Eye
+from .frames import FrameHandler, FrameRoom
 from .handlers import Gate, NotThere, SessionHandler, StaticFile
 from .layout import Layouter
 from .questions import QuestionBoard
 from .robots import Robots
 from .sections import Sections
+from .sensors import Sensors
 from .settings import ConsoleSettings, read_settings
 from .page_socket import Office, Socket
+from .perception_desk import PerceptionDesk
 from .trial_log import TrialLog
 
 STATIC = Path(__file__).resolve().parent / 'static'
@@ -37,11 +41,12 @@ PING_S = 5.0
 PONG_LIMIT_S = 15.0
 
 
-def make_app(gate: Gate, office: Office) -> tornado.web.Application:
+def make_app(gate: Gate, office: Office, sensors: Sensors) -> tornado.web.Application:
     """The web application; its handlers run in the thread of the loop that serves it."""
     shared = {'gate': gate}
     return tornado.web.Application(
         [(r'/session', SessionHandler, shared), (r'/socket', Socket, {'gate': gate, 'office': office}),
+         (r'/frame/([0-9]{1,9})', FrameHandler, {'gate': gate, 'room': FrameRoom(sensors)}),
          (r'/()', StaticFile, dict(shared, path=str(STATIC), default_filename='index.html')),
          (r'/static/(.+)', StaticFile, dict(shared, path=str(STATIC)))],
         default_handler_class=NotThere, default_handler_args=shared, cookie_secret=gate.secret,
@@ -72,10 +77,12 @@ class Console:
         self._audit = Audit()
         self._robots = Robots(self._sections, self._log, Layouter())
         self._front_end = FrontEnd('expert_console')
+        self._eye = Eye(self._sections, self._front_end)
         self._board = QuestionBoard(self._front_end, self._log)
-        self._office = Office(self._sections, self._log, Desk(self._front_end, self._audit, {}))
+        self._office = Office(self._sections, self._log, Desk(
+            self._front_end, self._audit, PerceptionDesk(self._eye.is_perception).commands))
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
-        app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office)
+        app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office, self._eye.sensors)
         server = tornado.httpserver.HTTPServer(
             app, ssl_options=tls, max_body_size=MOST_BYTES, max_header_size=16384, body_timeout=10.0,
             idle_connection_timeout=60.0, max_buffer_size=4 * MOST_BYTES)
@@ -83,6 +90,7 @@ class Console:
 
     def run(self) -> None:
         """Serve until the node goes down."""
+        self._eye.start()
         for target in (self._robots.run, self._draw):
             threading.Thread(target=target, name=target.__name__, daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()

@@ -1,0 +1,142 @@
+"""The sensors that people may look at: topics found by their types, listened to only while somebody looks.
+
+A browser names a sensor by the number that it was given here; whatever has no number cannot be named.
+"""
+import itertools
+import json
+import threading
+import time
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+import rospy
+from sensor_msgs.msg import CompressedImage, Image, JointState, PointCloud2
+
+from .clouds import encode_cloud, encode_joints
+from .images import Encoded, encode_image
+
+MOST_SENSORS = 400
+MOST_LISTENED = 16
+IDLE_S = 6.0  # after the last look
+_GONE_AFTER = 3  # looks at the master
+_TYPES: Dict[str, Tuple[str, Any, Callable[[Any, int], Encoded]]] = {
+    Image._type: ('image', Image, encode_image),
+    CompressedImage._type: ('image', CompressedImage, encode_image),
+    PointCloud2._type: ('cloud', PointCloud2, lambda message, _: encode_cloud(message)),
+    JointState._type: ('joints', JointState, lambda message, _: encode_joints(message))}
+
+
+class Frame(NamedTuple):
+    """A message as it came."""
+
+    sequence: int  # of its sensor, from 1
+    message: Any
+    came_s: float  # monotonic
+
+
+class Sensor:
+    """One topic. It holds the newest message only."""
+
+    def __init__(self, sensor: int, topic: str, kind: str) -> None:
+        """`kind` is one of the types that can be shown, such as sensor_msgs/Image."""
+        self.number = sensor
+        self.topic = topic
+        self.type = kind
+        self.kind, self._message_class, self._encode = _TYPES[kind]
+        self._asked_s = -IDLE_S
+        self._sequence = itertools.count(1)
+        self._frame: Optional[Frame] = None
+        self._subscriber: Optional[rospy.Subscriber] = None
+        self._lock = threading.Lock()
+        self._encoded: Dict[Tuple[int, int], Tuple[Encoded, str]] = {}
+
+    @property
+    def listened(self) -> bool:
+        """Whether it is subscribed to."""
+        return self._subscriber is not None
+
+    def newer(self, than: int) -> Optional[Frame]:
+        """The newest frame, where it is another one than the one that was seen last; keeps listening going."""
+        self._asked_s = time.monotonic()
+        frame = self._frame
+        return frame if frame is not None and frame.sequence != than else None
+
+    def file_of(self, frame: Frame, width: int) -> Tuple[Encoded, str]:
+        """The frame as a browser gets it, and its facts as JSON; several browsers share the work.
+
+        :raises ValueError: for a message that cannot be shown; the text says why.
+        """
+        with self._lock:
+            key = (frame.sequence, width)
+            if key not in self._encoded:
+                self._encoded = {known: found for known, found in self._encoded.items() if known[0] == frame.sequence}
+                self._encoded[key] = self._made(frame, width)
+            return self._encoded[key]
+
+    def tend(self, may_listen: bool) -> None:
+        """Begin to listen where somebody looks, stop where nobody does. One thread calls it; a master may hang it."""
+        wanted = time.monotonic() - self._asked_s < IDLE_S
+        if wanted and may_listen and self._subscriber is None:
+            self._subscriber = rospy.Subscriber(self.topic, self._message_class, self.take, queue_size=1,
+                                                buff_size=1 << 24)
+        elif not wanted and self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber, self._frame, self._encoded = None, None, {}
+
+    def take(self, message: Any) -> None:
+        """A message has come."""
+        self._frame = Frame(next(self._sequence), message, time.monotonic())
+
+    def _made(self, frame: Frame, width: int) -> Tuple[Encoded, str]:
+        encoded = self._encode(frame.message, width)
+        header = frame.message.header
+        facts = dict(encoded.facts, sequence=frame.sequence, frame=header.frame_id[:200],
+                     stamp='{}.{:09d}'.format(header.stamp.secs, header.stamp.nsecs))
+        if encoded.content_type == 'application/json':
+            return encoded._replace(body=json.dumps(facts, allow_nan=False).encode()), ''
+        return encoded, json.dumps(facts, allow_nan=False)
+
+
+class Sensors:
+    """The closed set."""
+
+    def __init__(self) -> None:
+        self._by_number: Dict[int, Sensor] = {}
+        self._unseen: Dict[int, int] = {}
+        self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
+
+    def find(self, sensor: int) -> Optional[Sensor]:
+        """A sensor by its number; None where it has never been given."""
+        return self._by_number.get(sensor)
+
+    def on(self, topic: str) -> Optional[Sensor]:
+        """A sensor by its topic, for the server's own use."""
+        return next((each for each in self._all() if each.topic == topic), None)
+
+    def follow(self, published: Sequence[Sequence[str]]) -> None:
+        """Take in what the master knows: topics and their types."""
+        seen = {(topic, kind) for topic, kind in published if kind in _TYPES}
+        with self._lock:
+            known = {(each.topic, each.type): each.number for each in self._by_number.values()}
+            for key, sensor in known.items():
+                self._unseen[sensor] = 0 if key in seen else self._unseen.get(sensor, 0) + 1
+                if self._unseen[sensor] >= _GONE_AFTER and not self._by_number[sensor].listened:
+                    del self._by_number[sensor], self._unseen[sensor]
+            for topic, kind in sorted(seen - set(known))[:MOST_SENSORS - len(self._by_number)]:
+                found = Sensor(next(self._numbers), topic, kind)
+                self._by_number[found.number] = found
+
+    def tend(self) -> None:
+        """Begin and stop to listen; to be called often, by one thread."""
+        for sensor in self._all():
+            listened = sum(each.listened for each in self._all())
+            sensor.tend(listened < MOST_LISTENED)
+
+    def view(self) -> List[Dict[str, Any]]:
+        """As plain data, by topic."""
+        return [{'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}
+                for each in sorted(self._all(), key=lambda sensor: (sensor.topic, sensor.number))]
+
+    def _all(self) -> List[Sensor]:
+        with self._lock:
+            return list(self._by_number.values())
