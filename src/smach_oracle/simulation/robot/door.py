@@ -33,6 +33,7 @@ JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 
 BEFORE = 0.10  # m that the hand comes straight
 PUSHES = 2  # until the door is shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
+BERTH = 0.02  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
 RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
@@ -71,10 +72,14 @@ def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
     drive(means, odom_from_pose(kitchen, *CLOSING))
     _clear_of_door(means, next(other for other in ARMS if other != arm))
     view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
-    for _ in range(PUSHES):
+    for push in range(PUSHES):
         if view.angle >= STEP:
-            _push_shut(means, kitchen, arm, view)
-            view = look(means.robot, kitchen, np.array([-0.1, 0.05, GRASP_HEIGHT]))
+            try:
+                _push_shut(means, kitchen, arm, view)
+            except SkillError:
+                if push == PUSHES - 1:
+                    raise
+            view = look(means.robot, kitchen, np.array([-0.2, 0.10, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
         raise SkillError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
 
@@ -161,7 +166,7 @@ def _push_open(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> floa
                        lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
-        _place_door(limb, kitchen, fridge, view.angle)
+        _place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
         means.robot.gripper(arm, 0.0)
         _strain(limb, swing, PUSH_SPEED)
@@ -183,7 +188,7 @@ def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None
                        lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
-        _place_door(limb, kitchen, fridge, view.angle)
+        _place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
         _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
@@ -229,7 +234,7 @@ def _check_arm(arm: str) -> None:
 
 def _is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bool:
     """Whether the arm touches nothing at joint positions, with the door where it was seen."""
-    _place_door(limb, kitchen, view.base_from_fridge, view.angle)
+    _place_door(limb, kitchen, view.base_from_fridge, view.angle, BERTH)
     return limb.space.is_free(q)
 
 
@@ -262,7 +267,8 @@ def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str,
     return named
 
 
-def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float) -> None:
+def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float, berth: float = 0.0) -> None:
+    """Have the door at an angle in the arm's map, with `berth` m around it."""
     boxes = named_boxes(kitchen, fridge, angle)
     for name in ('door', 'handle'):
-        limb.space.add_box(name, boxes[name])
+        limb.space.add_box(name, boxes[name]._replace(half=boxes[name].half + berth))

@@ -16,6 +16,8 @@ PALM: Vector = (0.0, 0.62, 0.85)  # the middle of its upper face
 PALM_SIZE: Vector = (0.20, 0.20, 0.03)
 SKIN, SHIRT, TROUSERS = (0.87, 0.68, 0.55), (0.25, 0.42, 0.62), (0.20, 0.22, 0.27)
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
+DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
+CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
 DOOR_FRICTION = 3.0  # N m, dry
 START_TORSO = 0.15  # m
 
@@ -48,9 +50,9 @@ def _fridge(kitchen: Kitchen) -> Body:
 def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
     """Upright on the shelf, apart from each other, near the front; the foremost comes first."""
     places: List[Tuple[float, float]] = []
-    while len(places) < 3:
-        x, y = generator.uniform(0.06, 0.16), generator.uniform(-0.20, 0.02)
-        if all(np.hypot(x - other[0], y - other[1]) > 0.10 for other in places):
+    for _ in range(100):
+        x, y = generator.uniform(*DEPTHS), generator.uniform(*SIDES)
+        if len(places) < 3 and all(np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
     floor = kitchen.shelves[kitchen.drinks_shelf]
