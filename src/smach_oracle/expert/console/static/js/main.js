@@ -5,9 +5,10 @@ import { h, replace, setText, toast } from './dom.js';
 import { Link, Store } from './link.js';
 import { machines } from './machines.js';
 import { questions } from './questions.js';
+import { sensors } from './sensors.js';
 import { trials } from './trials.js';
 
-const PANELS = [questions, machines, trials];
+const PANELS = [questions, machines, sensors, trials];
 const STATES = { connecting: 'connecting…', connected: 'live', lost: 'connection lost – trying again', 'signed-out': 'signed out' };
 
 class App {

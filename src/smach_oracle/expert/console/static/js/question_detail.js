@@ -5,6 +5,8 @@ import { Lost } from './link.js';
 import { MachineView } from './machines.js';
 import { AnswerForm } from './answer_form.js';
 import { FollowUp } from './follow_up.js';
+import { PerceptionPanel } from './perception_panel.js';
+import { SituationCamera } from './situation_camera.js';
 
 const VISITS = { success: ['✓', 'good'], failure: ['✗', 'bad'], superseded: ['☞', 'accent'], preempted: ['■', 'warn'] };
 
@@ -17,12 +19,14 @@ export class Detail {
     this.settled = '';
     this.claiming = false;
     this.machine = new MachineView(app.store, () => {});
+    this.camera = new SituationCamera(app, question);
+    this.workbench = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
     this.claimBar = h('div', { class: 'claim-bar', role: 'status' });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'), this.form.root);
-    this.root = h('article', { class: 'detail', 'data-question': question.key }, this.head(), this.claimBar,
-      h('div', { class: 'detail-body' }, h('div', { class: 'situation' }, this.failure(), this.machineCard(), this.visits(), this.userdata()), this.answers));
+    this.root = h('article', { class: 'detail', 'data-question': question.key }, this.head(), this.claimBar, this.workbench,
+      h('div', { class: 'detail-body' }, h('div', { class: 'situation' }, this.failure(), this.camera.root, this.machineCard(), this.visits(), this.userdata()), this.answers));
     this.machine.show(question.robot, question.path);
     this.show();
   }
@@ -75,6 +79,7 @@ export class Detail {
 
   // Take the question, unless somebody else works on it.
   begin() {
+    this.showWorkbench();
     if (this.app.mayAnswer && this.question.status === 'pending') this.claim('claim');
     this.show();
   }
@@ -88,6 +93,8 @@ export class Detail {
   end() {
     if (this.held && !this.settled) this.app.link.request('release', { question: this.key }).catch(() => {});
     this.ended = true;
+    this.camera.stop();
+    if (this.perception) this.perception.stop();
   }
 
   async claim(command) {
@@ -150,7 +157,37 @@ export class Detail {
     this.time.classList.toggle('urgent', now.deadline !== null && now.deadline - clock < 20);
   }
 
+  // The tools of a perception interface, for as long as one runs for this question.
+  showWorkbench() {
+    const running = this.question.key in ((this.app.store.get('eye') || {}).perception || {});
+    if (running && !this.perception && !this.ended) {
+      this.perception = new PerceptionPanel(this.app, this.question, () => this.follow());
+      replace(this.workbench, this.perception.root);
+      this.workbench.scrollIntoView({ block: 'nearest' });
+    } else if (!running && this.perception) {
+      this.perception.stop();
+      this.perception = null;
+      replace(this.workbench);
+    }
+    this.workbench.hidden = !this.perception;
+  }
+
+  // Tell what the robot does after an interface that somebody else may have started.
+  follow() {
+    if (this.followUp) return;
+    this.settled = 'yours';
+    this.followUp = new FollowUp(this.app, this.question, this.onLeave);
+    this.followUp.begin({ kind: 'interface', name: this.now ? this.now.interface : '' });
+    replace(this.answers, this.followUp.root);
+    this.root.classList.add('answered');
+    this.show();
+  }
+
   update(names) {
+    if (names.includes('eye')) {
+      this.camera.update();
+      this.showWorkbench();
+    }
     if (names.includes('questions')) {
       const now = this.now;
       // a server that was restarted knows nobody who holds it

@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""The console's eye in a real browser: an object marked with the mouse in a real interface, and sensors looked at."""
+import os
+import shutil
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_browser import Node, free_port  # noqa: E402
+from published_camera import OPTICAL, PublishedCamera  # noqa: E402
+from roslib.packages import find_node  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.msg import ConsoleCommand  # noqa: E402
+from smach_oracle.ros.images import cloud_message  # noqa: E402
+from smach_oracle.simulation.world.scene import Body  # noqa: E402
+
+WITH_BROWSER = bool(shutil.which('chromedriver'))
+if WITH_BROWSER:
+    from browser import Browser  # noqa: E402
+    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22))
+CAN = Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.80, 0.10, 0.78), colour=(0.1, 0.3, 0.9))
+BOX = Body('box', 'box', (0.05, 0.05, 0.14), (0.68, -0.15, 0.79), colour=(0.2, 0.8, 0.2))
+CAN_INDEX = 1
+QUESTION = '.question-row[data-key^="/alpha/"]'
+CAMERA = '/head_camera/rgb/image_raw'
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class TheEye(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.camera = PublishedCamera('head_camera', [TABLE, CAN, BOX], streams=True)
+        cls.joints = rospy.Publisher('joint_states', JointState, queue_size=1, latch=True)
+        cls.cloud = rospy.Publisher('points', PointCloud2, queue_size=1, latch=True)
+        cls.audited = []
+        rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
+        port = free_port()
+        cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
+                           '__name:=expert_console')
+        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
+                                                      'console_eye_robot.py'), '__name:=alpha')
+        cls.browser = Browser(1360, 1000)
+        cls.page = 'http://localhost:{}/'.format(port)
+        wait_for(cls.page_is_served, 40.0)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.robot.stop()
+        cls.console.stop()
+
+    @classmethod
+    def page_is_served(cls):
+        try:
+            cls.browser.driver.get(cls.page)
+            return cls.browser.driver.title
+        except Exception:  # whatever the driver says of a page that is not there yet
+            return False
+
+    def drag(self, *points):
+        """With the mouse, over points of the frame in px."""
+        canvas = self.browser.find('.perception .drawing')
+        scale = canvas.size['width'] / 640.0
+        middle = np.array([canvas.size['width'], canvas.size['height']]) / 2.0
+        places = [np.rint(np.array(point, float) * scale - middle) for point in points]
+        action = ActionChains(self.browser.driver, duration=20)
+        action.move_to_element_with_offset(canvas, *(int(each) for each in places[0])).click_and_hold()
+        for place in places[1:]:
+            action.move_to_element_with_offset(canvas, *(int(each) for each in place))
+        action.release().perform()
+
+    def around_the_can(self):
+        rows, columns = np.nonzero(self.camera.pixels(CAN_INDEX))
+        return (columns.min() - 8, rows.min() - 8), (columns.max() + 8, rows.max() + 8)
+
+    def told(self, name):
+        return [told for told in self.audited if told.command == name]
+
+    def test_1_an_object_is_marked_in_the_frame_and_the_machine_goes_on_with_it(self):
+        browser = self.browser
+        browser.click(QUESTION)
+        browser.click('.choice.interface[data-name=perception]')
+        browser.find('.perception.shown', 30.0)
+        self.assertFalse(browser.find('.perception .accept').is_enabled(), 'nothing is marked yet')
+        self.drag(*self.around_the_can())
+        browser.find('[data-fact=size]')
+        middle = np.array(self.around_the_can(), float).mean(axis=0)
+        self.assertTrue(wait_for(lambda: browser.run(
+            'return document.querySelector(".drawing").getContext("2d").getImageData(arguments[0], arguments[1], 1, 1)'
+            '.data[3]', *(int(each) for each in middle))), 'the mask lies over the object')
+        browser.click('[data-tool=background]')
+        left_top, right_bottom = self.around_the_can()
+        self.drag(left_top, (right_bottom[0], left_top[1]))
+        self.assertTrue(wait_for(lambda: len(self.told('mark')) == 2), 'a stroke cuts anew')
+        self.assertEqual([told.ok for told in self.told('mark')], [True, True])
+        browser.click('.perception .accept')
+        self.assertTrue(wait_for(lambda: rospy.has_param('/alpha/picked')))
+        self.assertLess(np.linalg.norm(np.subtract(rospy.get_param('/alpha/picked'), CAN.position)), 0.02)
+        self.assertTrue(browser.says('DETECT_TABLETOP counts as having ended with succeeded.', '.follow-up'))
+        self.assertEqual([(told.ok, told.expert) for told in self.told('hand_over')], [(True, 'operator')])
+        self.assertTrue(self.told('hand_over')[0].query_id, 'it is told which question it was about')
+        self.assertEqual(browser.errors(), [])
+
+    def test_2_giving_up_asks_again(self):
+        browser = self.browser
+        browser.click('.follow-up .primary')
+        browser.click(QUESTION)
+        browser.click('.choice.interface[data-name=perception]')
+        browser.find('.perception.shown', 30.0)
+        browser.click('.perception .quit')
+        self.assertTrue(browser.says('It asks again', '.follow-up', 30.0))
+        self.assertTrue(wait_for(lambda: not browser.text('.perception')), 'the tools are gone with the interface')
+
+    def test_3_a_camera_is_listened_to_while_somebody_looks(self):
+        browser = self.browser
+        browser.click('#tab-sensors')
+        self.assertTrue(wait_for(lambda: self.camera._rgb.get_num_connections() == 0))
+        browser.click('[data-topic="{}"]'.format(CAMERA))
+        browser.find('.camera-view.shown')
+        self.assertTrue(wait_for(lambda: browser.run(
+            'const view = document.querySelector(".camera-view .picture");'
+            'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, 1).data[0] > 20')))
+        self.assertEqual(self.camera._rgb.get_num_connections(), 1)
+        browser.click('.camera-view .view-close')
+        self.assertTrue(wait_for(lambda: self.camera._rgb.get_num_connections() == 0, 30.0), 'nobody looks any more')
+
+    def test_4_clouds_and_joints_are_shown(self):
+        browser = self.browser
+        self.joints.publish(JointState(name=['elbow'], position=[1.25]))
+        points = np.random.default_rng(1).uniform(-1, 1, (50000, 3))
+        self.cloud.publish(cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8)))
+        browser.click('[data-topic="/joint_states"]')
+        self.assertTrue(browser.says('1.250', '.joints-view'))
+        browser.click('[data-topic="/points"]')
+        self.assertTrue(browser.says('20000 of 50000 points', '.cloud-view'))
+        shown = ('const view = document.querySelector(".cloud"); return Array.from(view.getContext("2d").getImageData('
+                 '0, 0, view.width, view.height).data).filter((each, i) => i % 4 === 3 && each).length')
+        self.assertGreater(browser.run(shown), 1000)
+        self.assertEqual(browser.errors(), [])
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_eye')
+    rostest.rosrun('smach_oracle', 'console_eye', TheEye)
