@@ -17,6 +17,7 @@ from waiting import wait_for  # noqa: E402
 from smach_oracle.expert.front_end import FrontEnd  # noqa: E402
 from smach_oracle.msg import (ExpertDecision, OpenQuery, SharedAutonomyAction, SharedAutonomyFeedback,  # noqa: E402
                               SharedAutonomyResult, UserdataItem)
+from smach_oracle.oracle.errors import InterfaceError  # noqa: E402
 from smach_oracle.oracle.question import AnswerKind, InterfaceOffer  # noqa: E402
 from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
 from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
@@ -91,7 +92,8 @@ class TestInterfaces(unittest.TestCase):
 
     def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
         begun_s = time.monotonic()
-        self.assertIsNone(self.run_interface())
+        with self.assertRaises(InterfaceError):
+            self.run_interface()
         self.assertTrue(1.9 < time.monotonic() - begun_s < 6.0)
         self.assertEqual(self.told[-1], ('interface_end', 'assist', ''))
 

@@ -5,7 +5,7 @@ from typing import Any, Callable, Dict, Optional
 
 import smach
 
-from .errors import AnswerError
+from .errors import AnswerError, InterfaceError
 from .events import EventKind
 from .question import Answer, AnswerKind, Expert, Question, names
 from .question_making import make_question
@@ -108,6 +108,9 @@ class Inquiry:
             if answer.kind is AnswerKind.INTERFACE:
                 return self._run_interface(answer, question)
             return self._obey(answer)
+        except InterfaceError as err:
+            self._ledger.warn('interface {}: {}'.format(answer.interface, err), self._recovery.label)
+            return None
         except AnswerError as err:
             self._ledger.warn('an answer does not fit: {}'.format(err), self._recovery.label)
             return None
@@ -128,6 +131,9 @@ class Inquiry:
         done: Optional[Answer] = None
         try:
             done = self._guarded(lambda: self._expert.run_interface(offer, question, self._cancelled, self._progress))
+        except InterfaceError as err:
+            self._recovery.tried.append('interface {}: {}'.format(offer.name, err))
+            raise
         finally:
             self._emit(EventKind.INTERFACE_END, target=offer.name, by=answer.by,
                        outcome=done.outcome if done is not None else '')

@@ -10,6 +10,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 from . import config_values as values
 from .errors import ConfigError
 from .failure_rate import ESTIMATORS
+from .interface_config import checked_interfaces
 from .naming import DEFAULT_FAILING_OUTCOMES
 from .policy import POLICIES
 from .precondition_spec import PreconditionSpec, Resolver, parse_preconditions
@@ -95,7 +96,7 @@ class Settings:
         machine = {key: check(key, given[key]) for key, check in _MACHINE_CHECKS.items() if key in given}
         states = {name: _checked_state(name, overrides, defaults, resolver)
                   for name, overrides in values.mapping('states', given.get('states')).items()}
-        return cls(defaults=defaults, interfaces=_checked_interfaces(given.get('interfaces')), states=states, **machine)
+        return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')), states=states, **machine)
 
     def for_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of state `label` in the container at `path` (relative to the top machine, '' itself)."""
@@ -151,20 +152,6 @@ def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, 
                               'at least moderate_from, which is {}'.format(settings.moderate_from))
         raise ConfigError(prefix + 'moderate_from', settings.moderate_from,
                           'at most high_from, which is {}'.format(settings.high_from))
-
-
-def _checked_interfaces(given: Any) -> Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]:
-    offers = []
-    for name, fields_given in values.mapping('interfaces', given).items():
-        prefix = 'interfaces.{}.'.format(name)
-        fields_given = values.mapping(prefix[:-1], fields_given)
-        _refuse_unknown(prefix, fields_given, ['action', 'description', 'states'])
-        if 'action' not in fields_given:
-            raise ConfigError(prefix + 'action', None, 'the name of a SharedAutonomy action')
-        offer = InterfaceOffer(name, values.label(prefix + 'action', fields_given['action']),
-                               values.text(prefix + 'description', fields_given.get('description', '')))
-        offers.append((offer, values.words(prefix + 'states', fields_given.get('states', ()))))
-    return tuple(offers)
 
 
 def setting_names() -> Tuple[str, ...]:

@@ -3,6 +3,7 @@
     OracleError
     +-- ConfigError (also a ValueError): a setting is wrong; names the key, the value and what is allowed
     +-- AnswerError (also a ValueError): an expert's answer does not fit its question
+    |     +-- InterfaceError: the interface that an expert chose cannot be used; says why
     +-- TrialError: the executive was used out of order
 """
 
@@ -23,6 +24,10 @@ class ConfigError(OracleError, ValueError):
 
 class AnswerError(OracleError, ValueError):
     """An expert's answer does not fit its question; the text says what would."""
+
+
+class InterfaceError(AnswerError):
+    """The interface that an expert chose cannot be used now; the text says why."""
 
 
 class TrialError(OracleError):

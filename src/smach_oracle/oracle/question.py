@@ -51,12 +51,25 @@ class OutcomeChoice(NamedTuple):
     target: str
 
 
+class InterfaceStart(NamedTuple):
+    """How an interface that is not there is started; who can do that is not this room's business."""
+
+    LIMIT_S = 60.0
+
+    kind: str  # 'launch' or 'node'
+    package: str
+    target: str  # file name or node type
+    args: Tuple[str, ...] = ()
+    limit_s: float = LIMIT_S  # how long its action server may take to come
+
+
 class InterfaceOffer(NamedTuple):
     """A shared-autonomy interface on offer for the failed state (paper, section V-A)."""
 
     name: str
     action: str
     description: str = ''
+    start: Optional[InterfaceStart] = None  # None: somebody else starts it
 
 
 class Question(NamedTuple):
@@ -117,7 +130,10 @@ class Expert:
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Run a shared-autonomy interface; return a SUPERSEDE answer, or None where it failed or was cancelled."""
+        """Run a shared-autonomy interface; return a SUPERSEDE answer, or None where it failed or was cancelled.
+
+        May raise InterfaceError, which says to the expert why the interface cannot be used.
+        """
         return None
 
 

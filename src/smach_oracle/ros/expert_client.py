@@ -4,15 +4,18 @@ import threading
 import time
 from typing import Dict, Optional
 
+import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
 from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQueryGoal, ExpertQueryResult,
-                              SharedAutonomyAction, SharedAutonomyResult)
+                              InterfaceOutput, SharedAutonomyAction, SharedAutonomyResult)
 
+from ..oracle.errors import InterfaceError
 from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progress, Question, names
 from .expert_server import ExpertQueryServer
 from .goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
+from .interface_starting import InterfaceStarter, StartedInterface
 from .question_messages import to_answer, to_goal, to_interface_goal
 from .userdata_codec import UserdataCodecError, decode_all
 
@@ -39,6 +42,7 @@ class ExpertQueryClient(Expert):
         self.server: Optional[ExpertQueryServer] = None if server else ExpertQueryServer(OWN_SERVER)
         self._link = GoalLink(rospy.resolve_name(server or OWN_SERVER), ExpertQueryAction)
         self._server_wait_s = server_wait_s
+        self._starter = InterfaceStarter()
         self._interfaces: Dict[str, GoalLink] = {}
         self._interfaces_lock = threading.Lock()
 
@@ -52,7 +56,9 @@ class ExpertQueryClient(Expert):
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Run a shared-autonomy interface; None where it is not there, fails or is cancelled, with the log saying why.
+        """Run a shared-autonomy interface, which is started where it is not there; None where it fails or is cancelled.
+
+        :raises InterfaceError: where it is not there, and cannot be started or does not come up.
         """
         progress('interface_start', offer.name, '')
         announcement = self._announce(offer, question)
@@ -68,6 +74,7 @@ class ExpertQueryClient(Expert):
 
     def close(self) -> None:
         """Take down the connections, and the own server where there is one."""
+        self._starter.stop()
         for link in [self._link] + list(self._interfaces.values()):
             link.stop()
         if self.server is not None:
@@ -85,9 +92,43 @@ class ExpertQueryClient(Expert):
     def _run(self, offer: InterfaceOffer, question: Question,
              cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
         link = self._interface(offer.action)
+        started = self._provide(offer, link, question.query_id, cancelled)
+        try:
+            return self._result(offer, link, question, cancelled)
+        finally:
+            if started is not None:
+                started.tell(InterfaceOutput.STOPPED, 'it is being stopped')
+                started.stop()
+
+    def _provide(self, offer: InterfaceOffer, link: GoalLink, query_id: str,
+                 cancelled: threading.Event) -> Optional[StartedInterface]:
+        """Wait for the action server; start it where it can be started and nobody else has."""
+        if (offer.start is None or _advertised(link)) and _wait_until_ready(link, self._server_wait_s, cancelled):
+            return None
+        if offer.start is None or cancelled.is_set():
+            raise InterfaceError('taken back' if cancelled.is_set() else 'no action server at {} within {:g} s'.format(
+                link.name, self._server_wait_s))
+        started = self._starter.start(offer, query_id)
+        until_s = time.monotonic() + offer.start.limit_s
+        while not link.ready():
+            why = ''
+            if started.exit_code is not None:
+                why = 'it ended by itself with exit code {}: {}'.format(started.exit_code, started.last_words)
+            elif cancelled.is_set() or rospy.is_shutdown():
+                why = 'taken back'
+            elif time.monotonic() > until_s:
+                why = 'it brought up no action server {} within {:g} s'.format(link.name, offer.start.limit_s)
+            if why:
+                started.tell(InterfaceOutput.FAILED, why)
+                started.stop()
+                raise InterfaceError(why)
+            cancelled.wait(POLL_S)
+        started.tell(InterfaceOutput.RUNNING, 'its action server {} is there'.format(link.name))
+        return started
+
+    def _result(self, offer: InterfaceOffer, link: GoalLink, question: Question,
+                cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
         if not _wait_until_ready(link, self._server_wait_s, cancelled):
-            rospy.logwarn('Interface %s: no action server at %s within %g s', offer.name, link.name,
-                          self._server_wait_s)
             return None
         sent = link.send(to_interface_goal(offer, question), time.monotonic())
         while not (cancelled.is_set() or rospy.is_shutdown()):
@@ -204,6 +245,15 @@ def _wait_until_ready(link: GoalLink, timeout_s: float, cancelled: threading.Eve
         if time.monotonic() >= until_s or rospy.is_shutdown() or cancelled.wait(POLL_S):
             return False
     return True
+
+
+def _advertised(link: GoalLink) -> bool:
+    """Whether the master knows of an action server there; one that has died may still be listed."""
+    try:
+        published = rosgraph.Master(rospy.get_name()).getPublishedTopics('')
+    except (OSError, rosgraph.MasterException):
+        return link.ready()
+    return any(topic == link.name + '/status' for topic, _ in published)
 
 
 def _interface_result(offer: InterfaceOffer, event: GoalEvent) -> Optional[SharedAutonomyResult]:

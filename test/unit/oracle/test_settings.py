@@ -3,7 +3,7 @@ import pytest
 
 from smach_oracle.oracle.config import Settings, setting_names
 from smach_oracle.oracle.errors import ConfigError, OracleError
-from smach_oracle.oracle.question import InterfaceOffer
+from smach_oracle.oracle.question import InterfaceOffer, InterfaceStart
 
 
 def test_the_defaults_are_those_of_the_design():
@@ -56,6 +56,19 @@ def test_the_defaults_are_those_of_the_design():
     ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
     ({'interfaces': {'hand': {'action': 'a', 'state': []}}}, 'interfaces.hand.state', [], 'states'),
     ({'interfaces': {'hand': {'action': 'a', 'states': 'A'}}}, 'interfaces.hand.states', 'A', 'list'),
+    ({'interfaces': {'hand': {'action': 'a', 'args': []}}}, 'interfaces.hand.args', [], 'launch or node'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'launch': 'p/f.launch'}}}, 'interfaces.hand.node', 'p t',
+     'not both'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': '/tmp/f.launch'}}}, 'interfaces.hand.launch', '/tmp/f.launch',
+     'PACKAGE/FILE.launch'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}}, 'interfaces.hand.launch', 'p/../f.launch',
+     'PACKAGE/FILE.launch'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t; rm'}}}, 'interfaces.hand.node', 'p t; rm', 'PACKAGE TYPE'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'args': 'x'}}}, 'interfaces.hand.args', 'x', 'list'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x': [1]}}}},
+     'interfaces.hand.args.x', [1], 'launch argument'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}}, 'interfaces.hand.start_limit_s', 0,
+     'seconds'),
     ('prose', 'settings', 'prose', 'mapping')])
 def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value, allowed):
     with pytest.raises(ConfigError) as raised:
@@ -96,6 +109,15 @@ def test_interfaces_are_offered_for_the_states_they_name_or_for_all():
     assert [offer.name for offer in settings.offers_for('', 'PLACE')] == ['all']
     assert settings.offers_for('', 'PICK')[1] == InterfaceOffer('pick', 'b', 'd')
     assert [offer.name for offer in settings.offers_for('LEFT', 'PICK')] == ['all', 'pick', 'left']
+
+
+def test_an_interface_may_say_how_it_is_started():
+    settings = Settings.from_dict({'interfaces': {
+        'hand': {'action': 'a', 'launch': 'my_robot/hand.launch', 'args': {'camera': 'head', 'clearance': False}},
+        'eye': {'action': 'b', 'node': 'my_robot eye.py', 'args': ['_rate:=5'], 'start_limit_s': 5}}})
+    assert [offer.start for offer in settings.offers_for('', 'PICK')] == [
+        InterfaceStart('launch', 'my_robot', 'hand.launch', ('camera:=head', 'clearance:=false')),
+        InterfaceStart('node', 'my_robot', 'eye.py', ('_rate:=5',), 5.0)]
 
 
 def test_empty_sections_of_a_file_are_empty():

@@ -1,0 +1,67 @@
+"""The settings of shared-autonomy interfaces: what is offered, for which states, how it is started. Pure."""
+import re
+from typing import Any, List, Mapping, Optional, Tuple
+
+from . import config_values as values
+from .errors import ConfigError
+from .question import InterfaceOffer, InterfaceStart
+
+_KEYS = ('action', 'args', 'description', 'launch', 'node', 'start_limit_s', 'states')
+_NAME = r'[A-Za-z0-9_.+-]+'
+_LAUNCH = re.compile(r'({0})/({0}\.launch)'.format(_NAME))
+_NODE = re.compile(r'({0}) +({0})'.format(_NAME))
+_ARGUMENT = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+_LIMIT = values.number(0.1, 3600.0, 'seconds from 0.1 to 3600')
+
+Offers = Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]
+
+
+def checked_interfaces(given: Any) -> Offers:
+    """Each offer with the states it serves, () for all of them. Raises ConfigError."""
+    offers = []
+    for name, entry in values.mapping('interfaces', given).items():
+        prefix = 'interfaces.{}.'.format(name)
+        entry = values.mapping(prefix[:-1], entry)
+        for key in entry:
+            if key not in _KEYS:
+                raise ConfigError(prefix + key, entry[key], 'one of the keys ' + ', '.join(_KEYS))
+        if 'action' not in entry:
+            raise ConfigError(prefix + 'action', None, 'the name of a SharedAutonomy action')
+        offer = InterfaceOffer(name, values.label(prefix + 'action', entry['action']),
+                               values.text(prefix + 'description', entry.get('description', '')),
+                               _start(prefix, entry))
+        offers.append((offer, values.words(prefix + 'states', entry.get('states', ()))))
+    return tuple(offers)
+
+
+def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
+    """How it is started; None where it is somebody else's to start it."""
+    kinds = [key for key in ('launch', 'node') if key in entry]
+    if not kinds:
+        for key in ('args', 'start_limit_s'):
+            if key in entry:
+                raise ConfigError(prefix + key, entry[key], 'given together with launch or node')
+        return None
+    if len(kinds) > 1:
+        raise ConfigError(prefix + 'node', entry['node'], 'one of launch and node, not both')
+    kind = kinds[0]
+    pattern, allowed = {'launch': (_LAUNCH, 'PACKAGE/FILE.launch'), 'node': (_NODE, 'PACKAGE TYPE')}[kind]
+    found = pattern.fullmatch(entry[kind]) if isinstance(entry[kind], str) else None
+    if found is None or '..' in entry[kind]:
+        raise ConfigError(prefix + kind, entry[kind], allowed)
+    args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
+    return InterfaceStart(kind, found.group(1), found.group(2), tuple(args),
+                          _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', InterfaceStart.LIMIT_S)))
+
+
+def _launch_args(key: str, given: Any) -> List[str]:
+    args = []
+    for name, value in values.mapping(key, given).items():
+        if not _ARGUMENT.fullmatch(name) or not isinstance(value, (str, int, float)):
+            raise ConfigError('{}.{}'.format(key, name), value, 'the name of a launch argument, and text, a number or true or false')
+        args.append('{}:={}'.format(name, str(value).lower() if isinstance(value, bool) else value))
+    return args
+
+
+def _node_args(key: str, given: Any) -> Tuple[str, ...]:
+    return values.words(key, given if given is not None else ())

@@ -1,0 +1,171 @@
+"""Starts shared-autonomy interfaces that are not there, shows what they print, and ends them with all they started."""
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from pathlib import Path
+from typing import Any, Callable, Deque, Dict, List, Optional
+
+import roslib.packages
+import rospkg
+import rospy
+
+from smach_oracle.msg import InterfaceOutput
+
+from ..oracle.errors import InterfaceError
+from ..oracle.question import InterfaceOffer, InterfaceStart
+
+OUTPUT_TOPIC = '~interface_output'
+MOST_LINES = 200
+LONGEST_LINE = 500
+INTERRUPT_S = 12.0  # how long its command has after SIGINT
+TERMINATE_S = 3.0  # and all that is left after SIGTERM, before SIGKILL
+END_LIMIT_S = 25.0  # longer than both
+_TELL_PERIOD_S = 0.2
+_KEEPER = Path(__file__).with_name('process_keeper.py')
+_STEERING = re.compile(r'\x1b(\[[0-9;?]*[ -/]*[@-~]|\][^\x07]*\x07|.)')
+
+
+def command_of(start: InterfaceStart) -> List[str]:
+    """The command line.
+
+    :raises InterfaceError: where the package or the node is not there; of a launch file roslaunch itself tells.
+    """
+    try:
+        if start.kind == 'launch':
+            rospkg.RosPack().get_path(start.package)
+            # never a master of its own: it would be one that nobody else knows
+            return ['roslaunch', '--wait', '--screen', '--disable-title', start.package, start.target, *start.args]
+        found = roslib.packages.find_node(start.package, start.target)
+    except (rospkg.ResourceNotFound, roslib.packages.ROSPkgException) as err:
+        raise InterfaceError('there is no package {}'.format(start.package)) from err
+    if not found:
+        raise InterfaceError('there is no node {} in package {}'.format(start.target, start.package))
+    return [found[0], *start.args]
+
+
+class StartedInterface:
+    """One interface's processes, from their start to their end."""
+
+    def __init__(self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput], None]) -> None:
+        """Start it.
+
+        :raises InterfaceError: where it cannot be started.
+        """
+        self._name = offer.name
+        self._query_id = query_id
+        self._publish = publish
+        self._lines: Deque[str] = deque(maxlen=MOST_LINES)
+        self._lock = threading.Lock()
+        self._status, self._text = InterfaceOutput.STARTING, ''
+        self._changed = threading.Event()
+        self._over = False
+        if offer.start is None:
+            raise InterfaceError('nothing is said about how to start it')
+        command = command_of(offer.start)
+        # relative names mean the same in it as in this node's settings
+        environment = dict(os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/', PYTHONUNBUFFERED='1')
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, '-I', str(_KEEPER), str(INTERRUPT_S), str(TERMINATE_S), *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+        except OSError as err:
+            raise InterfaceError('it cannot be started: {}'.format(err)) from err
+        self.tell(InterfaceOutput.STARTING, 'started: ' + ' '.join(command))
+        for target in (self._read, self._tell_on):
+            threading.Thread(target=target, name='output of ' + offer.name, daemon=True).start()
+
+    @property
+    def exit_code(self) -> Optional[int]:
+        """Of its command, None as long as it runs."""
+        return self._process.poll()
+
+    @property
+    def last_words(self) -> str:
+        """The last lines that say something, for an error."""
+        with self._lock:
+            return ' / '.join([line for line in self._lines if line.strip()][-3:])
+
+    def tell(self, status: int, text: str) -> None:
+        """Publish how it stands."""
+        with self._lock:
+            self._status, self._text = status, text
+        rospy.loginfo('Interface %s: %s', self._name, text)
+        self._send()
+
+    def stop(self) -> None:
+        """Begin its end; returns at once. Nothing of it is left after some seconds, by force where needed."""
+        if self._process.stdin is not None and not self._process.stdin.closed:
+            self._process.stdin.close()
+        self._over = True
+        self._changed.set()
+
+    def ended(self, limit_s: float) -> bool:
+        """Wait until nothing of it is left; whether that is so."""
+        try:
+            self._process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def _read(self) -> None:
+        stream: Any = self._process.stdout
+        for line in stream:
+            text = _STEERING.sub('', line.decode('utf-8', 'replace')).rstrip()[:LONGEST_LINE]
+            with self._lock:
+                self._lines.append(text)
+            self._changed.set()
+
+    def _tell_on(self) -> None:
+        while not self._over:
+            self._changed.wait()
+            self._changed.clear()
+            self._send()
+            time.sleep(_TELL_PERIOD_S)
+
+    def _send(self) -> None:
+        with self._lock:
+            message = InterfaceOutput(query_id=self._query_id, interface=self._name, status=self._status,
+                                      text=self._text, lines=list(self._lines))
+        if not rospy.is_shutdown():
+            self._publish(message)
+
+
+class InterfaceStarter:
+    """Starts interfaces for a node's questions; one at a time of each name."""
+
+    def __init__(self) -> None:
+        self._publisher = rospy.Publisher(OUTPUT_TOPIC, InterfaceOutput, latch=True, queue_size=5)
+        self._last: Dict[str, StartedInterface] = {}
+        self._lock = threading.Lock()
+        rospy.on_shutdown(self.stop)
+
+    def start(self, offer: InterfaceOffer, query_id: str) -> StartedInterface:
+        """Start it, once what was started under its name before has ended.
+
+        :raises InterfaceError: where it cannot be started.
+        """
+        before = self._last.get(offer.name)
+        if before is not None:
+            before.stop()
+            if not before.ended(END_LIMIT_S):
+                raise InterfaceError('what was started for an earlier question has not ended within {:g} s'.format(
+                    END_LIMIT_S))
+        try:
+            started = StartedInterface(offer, query_id, self._publisher.publish)
+        except InterfaceError as err:
+            self._publisher.publish(InterfaceOutput(query_id=query_id, interface=offer.name,
+                                                    status=InterfaceOutput.FAILED, text=str(err)))
+            raise
+        with self._lock:
+            self._last[offer.name] = started
+        return started
+
+    def stop(self) -> None:
+        """Begin the end of all that was started; each has a keeper that sees to it, this node alive or not."""
+        with self._lock:
+            for started in self._last.values():
+                started.stop()

@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""Interfaces that are started when an expert chooses them: the documentation's own example, and starts that fail."""
+import os
+import re
+import shutil
+import sys
+import tempfile
+import threading
+import unittest
+
+import rosgraph
+import rospkg
+import rospy
+import rostest
+import yaml
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from expert_fixtures import make_question  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.expert.followed_server import ServerGoneError, call_service  # noqa: E402
+from smach_oracle.msg import InterfaceOutput  # noqa: E402
+from smach_oracle.oracle.config import Settings  # noqa: E402
+from smach_oracle.oracle.errors import InterfaceError  # noqa: E402
+from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.srv import FinishInterface, FinishInterfaceRequest  # noqa: E402
+
+PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'shared_autonomy.md')
+LAUNCH = '<launch><node pkg="my_robot" type="by_hand.py" name="by_hand" output="screen"/></launch>'
+BROKEN = '#!/bin/sh\necho it has no camera >&2\nexit 5\n'
+IDLE = '#!/bin/sh\nexec sleep 600\n'
+
+
+def blocks(language):
+    """The fenced blocks of a language on the page, in the section of the example."""
+    with open(PAGE) as file:
+        section = file.read().split('## An interface of your own')[1].split('\n## ')[0]
+    return re.findall('```{}\n(.*?)```'.format(language), section, re.S)
+
+
+class InterfaceOnDemand(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        package = os.path.join(cls.folder, 'my_robot')
+        os.mkdir(package)
+        files = {'package.xml': '<package><name>my_robot</name><version>1.0.0</version><description>x</description>'
+                                '<maintainer email="a@b.c">a</maintainer><license>BSD</license></package>',
+                 'by_hand.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN, 'idle': IDLE}
+        for name, text in files.items():
+            with open(os.path.join(package, name), 'w') as file:
+                file.write(text)
+            os.chmod(os.path.join(package, name), 0o755)
+        os.environ['ROS_PACKAGE_PATH'] = cls.folder + ':' + os.environ['ROS_PACKAGE_PATH']
+        cls.client = ExpertQueryClient(server_wait_s=3.0)
+        cls.told = []
+        rospy.Subscriber(rospy.resolve_name('~interface_output'), InterfaceOutput, cls.told.append)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.client.close()
+        shutil.rmtree(cls.folder)
+
+    def offer(self, **changes):
+        entry = dict(yaml.safe_load(blocks('yaml')[0])['interfaces']['by_hand'], **changes)
+        entry = {key: value for key, value in entry.items() if value is not None}
+        return Settings.from_dict({'interfaces': {'by_hand': entry}}).offers_for('', 'PICK')[0]
+
+    def run_interface(self, offer, work):
+        """Run it while a person works in a thread; the answer."""
+        del self.told[:]
+        thread = threading.Thread(target=work)
+        thread.start()
+        try:
+            return self.client.run_interface(offer, make_question(self.id(), output_keys=('object_name',)),
+                                             threading.Event(), lambda *what: None)
+        finally:
+            thread.join()
+
+    def said(self, text):
+        return wait_for(lambda: any(text in line for told in list(self.told) for line in told.lines), 30.0)
+
+    def finish(self):
+        """What a front end does: as soon as the interface has said that it is ready."""
+        def finished():
+            try:
+                return call_service('/by_hand/finish', FinishInterface, FinishInterfaceRequest(outcome='succeeded')).ok
+            except ServerGoneError:
+                return False
+        self.seen = bool(self.said('Now do the work of PICK')) and bool(wait_for(finished))
+
+    def assert_gone(self):
+        self.assertTrue(self.client._starter._last['by_hand'].ended(25.0), 'nothing of it is left')
+
+    def assert_works(self, offer):
+        answer = self.run_interface(offer, self.finish)
+        self.assertTrue(self.seen, 'what it prints is told')
+        self.assertEqual((answer.outcome, answer.outputs), ('succeeded', {'object_name': 'mug'}))
+        self.assert_gone()
+        self.assertEqual(self.told[-1].status, InterfaceOutput.STOPPED)
+
+    def test_the_example_of_the_documentation_does_the_work_and_is_gone_afterwards(self):
+        self.assert_works(self.offer())
+        self.assertTrue(wait_for(lambda: '/by_hand/status' not in dict(rosgraph.Master('/t').getPublishedTopics(''))),
+                        'it ended in order')
+
+    def test_so_does_a_launch_file(self):
+        self.assert_works(self.offer(node=None, launch='my_robot/by_hand.launch'))
+
+    def assert_fails(self, offer, *texts):
+        with self.assertRaises(InterfaceError) as raised:
+            self.run_interface(offer, lambda: None)
+        for text in texts:
+            self.assertIn(text, str(raised.exception))
+        self.assertTrue(wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED))
+        self.assertEqual(self.told[-1].text, str(raised.exception))
+
+    def test_a_start_that_fails_is_said_with_its_last_words(self):
+        self.assert_fails(self.offer(node='my_robot broken'), 'exit code 5', 'it has no camera')
+        self.assert_fails(self.offer(node='my_robot nothing'), 'there is no node nothing in package my_robot')
+        self.assert_fails(self.offer(node='no_robot nothing'), 'there is no package no_robot')
+
+    def test_what_never_brings_up_its_server_is_ended(self):
+        self.assert_fails(self.offer(node='my_robot idle', start_limit_s=1.5), 'no action server /by_hand within 1.5 s')
+        self.assert_gone()
+
+    def test_one_that_nobody_can_start_is_waited_for_only_so_long(self):
+        with self.assertRaises(InterfaceError) as raised:
+            self.run_interface(self.offer(node=None), lambda: None)
+        self.assertIn('no action server at /by_hand within 3 s', str(raised.exception))
+
+
+if __name__ == '__main__':
+    rospy.init_node('interface_on_demand')
+    rostest.rosrun('smach_oracle', 'interface_on_demand', InterfaceOnDemand)
