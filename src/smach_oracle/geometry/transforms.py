@@ -4,8 +4,10 @@ from typing import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+UNTURNED = np.eye(3)
 
-def transform(position: Sequence[float] = (0.0, 0.0, 0.0), rotation: np.ndarray = np.eye(3)) -> np.ndarray:
+
+def transform(position: Sequence[float] = (0.0, 0.0, 0.0), rotation: np.ndarray = UNTURNED) -> np.ndarray:
     """4x4 of a position (3,) in m and a rotation matrix (3, 3)."""
     result = np.eye(4)
     result[:3, :3] = rotation

@@ -1,4 +1,4 @@
-"""Checks of single arguments of commands. Pure. A check takes what came and gives what is meant, or a ValueError."""
+"""Checks of single arguments of commands. A check takes what came and gives what is meant, or raises ValueError."""
 from typing import Any, Callable, Dict, NamedTuple, Tuple
 
 Check = Callable[[Any], Any]

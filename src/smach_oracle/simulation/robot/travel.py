@@ -12,7 +12,8 @@ from .kitchen import MapBox
 TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
           'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0])}
 NEAR_ENOUGH = 0.06  # rad
-CARRIES = ((0.45, -0.38, -0.2), (0.45, -0.38, 0.2), (0.45, -0.32, -0.2), (0.48, -0.42, -0.5))  # m, m, rad: where the right hand carries
+# m, m, rad: where the right hand carries
+CARRIES = ((0.45, -0.38, -0.2), (0.45, -0.38, 0.2), (0.45, -0.32, -0.2), (0.48, -0.42, -0.5))
 CARRY_HEIGHTS = (0.85, 1.00)  # m
 CARRY_SPEED = 0.3
 
