@@ -35,8 +35,9 @@ class Teleoperation(unittest.TestCase):
         self.assertTrue(self.ann.active())
 
     def tearDown(self):
+        self.ann.send(held=False)
         self.sent.cancel()
-        self.assertTrue(wait_for(lambda: not self.ann.finish('succeeded', [], '').ok))
+        self.assertTrue(wait_for(lambda: self.ann.states[-1].query_id == ''))
 
     def moved(self, **command):
         """Hold a command for a while: how far the tool went (m), and the least and the most that it may."""
@@ -127,6 +128,75 @@ class Teleoperation(unittest.TestCase):
                 break
         self.assertEqual(refused, 'ann drives; one at a time')
 
+    def test_another_ones_refused_command_changes_nothing_for_who_drives(self):
+        bob = Person(SERVER, 'bob')
+        ROBOT.blocked = True
+        self.assertTrue(wait_for(lambda: self.ann.hold(0.1, linear=(0.0, 0.0, 0.2)) and max(ROBOT.leads) > 0.12))
+        seen = len(ROBOT.leads)
+        for _ in range(15):
+            self.ann.hold(0.03, linear=(0.0, 0.0, 0.2))
+            bob.send(linear=(0.0, 0.0, -0.2))
+        refused = [state for state in bob.states if state.refused == 'ann drives; one at a time']
+        self.assertTrue(refused and {state.sender for state in refused} == {'bob'})
+        self.assertGreater(np.median(ROBOT.leads[seen:]), 0.1, 'her targets did not begin anew')
+
+    def test_an_arm_that_could_not_follow_pushes_no_more_once_the_dead_man_is_let_go(self):
+        ROBOT.blocked = True
+        self.assertTrue(wait_for(lambda: self.ann.hold(0.1, linear=(0.0, 0.0, 0.2)) and max(ROBOT.leads) > 0.1))
+        self.assertLess(max(ROBOT.leads), 0.16)
+        self.assertTrue(wait_for(lambda: ROBOT.leads[-1] < 0.051))
+        self.ann.hold(0.5, linear=(0.0, 0.0, 0.2))
+        self.ann.answer(self.ann.send(held=False))
+        self.assertTrue(wait_for(lambda: ROBOT.leads[-1] < 0.051))
+
+    def test_the_gripper_stops_with_the_dead_man_and_turns_round_when_told(self):
+        ROBOT.grip_s = 5.0
+        self.assertTrue(wait_for(lambda: self.close() and self.ann.states[-1].gripper_moving))
+        self.ann.send(held=False)
+        self.assertTrue(wait_for(lambda: ROBOT.grips == [(0.0, False)]))
+        self.assertTrue(wait_for(lambda: not self.ann.states[-1].gripper_moving))
+        self.assertTrue(wait_for(lambda: self.close() and self.ann.states[-1].gripper_moving))
+        ROBOT.grip_s = 0.05
+        self.assertTrue(wait_for(lambda: self.ann.send(move_gripper=True, gripper=0.08)
+                                 and (0.08, True) in ROBOT.grips))
+        self.assertEqual(ROBOT.grips[1], (0.0, False))
+
+    def close(self):
+        return self.ann.send(move_gripper=True, gripper=0.0)
+
+    def test_a_preempt_stops_the_gripper(self):
+        ROBOT.grip_s = 5.0
+        self.assertTrue(wait_for(lambda: self.close() and self.ann.states[-1].gripper_moving))
+        self.sent.cancel()
+        self.assertTrue(wait_for(lambda: ROBOT.grips and ROBOT.grips[0] == (0.0, False)))
+
+    def test_joints_that_are_silent_or_no_numbers_move_nothing_and_the_hand_obeys_again_afterwards(self):
+        for fault, says in (('silent', 'no joint_states for '), ('odd', 'finite')):
+            setattr(ROBOT, fault, True)
+            self.assertTrue(wait_for(lambda: self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused, 20.0))
+            self.assertIn(says, self.ann.states[-1].refused)
+            setattr(ROBOT, fault, False)
+            self.assertTrue(wait_for(lambda: not self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused))
+
+    def test_a_hand_that_is_still_held_does_not_drive_the_next_goal(self):
+        self.ann.send(linear=(0.0, 0.0, 0.05))
+        with self.ann.pressing(linear=(0.0, 0.0, 0.05)):
+            self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
+            self.sent.cancel()
+            self.assertTrue(wait_for(lambda: 'no goal' in self.ann.states[-1].refused))
+            self.sent = self.ann.start(query_id='q3')
+            self.assertTrue(wait_for(lambda: 'let go of the dead-man first' in self.ann.states[-1].refused))
+        self.ann.send(held=False)
+        with self.ann.pressing(linear=(0.0, 0.0, 0.05)):
+            self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
+
+    def test_the_end_of_a_goal_is_told_to_who_comes_later(self):
+        self.sent.cancel()
+        self.assertTrue(wait_for(lambda: self.ann.states[-1].query_id == ''))
+        late = Person(SERVER, 'late')
+        self.assertTrue(wait_for(lambda: late.states))
+        self.assertEqual(late.states[0].query_id, '')
+
     def test_a_second_goal_is_refused(self):
         second = self.ann.start(query_id='q2')
         status, result = result_of(second)
@@ -135,8 +205,8 @@ class Teleoperation(unittest.TestCase):
 
     def test_the_person_finishes_and_the_grasp_is_known(self):
         self.ann.hold(0.3, linear=(0.0, 0.0, 0.1))
-        self.ann.send(move_gripper=True, gripper=0.0)
-        self.assertTrue(wait_for(lambda: self.ann.states[-1].gripper_stalled))
+        self.assertTrue(wait_for(lambda: self.ann.send(move_gripper=True, gripper=0.0)
+                                 and self.ann.states[-1].gripper_stalled))
         grasp = self.robot_tool()
         self.ann.hold(0.3, linear=(0.0, 0.0, 0.1))
         refused = self.ann.finish('finished', [], '')

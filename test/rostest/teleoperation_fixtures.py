@@ -1,4 +1,5 @@
 """An arm that goes at once where it is told, and a person's front end, to test the manipulation interface."""
+import contextlib
 import threading
 import time
 
@@ -22,12 +23,19 @@ NAMES = ['j{}'.format(number) for number in range(7)]
 
 
 class FakeArm:
-    """Takes every target at once, tells its joints 100 times a second; its gripper meets something at 5 cm."""
+    """Takes every target at once, tells its joints 100 times a second; its gripper meets something at 5 cm.
+
+    Unless it is `blocked` (it stays where it is), `silent` (it tells nothing), or `odd` (it tells what is no number).
+    """
 
     def __init__(self):
         self._lock = threading.Lock()
         self._positions = np.array(READY)
         self.moved_s = 0.0  # monotonic, of the last change
+        self.blocked = self.silent = self.odd = False
+        self.leads = []  # rad, of each target before where the arm is
+        self.grip_s = 0.05  # that a motion of the gripper takes
+        self.grips = []  # of the gripper's motions: where to, and whether it came to its end
         self._states = rospy.Publisher('joint_states', JointState, queue_size=10, tcp_nodelay=True)
         self._gripper = actionlib.SimpleActionServer('gripper', GripperCommandAction, self._grip, auto_start=False)
         self._gripper.start()
@@ -35,13 +43,18 @@ class FakeArm:
         threading.Thread(target=self._tell_on, daemon=True).start()
 
     def reset(self):
+        self.blocked = self.silent = self.odd = False
+        self.grip_s = 0.05
+        self.leads, self.grips = [], []
         with self._lock:
             self._positions = np.array(READY)
         self.tell()
 
     def tell(self):
         with self._lock:
-            positions = self._positions.tolist()
+            positions = [float('nan')] * 7 if self.odd else self._positions.tolist()
+        if self.silent:
+            return
         self._states.publish(JointState(Header(stamp=rospy.Time.now()), NAMES, positions, [], []))
 
     def _tell_on(self):
@@ -55,13 +68,21 @@ class FakeArm:
     def _move(self, message):
         now_s = time.monotonic() + message.points[-1].time_from_start.to_sec()
         with self._lock:
-            self._positions = np.array(message.points[-1].positions)
+            self.leads.append(np.abs(np.array(message.points[-1].positions) - self._positions).max())
+            if not self.blocked:
+                self._positions = np.array(message.points[-1].positions)
         self.moved_s = now_s
         self.tell()
 
     def _grip(self, goal):
-        time.sleep(0.05)
+        until_s = time.monotonic() + self.grip_s
+        while time.monotonic() < until_s and not self._gripper.is_preempt_requested():
+            time.sleep(0.005)
+        self.grips.append((goal.command.position, time.monotonic() >= until_s))
         met = goal.command.position < 0.05
+        if not self.grips[-1][1]:
+            self._gripper.set_preempted(GripperCommandResult(0.07, 0.0, False, False))
+            return
         self._gripper.set_succeeded(GripperCommandResult(max(0.05, goal.command.position), 10.0, met, not met))
 
 
@@ -110,6 +131,22 @@ class Person:
             self.send(**command)
             time.sleep(1.0 / rate_hz)
         return begun_s, sent_s
+
+    @contextlib.contextmanager
+    def pressing(self, **command):
+        """Send a command 30 times a second meanwhile."""
+        over = threading.Event()
+
+        def press():
+            while not over.wait(1.0 / 30.0):
+                self.send(**command)
+        thread = threading.Thread(target=press, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
     def tool(self):
         """(3,) m, where the tool was last said to be."""

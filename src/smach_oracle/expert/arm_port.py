@@ -1,4 +1,5 @@
 """A robot's arm on ROS: joint states in, joint targets out, a gripper action."""
+import math
 import threading
 import time
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
@@ -48,6 +49,7 @@ class JointListener:
     def __init__(self, topic: str = 'joint_states') -> None:
         self._changed = threading.Condition()
         self._positions: Dict[str, float] = {}
+        self._heard_s: Dict[str, float] = {}  # monotonic
         self._stamp = rospy.Time()
         self._subscriber = rospy.Subscriber(topic, JointState, self._heard, queue_size=100, tcp_nodelay=True)
 
@@ -55,6 +57,11 @@ class JointListener:
         """Positions by joint (rad or m), and their time."""
         with self._changed:
             return dict(self._positions), self._stamp
+
+    def silent_s(self, names: Sequence[str]) -> float:
+        """For how long (wall time) the least heard of these joints has been silent; inf where one never was heard."""
+        with self._changed:
+            return time.monotonic() - min(self._heard_s.get(name, -math.inf) for name in names)
 
     def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time, period_s: float,
                         limit_s: float) -> bool:
@@ -79,6 +86,7 @@ class JointListener:
     def _heard(self, message: JointState) -> None:
         with self._changed:
             self._positions.update(zip(message.name, message.position))
+            self._heard_s.update(dict.fromkeys(message.name, time.monotonic()))
             self._stamp = message.header.stamp
             self._changed.notify_all()
 
@@ -97,6 +105,7 @@ class GripperPort:
     def __init__(self, action: str) -> None:
         self._link = GoalLink(rospy.resolve_name(action), GripperCommandAction)
         self._sent: Optional[SentGoal] = None
+        self._wanted = (math.nan, math.nan)  # m, N
         self.report = GripperReport()
 
     def why_not(self) -> str:
@@ -109,10 +118,22 @@ class GripperPort:
         return self._sent is not None
 
     def move(self, position: float, effort: float) -> None:
-        """Begin to move to `position` m between the tips, with at most `effort` N."""
+        """Begin to move to `position` m between the tips, with at most `effort` N.
+
+        The same once more, while it is on its way there, changes nothing; anything else comes in its place.
+        """
+        if self.moving and self._wanted == (position, effort):
+            return
+        self._wanted = position, effort
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = position, effort
         self._sent = self._link.send(goal, time.monotonic())
+
+    def stop(self) -> None:
+        """Take back a motion that has not ended."""
+        sent = self._sent
+        if sent is not None:
+            sent.cancel()
 
     def poll(self, timeout_s: float) -> bool:
         """Take notice of a motion's end; whether it has just ended."""

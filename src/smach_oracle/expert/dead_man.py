@@ -1,6 +1,8 @@
 """Who drives, and whether they still do: a dead-man's handle with a watchdog. Pure; times are monotonic, in s."""
 import math
 
+_LET_GO_S = 0.3  # silence that counts as letting go, where the handle was taken from a hand that pressed it
+
 
 class DeadMan:
     """Held by one operator at a time, by commands that keep coming."""
@@ -10,6 +12,8 @@ class DeadMan:
         self._watchdog_s = watchdog_s
         self._until_s = -math.inf
         self._operator = ''
+        self._dropped = ''  # who pressed it when it was dropped, and has not let go since
+        self._silent_until_s = -math.inf
 
     def holder(self, now_s: float) -> str:
         """Who holds it, '' for nobody."""
@@ -20,14 +24,31 @@ class DeadMan:
         holder = self.holder(now_s)
         if holder and holder != operator:
             return '{} drives; one at a time'.format(holder)
+        if operator == self._dropped and now_s < self._silent_until_s:
+            self._silent_until_s = now_s + _LET_GO_S
+            return 'let go of the dead-man first: it was pressed before this goal began'
         self._operator, self._until_s = operator, now_s + self._watchdog_s
         return ''
 
     def release(self, operator: str) -> None:
-        """Let go; what others hold they keep."""
+        """The hand has let go; what others hold they keep."""
+        self.refuse(operator)
+        if operator == self._dropped:
+            self._dropped = ''
+
+    def refuse(self, operator: str) -> None:
+        """What the operator wants cannot be: not held any more, until the next press."""
         if operator == self._operator:
             self._until_s = -math.inf
 
-    def drop(self) -> None:
-        """Let go whoever holds it."""
-        self._until_s = -math.inf
+    def press_for_nothing(self, operator: str, now_s: float) -> None:
+        """Pressed while there is nothing to hold it for: it does not hold what comes next either."""
+        self.refuse(operator)
+        if math.isfinite(self._watchdog_s):  # without one, silence says nothing
+            self._dropped, self._silent_until_s = operator, now_s + _LET_GO_S
+
+    def drop(self, now_s: float) -> None:
+        """What it was held for has ended."""
+        holder = self.holder(now_s)
+        if holder:
+            self.press_for_nothing(holder, now_s)

@@ -1,5 +1,5 @@
 """One arm that a person drives: commands in, one control period of motion out, and what is known of its tool."""
-from typing import Mapping, NamedTuple, Optional, Tuple
+from typing import Callable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -9,10 +9,13 @@ from std_msgs.msg import Header
 from smach_oracle.msg import TeleopCommand
 
 from ..geometry.chain import Chain, read_joints
-from ..geometry.links import link_pose
+from ..geometry.links import joints_between, link_pose
 from ..geometry.transforms import quaternion
 from .arm_port import ArmNames, ArmPort, GripperPort, JointListener
-from .teleoperation import CartesianDrive, DriveLimits, Near, Step, pulled_back
+from .teleoperation import CartesianDrive, DriveLimits, Near, Step, pulled_back, standing
+
+_SILENT_S = 1.0  # wall time after which joints that say nothing are not known any more
+_REST_LEAD = 0.05  # rad by which targets may stay ahead of the joints when nobody moves the arm
 
 
 class Robot(NamedTuple):
@@ -63,27 +66,51 @@ class Hand:
         """A person takes hold: targets start from where the arm is measured to be."""
         self._targets = None
 
-    def why_not(self, command: TeleopCommand) -> str:
-        """Why the command cannot be carried out, or ''."""
+    def rest(self, period_s: float) -> None:
+        """The person has let go: an arm that could not follow its targets stops pushing."""
+        targets, self._targets = self._targets, None
+        if targets is not None:
+            near = pulled_back(targets, self.measured(self._robot.listener.now()[0]), _REST_LEAD)
+            if (near != targets).any():
+                self._port.send(near, np.zeros(len(near)), period_s)
+
+    def why_not(self, command: TeleopCommand, frozen: bool) -> str:
+        """Why the command cannot be carried out, or ''.
+
+        :param frozen: whether the world stands still, and says nothing, between two commands.
+        """
         twist = _array(command.twist)
         if not np.isfinite(twist).all():
             return 'twist {} is not finite'.format(twist.tolist())
         if command.move_gripper and not (0.0 <= command.gripper < np.inf and 0.0 <= command.gripper_effort < np.inf):
             return 'gripper {} m with {} N: both must be finite and 0 or more'.format(
                 command.gripper, command.gripper_effort)
-        positions, _ = self._robot.listener.now()
-        missing = [name for name in self.chain.names if name not in positions]
-        if missing:
-            return 'no joint_states of {} yet'.format(', '.join(missing))
         try:
-            self._axes(command.header.frame_id, positions)
+            needed = joints_between(self._tree, self._robot.base, command.header.frame_id)
         except ValueError as err:
             return 'frame {!r}: {}; allowed: {}, {} or another link of the robot'.format(
                 command.header.frame_id, err, self._names.tool, self._robot.base)
-        return self._port.why_not() or (self.gripper.why_not() if command.move_gripper else '')
+        return self._unknown(needed, frozen) or self._port.why_not() or (self.gripper.why_not() if command.move_gripper else '')
 
-    def move(self, command: TeleopCommand, period_s: float) -> Step:
-        """Send the joints where the tool is one period later, if it moves as commanded."""
+    def _unknown(self, more: Sequence[str], frozen: bool) -> str:
+        """Which joints of the arm, or of `more`, are not where joint_states last said they were; '' : none."""
+        needed = joints_between(self._tree, self._robot.base, self._names.tool)[::-1]
+        needed += [name for name in more if name not in needed]
+        positions, _ = self._robot.listener.now()
+        missing = [name for name in needed if name not in positions]
+        if missing:
+            return 'no joint_states of {} yet'.format(', '.join(missing))
+        odd = [name for name in needed if not np.isfinite(positions[name])]
+        if odd:
+            return 'joint_states of {} are not finite'.format(', '.join(odd))
+        silent_s = self._robot.listener.silent_s(needed)
+        return '' if frozen or silent_s < _SILENT_S else 'no joint_states for {:.1f} s'.format(silent_s)
+
+    def move(self, command: TeleopCommand, period_s: float, held: Callable[[], bool]) -> Step:
+        """Send the joints where the tool is one period later, if it moves as commanded.
+
+        :param held: whether the dead-man still is, asked right before.
+        """
         positions, _ = self._robot.listener.now()
         measured = self.measured(positions)
         targets = measured if self._targets is None else pulled_back(self._targets, measured, self._lead)
@@ -91,6 +118,8 @@ class Hand:
         axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id, positions)
         step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]), period_s,
                                 command.turn_freely)
+        if not held():
+            return standing()
         if step.velocities.any():
             self._port.send(step.joints, step.velocities, period_s)
         self._targets = step.joints
@@ -100,7 +129,7 @@ class Hand:
         """Move in lock-step with a world that stands still between commands; whether it has carried that out."""
         positions, since = self._robot.listener.now()
         before = {name: positions[name] for name in self.chain.names}
-        step = self.move(command, period_s)
+        step = self.move(command, period_s, lambda: True)
         if not step.velocities.any():  # time passes, too
             self._port.send(step.joints, step.velocities, period_s)
         moved = before if step.velocities.any() else None

@@ -3,7 +3,6 @@
 A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState), `~finish` and `~give_up`; for any
 robot with a robot_description, joint_states, arms that take joint trajectories and grippers of control_msgs.
 """
-import queue
 import threading
 import time
 from typing import Any, Dict, Mapping, Optional
@@ -18,6 +17,7 @@ from smach_oracle.srv import Snapshot
 from ..oracle.errors import ConfigError
 from ..ros.command_line import parameters_only
 from ..ros.master_watch import start_master_watch
+from .command_inbox import Arrived, CommandInbox
 from .dead_man import DeadMan
 from .hand import Hand
 from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
@@ -46,12 +46,12 @@ class TeleoperationServer:
         # in lock-step nothing moves between commands; a slow sender must not change what its commands do
         self._dead_man = DeadMan(float('inf') if settings.lock_step else settings.watchdog_s)
         self._held: Optional[TeleopCommand] = None
-        self._commands: 'queue.Queue[TeleopCommand]' = queue.Queue()
-        self._told_s = 0.0
+        self._commands = CommandInbox()
+        self._told_s, self._told_query = 0.0, ''
         self._unsure = True  # whether others may have moved the robot since our last command
         self._snapshot = (rospy.ServiceProxy(settings.snapshot, Snapshot)
                           if settings.lock_step and settings.snapshot != NO_SNAPSHOT else None)
-        self._seq, self._refused, self._step = 0, '', standing()
+        self._seq, self._sender, self._refused, self._step = 0, '', '', standing()
         self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True, tcp_nodelay=True)
         self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
         self._services = SettlingServices(self._goal, self.outputs)
@@ -73,56 +73,65 @@ class TeleoperationServer:
         return known
 
     def _begun(self, goal: SharedAutonomyGoal) -> None:
-        self._seq, self._refused, self._step = 0, '', standing()
+        self._seq, self._sender, self._refused, self._step = 0, '', '', standing()
         self._arm = self._settings.arm_of(goal.state, self._arm)
         self._unsure = True
         for hand in self._hands.values():
             hand.forget()
 
     def _ended(self) -> None:
-        self._dead_man.drop()
+        self._dead_man.drop(time.monotonic())
+        for hand in self._hands.values():
+            hand.gripper.stop()
 
     def _on_boxes(self, message: CollisionBoxes) -> None:
         if self._surroundings is not None:
             self._surroundings.replace(message)
 
     def _run(self) -> None:
-        period_s = self._settings.period_s
         due_s = time.monotonic()
         while not rospy.is_shutdown():
-            moving = self._held is not None
-            command = self._next(max(0.0, due_s - time.monotonic()) if moving else _IDLE_S)
-            if command is not None:
-                self._take(command)
-            now_s = time.monotonic()
-            if self._held is not None and now_s >= due_s:
-                due_s = max(due_s + period_s, now_s)
-                self._move_on(now_s)
-            elif self._held is None:
-                due_s = now_s
-                self._idle(now_s)
+            try:
+                due_s = self._work(due_s)
+            except rospy.ROSException as err:
+                rospy.logdebug('%s: the node goes down: %s', rospy.get_name(), err)
+            except Exception as err:  # whatever it was: the hand stands, and the next command is heard
+                rospy.logerr_throttle(1.0, '{}: {!r}'.format(rospy.get_name(), err))
+                self._dead_man.refuse(self._dead_man.holder(time.monotonic()))
+                self._held, self._step, self._refused = None, standing(), 'error: {}'.format(err)
 
-    def _next(self, timeout_s: float) -> Optional[TeleopCommand]:
-        try:
-            return self._commands.get(timeout=timeout_s) if timeout_s > 0 else self._commands.get_nowait()
-        except queue.Empty:
-            return None
+    def _work(self, due_s: float) -> float:
+        """Take the commands that have come, and move on by a period where it is time; when the next one is due."""
+        wait_s = max(0.0, due_s - time.monotonic()) if self._held is not None else _IDLE_S
+        for arrived in self._commands.take_all(wait_s):
+            self._take(arrived)
+        self._goal.drop_if_asker_is_gone()
+        now_s = time.monotonic()
+        if self._held is None:
+            self._idle(now_s)
+            return now_s
+        if now_s < due_s:
+            return due_s
+        self._move_on()
+        return max(due_s + self._settings.period_s, now_s)
 
-    def _take(self, command: TeleopCommand) -> None:
+    def _driver(self) -> str:
+        """Who moves the hand, '' for nobody: the dead-man holds no longer than the goal."""
+        return self._dead_man.holder(time.monotonic()) if self._goal.goal is not None else ''
+
+    def _take(self, arrived: Arrived) -> None:
         """Carry out a command, or say why not; a bad one of the person who drives stops the arm."""
-        self._seq, self._step = command.seq, standing()
-        self._refused = self._why_not(command)
-        hand = self._hands.get(command.arm)
-        if self._refused or hand is None:
-            self._let_go(command.operator)
-        elif not command.dead_man:
-            self._let_go(command.operator)
+        command = arrived.command
+        self._seq, self._sender = command.seq, command.operator
+        self._refused = self._why_not(arrived)
+        if self._refused or not command.dead_man:
+            self._let_go(arrived)
+            self._tell()
         else:
-            self._hold(command, hand)
-            return
-        self._tell()
+            self._hold(command)
 
-    def _why_not(self, command: TeleopCommand) -> str:
+    def _why_not(self, arrived: Arrived) -> str:
+        command = arrived.command
         if self._goal.goal is None:
             return NO_GOAL
         if command.arm not in self._hands:
@@ -131,21 +140,43 @@ class TeleoperationServer:
             return 'a command needs the name of its operator'
         if not command.dead_man:
             return ''
-        why = self._hands[command.arm].why_not(command)
-        now_s = time.monotonic()
-        holder = self._dead_man.holder(now_s)
-        if not why and holder != command.operator:
-            self._hands[command.arm].begin()
-        return why or self._dead_man.press(command.operator, now_s)
+        hand = self._hands[command.arm]
+        goes_on = self._dead_man.holder(arrived.at_s) == command.operator and command.arm == self._arm
+        why = (hand.why_not(command, self._settings.lock_step)
+               or self._dead_man.press(command.operator, arrived.at_s))
+        if why:
+            return why
+        if self._driver() != command.operator:
+            return 'it came too late to be carried out'
+        if not goes_on:
+            self._stand()
+            hand.begin()
+        return ''
 
-    def _let_go(self, operator: str) -> None:
-        self._dead_man.release(operator)
-        if self._held is not None and self._held.operator == operator:
-            self._held = None
+    def _let_go(self, arrived: Arrived) -> None:
+        """The operator lets go, or is refused."""
+        operator = arrived.command.operator
+        if operator in (self._driver(), self._held.operator if self._held is not None else ''):
+            self._stand()
+        if not arrived.command.dead_man:
+            self._dead_man.release(operator)
+        elif self._goal.goal is None:
+            self._dead_man.press_for_nothing(operator, arrived.at_s)
+        else:
+            self._dead_man.refuse(operator)
 
-    def _hold(self, command: TeleopCommand, hand: Hand) -> None:
+    def _stand(self) -> None:
+        """Nobody moves anything any more."""
+        self._held, self._step = None, standing()
+        for hand in self._hands.values():
+            hand.gripper.stop()
+        if self._goal.goal is not None and not self._settings.lock_step:  # after it, the arm is others' to move
+            self._hands[self._arm].rest(self._settings.period_s)
+
+    def _hold(self, command: TeleopCommand) -> None:
         self._arm = command.arm
-        if command.move_gripper and not hand.gripper.moving:
+        hand = self._hands[command.arm]
+        if command.move_gripper:
             hand.gripper.move(command.gripper, command.gripper_effort or self._settings.gripper_effort)
         if self._settings.lock_step:
             self._in_lock_step(command, hand)
@@ -155,8 +186,12 @@ class TeleoperationServer:
     def _in_lock_step(self, command: TeleopCommand, hand: Hand) -> None:
         """Carry the command out for one period, and tell when the world has done it."""
         until_s = time.monotonic() + _GRIPPER_S
-        while hand.gripper.moving and time.monotonic() < until_s and not rospy.is_shutdown():
+        while hand.gripper.moving and time.monotonic() < until_s and self._driver() and not rospy.is_shutdown():
             self._poll_gripper(hand, 0.02)
+        if not self._driver():
+            self._refused = NO_GOAL
+            self._tell()
+            return
         if self._unsure or command.move_gripper:
             self._catch_up(hand)
         if self._surroundings is not None:
@@ -179,17 +214,18 @@ class TeleoperationServer:
         if not hand.catch_up(stamp, _APPLIED_S):
             rospy.logwarn('joint_states of %s did not come', stamp)
 
-    def _move_on(self, now_s: float) -> None:
+    def _move_on(self) -> None:
         """One period of a command that is held."""
         command = self._held
-        if command is None or self._dead_man.holder(now_s) != command.operator:
-            self._held, self._step = None, standing()
+        if command is None or self._driver() != command.operator:
+            self._stand()
         else:
             hand = self._hands[command.arm]
             if self._surroundings is not None:
                 self._surroundings.update()
-            self._step = hand.move(command, self._settings.period_s)
-            self._poll_gripper(hand, 0.0)
+            self._step = hand.move(command, self._settings.period_s, lambda: self._driver() == command.operator)
+        for each in self._hands.values():
+            self._poll_gripper(each, 0.0)
         self._tell()
 
     def _poll_gripper(self, hand: Hand, timeout_s: float) -> None:
@@ -198,19 +234,22 @@ class TeleoperationServer:
 
     def _idle(self, now_s: float) -> None:
         for hand in self._hands.values():
-            if hand.gripper.moving:
-                self._poll_gripper(hand, 0.0)
-        self._goal.drop_if_asker_is_gone()
-        if self._goal.goal is not None and now_s - self._told_s >= _IDLE_S:
+            self._poll_gripper(hand, 0.0)
+        query = self._query()
+        if query != self._told_query or (query and now_s - self._told_s >= _IDLE_S):
             self._tell()
 
+    def _query(self) -> str:
+        goal = self._goal.goal
+        return goal.query_id if goal is not None else ''
+
     def _tell(self) -> None:
-        goal, hand, now_s = self._goal.goal, self._hands[self._arm], time.monotonic()
-        self._told_s = now_s
-        state = TeleopState(query_id=goal.query_id if goal is not None else '', arm=self._arm, seq=self._seq,
-                            operator=self._dead_man.holder(now_s), refused=self._refused,
+        hand = self._hands[self._arm]
+        self._told_s, self._told_query = time.monotonic(), self._query()
+        state = TeleopState(query_id=self._told_query, arm=self._arm, seq=self._seq, sender=self._sender,
+                            operator=self._driver(), refused=self._refused,
                             moving=bool(self._step.velocities.any()), speed=self._step.speed,
-                            limit=hand.gripper.report.problem or self._step.limit, clearance=self._step.clearance,
+                            limit=self._step.limit or hand.gripper.report.problem, clearance=self._step.clearance,
                             gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled,
                             gripper_moving=hand.gripper.moving)
         pose = hand.tool_pose()
@@ -233,6 +272,6 @@ def main() -> None:
     except (ConfigError, ValueError) as err:
         rospy.logfatal('manipulation_interface: %s', err)
         raise SystemExit(2) from err
-    server = TeleoperationServer(settings, hands, surroundings)
-    rospy.loginfo('manipulation_interface: arms %s', ', '.join(sorted(server._hands)))
+    TeleoperationServer(settings, hands, surroundings)
+    rospy.loginfo('manipulation_interface: arms %s', ', '.join(sorted(hands)))
     rospy.spin()

@@ -30,5 +30,41 @@ def test_dropped_it_is_nobodys_even_without_a_watchdog():
     handle = DeadMan(float('inf'))
     handle.press('ann', 1.0)
     assert handle.holder(1e9) == 'ann'
-    handle.drop()
+    handle.drop(2.0)
     assert handle.holder(1.0) == ''
+
+
+def test_a_command_that_has_waited_holds_nothing():
+    handle = DeadMan(0.1)
+    handle.press('ann', 1.0)
+    assert handle.holder(1.5) == ''
+
+
+def test_a_hand_that_pressed_when_it_was_dropped_must_let_go_first():
+    handle = DeadMan(0.1)
+    handle.press('ann', 1.0)
+    handle.drop(1.05)
+    assert 'let go' in handle.press('ann', 1.2) and 'let go' in handle.press('ann', 1.45), 'pressed all along'
+    assert handle.press('bob', 1.46) == '', 'another one may'
+    handle.release('bob')
+    handle.release('ann')
+    assert handle.press('ann', 1.5) == '' and handle.holder(1.5) == 'ann'
+    handle.drop(1.55)
+    assert handle.press('ann', 1.9) == '', 'silence is letting go, too'
+    handle.refuse('ann')
+    assert handle.holder(1.9) == '' and handle.press('ann', 1.91) == '', 'refused for another reason'
+    handle.drop(5.0)
+    assert handle.press('ann', 5.01) == '', 'nobody pressed it'
+
+
+def test_who_presses_before_there_is_anything_to_hold_it_for_does_not_hold_what_begins():
+    handle = DeadMan(0.1)
+    handle.press_for_nothing('ann', 1.0)
+    assert 'let go' in handle.press('ann', 1.1)
+    handle.refuse('ann')
+    assert 'let go' in handle.press('ann', 1.2), 'a refused press is no letting go'
+    handle.release('ann')
+    assert handle.press('ann', 1.3) == ''
+    in_steps = DeadMan(float('inf'))
+    in_steps.press_for_nothing('ann', 1.0)
+    assert in_steps.press('ann', 1.1) == '', 'where silence says nothing'

@@ -46,7 +46,7 @@ class HandLink:
         self._seq += 1
         command.seq, command.operator = self._seq, self._operator
         self._publisher.publish(command)
-        if not self._wait(lambda state: state.seq == command.seq, _ANSWER_S):
+        if not self._wait(lambda state: (state.seq, state.sender) == (command.seq, self._operator), _ANSWER_S):
             raise Stuck('the manipulation interface does not answer')
         state = self._state
         if not state.query_id:
