@@ -5,10 +5,9 @@ ROS-free. Lengths in m, angles in rad, times in s; twists are (6,): linear, then
 base, about the tool's origin.
 """
 from functools import partial
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
-from typing_extensions import Protocol
 
 _ROOM = 1e-4  # rad; a joint with less room than this before its limit takes no part in a motion towards it
 _EASE_GAIN = 2.0  # 1/s, towards the arm's posture

@@ -1,8 +1,7 @@
 """Driving a hand by velocities, as a person at a joystick does: towards a place, watching where it is."""
-from typing import NamedTuple, Tuple
+from typing import NamedTuple, Protocol, Tuple
 
 import numpy as np
-from typing_extensions import Protocol
 
 from smach_oracle.geometry.transforms import inverse, rotation_vector
 

@@ -3,10 +3,9 @@
 Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the world's DirectRobot,
 which runs in one process. Lengths in m, angles in rad, times in s; frames as in REP 105 and REP 120.
 """
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Dict, List, NamedTuple, Protocol, Sequence
 
 import numpy as np
-from typing_extensions import Protocol
 
 ARMS = ('left', 'right')
 ARM_JOINTS: Dict[str, List[str]] = {

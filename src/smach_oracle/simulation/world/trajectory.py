@@ -5,11 +5,10 @@
 A motion is ticked before each control period and says None until it has ended. Several may be ticked side by side.
 """
 import math
-from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import List, Mapping, NamedTuple, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from typing_extensions import Protocol
 
 from ..robot.interface import GripperState
 from .physics import World
