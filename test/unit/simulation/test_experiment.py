@@ -7,14 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Optional
 
 import pytest
 
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.oracle.events import Event, EventKind
-from smach_oracle.simulation.experiment.command import alone_in, parse
+from smach_oracle.simulation.experiment.command import alone_in, parse, stop_all
 from smach_oracle.simulation.experiment.interrupts import Interrupted, Interrupts
-from smach_oracle.simulation.experiment.launching import MARK, end_marked, free_port, marked
+from smach_oracle.simulation.experiment.launching import MARK, end_marked, environment_of, free_port, marked
 from smach_oracle.simulation.experiment.plan import ExperimentError, enter_folder
 from smach_oracle.simulation.experiment.progress import ProgressLine, describe_trials, time_left
 
@@ -139,6 +140,50 @@ def test_signals_are_kept_for_a_moment_at_which_they_can_do_no_harm(signum: int)
             interrupts.check()
     assert caught.value.signum == signum
     assert signal.getsignal(signum) == before
+
+
+def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupts() as interrupts:
+            os.kill(os.getpid(), signal.SIGHUP)
+            interrupts.check()
+            assert signal.getsignal(signal.SIGINT) != signal.SIG_IGN
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_job_that_cannot_be_settled_does_not_keep_the_others_running() -> None:
+    stopped = []
+
+    class Stopped:
+        def __init__(self, error: Optional[Exception]) -> None:
+            self.error = error
+
+        def request_stop(self) -> None:
+            stopped.append('asked')
+
+        def stop(self) -> None:
+            stopped.append('stopped')
+            if self.error is not None:
+                raise self.error
+    with pytest.raises(OSError, match='disk full'):
+        stop_all([Stopped(OSError('disk full')), Stopped(ExperimentError('damaged')), Stopped(None)])
+    assert stopped == ['asked'] * 3 + ['stopped'] * 3
+
+
+def test_a_job_is_alone_with_its_master_whatever_the_shell_is_set_to(monkeypatch: pytest.MonkeyPatch,
+                                                                     tmp_path: Path) -> None:
+    for name, value in {'ROS_MASTER_URI': 'http://robot:11311', 'ROS_NAMESPACE': '/robot', 'ROS_IP': '10.0.0.1',
+                        'ROS_HOSTNAME': 'desk', 'OMP_NUM_THREADS': '3'}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv('OPENBLAS_NUM_THREADS', raising=False)
+    environment = environment_of(tmp_path, 4711)
+    assert environment['ROS_MASTER_URI'] == 'http://localhost:4711' and environment['ROS_HOSTNAME'] == 'localhost'
+    assert not {'ROS_NAMESPACE', 'ROS_IP'} & set(environment)
+    assert (environment['OMP_NUM_THREADS'], environment['OPENBLAS_NUM_THREADS']) == ('3', '1')
+    assert environment[MARK] == str(tmp_path) and environment['PATH'] == os.environ['PATH']
 
 
 def test_a_free_port_can_be_bound() -> None:

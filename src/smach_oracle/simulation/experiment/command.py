@@ -49,11 +49,22 @@ def run(plan: Plan, output: Path, at_a_time: int, hung_after_s: float) -> List[J
             run_jobs(jobs, at_a_time, interrupts, progress)
         finally:
             progress.end()
-            for job in jobs:
-                job.request_stop()
-            for job in jobs:
-                job.stop()
+            stop_all(jobs)
     return jobs
+
+
+def stop_all(jobs: Sequence[Job]) -> None:
+    """End what runs of every job, whatever may go wrong with one: of several errors the first is raised."""
+    for job in jobs:
+        job.request_stop()
+    errors: List[Exception] = []
+    for job in jobs:
+        try:
+            job.stop()
+        except (ExperimentError, OSError) as err:  # e.g. the disk is full
+            errors.append(err)
+    if errors:
+        raise errors[0]
 
 
 def run_jobs(jobs: Sequence[Job], at_a_time: int, interrupts: Interrupts, progress: ProgressLine) -> None:

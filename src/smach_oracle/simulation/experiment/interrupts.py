@@ -16,7 +16,7 @@ class Interrupts:
     """``with Interrupts() as interrupts:`` signals that ask to stop are noted there, for `check` to raise.
 
     So they cannot tear apart the starting and the stopping of the jobs, and the second Ctrl-C of somebody impatient
-    does not leave robots running that the first one was about to stop.
+    does not leave robots running that the first one was about to stop. A hangup that nohup has ignored stays ignored.
     """
 
     SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -26,7 +26,9 @@ class Interrupts:
         self._before: Dict[int, Any] = {}
 
     def __enter__(self) -> 'Interrupts':
-        self._before = {signum: signal.signal(signum, self._note) for signum in self.SIGNALS}
+        hangup_ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        self._before = {signum: signal.signal(signum, self._note) for signum in self.SIGNALS
+                        if not (signum == signal.SIGHUP and hangup_ignored)}
         return self
 
     def __exit__(self, *_: object) -> None:

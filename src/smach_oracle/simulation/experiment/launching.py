@@ -6,7 +6,7 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, IO, List, Mapping, Optional
+from typing import Any, Dict, IO, List, Mapping, Optional
 
 LOG_FILE = 'launch.log'
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
@@ -25,10 +25,8 @@ class Launch:
         port = free_port()
         command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
         command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
-        environment = dict(os.environ, ROS_MASTER_URI='http://localhost:{}'.format(port), ROS_HOSTNAME='localhost',
-                           ROS_LOG_DIR=str(folder / 'log'), PYTHONUNBUFFERED='1')
         self._log_file: IO[str] = (folder / LOG_FILE).open('a')
-        self._process = subprocess.Popen(command, env=dict(environment, **{MARK: self._mark}), stdout=self._log_file,
+        self._process = subprocess.Popen(command, env=environment_of(folder, port), stdout=self._log_file,
                                          stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=end_with_parent)
 
     def running(self) -> bool:
@@ -50,6 +48,17 @@ class Launch:
         end_marked(self._mark)
         self._process.wait()
         self._log_file.close()
+
+
+def environment_of(folder: Path, port: int) -> Dict[str, str]:
+    """What a job's processes find in their environment: their own master, whatever robot the caller's shell is set to.
+
+    Jobs run side by side, each with several nodes: more threads in one of them would only be in the others' way.
+    """
+    caller = {name: value for name, value in os.environ.items() if name not in ('ROS_NAMESPACE', 'ROS_IP')}
+    threads = {name: caller.get(name, '1') for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS')}
+    return {**caller, **threads, 'ROS_MASTER_URI': 'http://localhost:{}'.format(port), 'ROS_HOSTNAME': 'localhost',
+            'ROS_LOG_DIR': str(folder / 'log'), 'PYTHONUNBUFFERED': '1', MARK: str(folder)}
 
 
 def last_words(log: Path, count: int = 6) -> str:
