@@ -10,6 +10,9 @@ def text(**fields):
     return json.dumps(dict({'id': 1}, **fields))
 
 
+STROKE = {'foreground': True, 'width': 5, 'points': [[3, 4]]}
+MARK = {'do': 'mark', 'question': 'q', 'stamp': '12.000000034', 'region': [[0, 0], [9, 0], [9, 9.5]],
+        'strokes': [STROKE]}
 ANSWER = {'do': 'answer', 'question': 'q', 'kind': 'goto', 'name': 'PICK'}
 
 
@@ -18,6 +21,13 @@ def test_an_answer_is_taken_apart():
     assert (command.number, command.name) == (1, 'answer')
     assert command.arguments == {'question': 'q', 'kind': 'goto', 'name': 'PICK', 'why': 'it slipped',
                                  'outputs': [Output('grasp', [1, {'a': None}], '')]}
+
+
+def test_a_mark_is_taken_apart():
+    said = parse(text(**MARK)).arguments
+    assert (said['stamp'].secs, said['stamp'].nsecs) == (12, 34)
+    assert said['region'] == [(0.0, 0.0), (9.0, 0.0), (9.0, 9.5)]
+    assert said['strokes'] == [(True, 5.0, [(3.0, 4.0)])]
 
 
 def test_what_is_left_out_is_empty():
@@ -42,6 +52,17 @@ def test_what_is_left_out_is_empty():
     text(**ANSWER, outputs=[{'key': str(number), 'value': 1} for number in range(65)]),
     text(**ANSWER, outputs=[{'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}]),
     text(**ANSWER, outputs=[{'key': 'a', 'value': 1e999}]).replace('Infinity', '1e999'),
+    text(**dict(MARK, stamp='now')), text(**dict(MARK, stamp='99999999999.000000000')), text(**dict(MARK, stamp=5)),
+    text(**dict(MARK, region=[[0, 0], [1, 1]])), text(**dict(MARK, region=[[0, 0]] * 2001)),
+    text(**dict(MARK, region=[[0, 0], [1, 1], [2, '3']])), text(**dict(MARK, region=[[0, 0], [1, 1], [2, 1e9]])),
+    text(**dict(MARK, region=[[0, 0], [1, 1], [2, True]])), text(**dict(MARK, region=[[0, 0, 0]] * 3)),
+    text(**dict(MARK, region={'x': 1})), text(**dict(MARK, strokes=None)), text(**dict(MARK, strokes=[STROKE] * 65)),
+    text(**dict(MARK, strokes=[dict(STROKE, foreground=1)])), text(**dict(MARK, strokes=[dict(STROKE, width=0)])),
+    text(**dict(MARK, strokes=[dict(STROKE, points=[])])), text(**dict(MARK, strokes=[dict(STROKE, topic='/x')])),
+    text(**dict(MARK, service='/shutdown')), text(**dict(MARK, action='/perception_interface')),
+    text(do='use_frame', question='q'), text(do='use_frame', question='q', frame='/camera'),
+    text(do='hand_over', question='q'), text(do='hand_over', question='q', outcome=''),
+    text(do='hand_over', question='q', outcome='done', outputs=[]), text(do='give_up_interface'),
     text(do='hello', xsrf='x', expert='\u202egro.live'), text(do='hello', xsrf='', expert='ann'),
     text(do='hello', xsrf='x', expert='a' * 61)])
 def test_anything_else_is_refused_with_a_reason(message):

@@ -1,120 +1,15 @@
 """The console's web server attacked over real connections: hosts, origins, cookies, forged requests, roles, floods."""
 import asyncio
 import json
-import os
 
-import pytest
-import tornado.httpclient
+import console_case
 import tornado.testing
-import tornado.websocket
+from console_case import TOKENS
 
 from smach_oracle.expert.console import handlers
-from smach_oracle.expert.console.access import Hosts, TokenBook
-from smach_oracle.expert.console.desk import Reply
-from smach_oracle.expert.console.handlers import Gate
-from smach_oracle.expert.console.page_socket import Office
-from smach_oracle.expert.console.sections import Sections
-from smach_oracle.expert.console.sensors import Sensors
-from smach_oracle.expert.console.server import make_app
-from smach_oracle.expert.console.settings import ConsoleSettings
-from smach_oracle.expert.console.trial_log import TrialLog
-
-os.environ.setdefault('ASYNC_TEST_TIMEOUT', '30')  # s; the machine may be loaded
-TOKENS = {role: role + '-token-of-sufficient-length' for role in ('viewer', 'operator', 'teleoperator')}
 
 
-class FakeDesk:
-    """Does what it is told, and remembers."""
-
-    def __init__(self):
-        self.done = []
-        self.left = []
-
-    def carry_out(self, command, person, browser):
-        self.done.append((command.name, person.expert, person.role))
-        return Reply(True, 'done')
-
-    def leave(self, browser):
-        self.left.append(browser)
-
-
-class FakeAudit:
-    """Remembers what it is told."""
-
-    def __init__(self):
-        self.told = []
-
-    def tell(self, person, command, ok, message, arguments=None, listed=None):
-        self.told.append((command, ok, person.role, message, arguments))
-
-
-class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
-    """One console on a free port of the loopback."""
-
-    tokens = True
-
-    def get_app(self):
-        text = '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items())
-        book = TokenBook(text, 'tokens') if self.tokens else None
-        self.audit, self.desk, self.sections, self.log = FakeAudit(), FakeDesk(), Sections(), TrialLog()
-        settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), '', '')
-        self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
-        self.office = Office(self.sections, self.log, self.desk)
-        self.sensors = Sensors()
-        return make_app(self.gate, self.office, self.sensors)
-
-    @property
-    def origin(self):
-        return 'http://127.0.0.1:{}'.format(self.get_http_port())
-
-    def ask(self, path, method='GET', body=None, **headers):
-        given = {name.replace('_', '-'): value for name, value in headers.items() if value is not None}
-        return self.fetch(path, method=method, body=body, headers=given, follow_redirects=False,
-                          allow_nonstandard_methods=True)
-
-    def begin(self, **headers):
-        """A fresh session: its cookie and what the server says of it."""
-        answer = self.ask('/session', **headers)
-        cookie = answer.headers['Set-Cookie'].split(';')[0] if 'Set-Cookie' in answer.headers else headers['Cookie']
-        return cookie, json.loads(answer.body)
-
-    def sign_in(self, role):
-        cookie, said = self.begin()
-        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS[role]}), Cookie=cookie, Origin=self.origin,
-                          X_Xsrf=said['xsrf'])
-        assert answer.code == 200
-        return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
-
-    def connect(self, cookie='', **headers):
-        given = dict({'Origin': self.origin, 'Cookie': cookie}, **headers)
-        request = tornado.httpclient.HTTPRequest(
-            'ws://127.0.0.1:{}/socket'.format(self.get_http_port()),
-            headers={name: value for name, value in given.items() if value is not None})
-        return tornado.websocket.websocket_connect(request)
-
-    async def refused(self, cookie='', **headers):
-        with pytest.raises(tornado.httpclient.HTTPClientError) as error:
-            await self.connect(cookie, **headers)
-        return error.value.code
-
-    async def say(self, socket, number=1, **command):
-        await socket.write_message(json.dumps(dict(command, id=number)))
-        while True:
-            text = await socket.read_message()
-            if text is None:
-                return None
-            message = json.loads(text)
-            if message.get('re') == number:
-                return message
-
-    async def open_page(self, cookie, said, expert='ann'):
-        socket = await self.connect(cookie)
-        reply = await self.say(socket, do='hello', xsrf=said['xsrf'], expert=expert)
-        assert reply['ok'], reply
-        return socket
-
-
-class TestRequests(ConsoleCase):
+class TestRequests(console_case.ConsoleCase):
 
     def test_every_answer_keeps_the_page_to_itself(self):
         for path, host in (('/', None), ('/session', None), ('/nothing', None), ('/static/js/main.js', None),
@@ -151,7 +46,7 @@ class TestRequests(ConsoleCase):
         assert [self.ask('/').code for _ in range(4)] == [200, 200, 200, 429]
 
 
-class TestSignIn(ConsoleCase):
+class TestSignIn(console_case.ConsoleCase):
 
     def test_the_cookie_is_for_this_page_s_requests_alone(self):
         cookie = self.ask('/session').headers['Set-Cookie']
@@ -206,7 +101,7 @@ class TestSignIn(ConsoleCase):
         assert json.loads(answer.body)['signed_in'] is False
 
 
-class TestSocket(ConsoleCase):
+class TestSocket(console_case.ConsoleCase):
 
     @tornado.testing.gen_test
     async def test_a_socket_needs_a_session_its_own_origin_and_host(self):
@@ -298,7 +193,7 @@ class TestSocket(ConsoleCase):
         assert json.loads(await socket.read_message())['sections'] == {'robots': None}
 
 
-class TestWithoutTokens(ConsoleCase):
+class TestWithoutTokens(console_case.ConsoleCase):
 
     tokens = False
 
@@ -306,6 +201,3 @@ class TestWithoutTokens(ConsoleCase):
         _, said = self.begin()
         assert (said['signed_in'], said['role'], said['tokens']) == (True, 'teleoperator', False)
         assert self.ask('/session', Origin='http://evil.example').code == 403
-
-
-del ConsoleCase  # not a case of its own

@@ -48,7 +48,8 @@ def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
             message.row_step < message.width * message.point_step
             or len(message.data) < message.row_step * message.height)):
         raise CloudError('the cloud tells of {} x {} points in {} bytes; it needs x, y, z, as many bytes as it tells '
-                         'of, and at most {} points'.format(message.width, message.height, len(message.data), MOST_POINTS))
+                         'of, and at most {} points'.format(
+                             message.width, message.height, len(message.data), MOST_POINTS))
     chosen = np.unique(np.linspace(0, count - 1, min(count, _SPARE * most)).astype(np.int64)) if count else []
     records = _records(message, np.asarray(chosen, np.int64))
     points = np.stack([_values(records, fields[name], message).astype(np.float64) for name in 'xyz'], axis=1)
