@@ -5,6 +5,8 @@ from worlds import scene
 
 from smach_oracle.simulation.robot.interface import RobotError
 from smach_oracle.simulation.world.direct import DirectRobot
+from smach_oracle.simulation.world.fridge import DOOR_JOINT
+from smach_oracle.simulation.world.kitchen_scene import draw as draw_kitchen
 from smach_oracle.simulation.world.physics import World
 from smach_oracle.simulation.world.scene import Disturbance
 
@@ -68,3 +70,18 @@ def test_a_motion_against_a_push_fails_and_says_so(world):
     world.happened('torso')
     with pytest.raises(RobotError, match='l_shoulder_pan_joint is .* off its path'):
         DirectRobot(world).follow(['l_shoulder_pan_joint'], np.array([[1.2]]), np.array([3.0]))
+
+
+def test_a_door_swings_to_its_angle_and_is_then_left_to_itself(world):
+    kitchen = draw_kitchen(3, benign=True)
+    fridge = next(body for body in kitchen.bodies if body.name == 'fridge')
+    ajar = fridge._replace(joints=((DOOR_JOINT, 1.8),))
+    swing = Disturbance('swing:fridge', 'torso', (('angle', 0.7), ('duration', 1.0)))
+    world.reset(kitchen._replace(bodies=tuple(ajar if body is fridge else body for body in kitchen.bodies),
+                                 disturbances=(swing,)))
+    assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(1.8, abs=0.02)
+    robot = DirectRobot(world)
+    robot.torso(0.2)
+    assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(0.7, abs=0.05)
+    world.step(60)
+    assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(0.7, abs=0.05)

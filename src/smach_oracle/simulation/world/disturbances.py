@@ -43,7 +43,7 @@ class _Course(NamedTuple):
     values: Dict[str, float]
     periods: int  # how long it takes
     begun: int  # at which period
-    start: Dict[str, float]  # arm: where the joints were; nudge: where the body was, x and y
+    start: Dict[str, float]  # arm, swing: where the joints were; nudge: where the body was, x and y
 
 
 class Disturbances:
@@ -89,6 +89,8 @@ class Disturbances:
                 self._moving.remove(course)
             if course.cause.kind == 'arm' and done < course.periods:
                 _move_arm(world, course, done)
+            elif course.cause.kind.startswith('swing'):
+                _swing_body(world, course, done)
             elif course.cause.kind != 'arm':
                 _move_body(world, course, done)
 
@@ -126,6 +128,13 @@ def _move_body(world: 'World', course: _Course, done: int) -> None:
     world.slide_body(name, pace[0], pace[1], let_go)
 
 
+def _swing_body(world: 'World', course: _Course, done: int) -> None:
+    name, let_go = course.cause.kind.partition(':')[2], done >= course.periods
+    for joint, start in course.start.items():
+        goal = start + _smooth(min(1.0, (done + 1) / course.periods)) * (course.values['angle'] - start)
+        world.turn_body(name, joint, (goal - world.body_joint(name, joint)) / PERIOD, let_go)
+
+
 def _smooth(share: float) -> float:
     return share * share * (3.0 - 2.0 * share)
 
@@ -137,7 +146,10 @@ def _values(disturbance: Disturbance) -> Dict[str, float]:
 def _start(world: 'World', disturbance: Disturbance) -> Dict[str, float]:
     if disturbance.kind == 'arm':
         return {name: world.robot.position(name) for name, _ in disturbance.values if name not in OPTIONS['arm']}
-    return dict(zip('xy', world.body_pose(disturbance.kind.partition(':')[2])[:2, 3].tolist()))
+    kind, _, body = disturbance.kind.partition(':')
+    if kind == 'swing':
+        return {joint: world.body_joint(body, joint) for joint in world.body_joints(body)}
+    return dict(zip('xy', world.body_pose(body)[:2, 3].tolist()))
 
 
 def _numbered(event: str) -> str:

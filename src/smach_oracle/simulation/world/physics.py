@@ -226,6 +226,10 @@ class World:
         position: float = pybullet.getJointState(placed.number, placed.joints[joint], physicsClientId=self._client)[0]
         return position
 
+    def body_joints(self, name: str) -> List[str]:
+        """The joints of a body, in its model's order."""
+        return list(self._find(name).joints)
+
     def slide_body(self, name: str, x: float, y: float, let_go: bool = False) -> None:
         """Take a body over what it stands on, at m/s; held so that it does not topple, but what is in its way stops it.
 
@@ -236,6 +240,16 @@ class World:
         pybullet.changeDynamics(placed.number, -1, lateralFriction=friction, physicsClientId=self._client)
         linear, _ = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
         pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], [0.0] * 3, physicsClientId=self._client)
+
+    def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
+        """Drive a joint of a body at rad/s with a person's strength; what is in its way stops it.
+
+        :param let_go: leave it to its own dry friction again.
+        """
+        placed = self._find(name)
+        strength = dict(placed.body.joint_friction).get(joint, 0.0) if let_go else TURNING_FORCE
+        pybullet.setJointMotorControl2(placed.number, placed.joints[joint], pybullet.VELOCITY_CONTROL, force=strength,
+                                       targetVelocity=0.0 if let_go else speed, physicsClientId=self._client)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""
