@@ -22,7 +22,7 @@ CLOSING = (-0.87, -0.30, 0.0)
 
 AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
 PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside
-WIDE = np.radians(104.0)  # as far as the door is opened
+WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 AWAY = 0.16  # m that the base takes the hand back from the bar
@@ -33,7 +33,7 @@ JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 
 BEFORE = 0.10  # m that the hand comes straight
 PUSHES = 2  # until the door is shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
-BERTH = 0.02  # m that the arm keeps from the door on its way to it
+BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
 RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
 LEAST_GAP = 0.008  # m between the tips that a bar keeps

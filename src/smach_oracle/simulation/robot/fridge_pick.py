@@ -6,14 +6,13 @@ import numpy as np
 from ...geometry.box import UprightBox
 from ...geometry.transforms import from_rpy
 from .arm import Arm, Means, SkillError, seed_of
-from .door import named_boxes
+from .door import WIDE, named_boxes
 from .interface import GRIPPER_OPEN
 from .kitchen import Kitchen, MapBox
 from .pick import Held, pick
 from .travel import carry, drive, stow
 
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
-OPEN_DOOR = np.radians(104.0)
 PADDING = 0.015  # m
 BESIDE = 0.004  # m around things on the shelf
 SAME = 0.03  # m between the middles of two boxes that are the same thing
@@ -27,7 +26,7 @@ def pick_from_fridge(means: Means, kitchen: Kitchen, base_from_fridge: np.ndarra
     :param others: what else stands on the shelf; the drink itself may be among it.
     :raises SkillError: with the reason.
     """
-    boxes = {name: _padded(box) for name, box in named_boxes(kitchen, base_from_fridge, OPEN_DOOR).items()}
+    boxes = {name: _padded(box) for name, box in named_boxes(kitchen, base_from_fridge, WIDE).items()}
     boxes.update({'thing {}'.format(k): MapBox(box.centre, box.size / 2 + BESIDE, box.yaw)
                   for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME})
     try:
