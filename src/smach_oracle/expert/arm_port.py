@@ -38,7 +38,8 @@ class ArmNames(NamedTuple):
             if not isinstance(value[field], str) or not value[field]:
                 raise ConfigError('{}.{}'.format(key, field), value[field], 'a name')
         posture = value.get('posture', [])
-        if not isinstance(posture, list) or not all(isinstance(each, (int, float)) for each in posture):
+        if not isinstance(posture, list) or not all(
+                isinstance(each, (int, float)) and math.isfinite(each) for each in posture):
             raise ConfigError(key + '.posture', posture, 'a list of angles, rad')
         return cls(**value)
 

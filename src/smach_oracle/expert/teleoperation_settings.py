@@ -15,6 +15,7 @@ GRASP_POSE = 'grasp_pose'  # of the tool, when the gripper last closed on someth
 TOOL_POSE = 'tool_pose'  # of the tool, now
 _DESCRIPTION_S = 60.0
 _OUTPUTS = (GRASP_POSE, TOOL_POSE)
+_NEVER_ZERO = ('linear', 'angular', 'joint_share')  # of the limits: what is divided by
 
 
 class TeleoperationSettings(NamedTuple):
@@ -98,7 +99,8 @@ def _limits() -> DriveLimits:
     unknown = sorted(set(given) - set(DriveLimits._fields))
     if unknown:
         raise ConfigError('~limits/' + unknown[0], given[unknown[0]], 'the keys ' + ', '.join(DriveLimits._fields))
-    values = {key: _checked('~limits/' + key, value, 0.0, 100.0) for key, value in given.items()}
+    values = {key: _checked('~limits/' + key, value, 1e-3 if key in _NEVER_ZERO else 0.0, 100.0)
+              for key, value in given.items()}
     if workspace is not None:
         values['workspace'] = _corners(workspace)
     limits = DriveLimits(**values)

@@ -1,0 +1,47 @@
+"""Settings of the manipulation interface: what cannot be is refused by name, before anything moves."""
+import math
+
+import pytest
+import rospy
+
+from smach_oracle.expert.teleoperation_settings import TeleoperationSettings
+from smach_oracle.oracle.errors import ConfigError
+
+ARMS = {'right': {'base': 'torso', 'tool': 'hand', 'command': 'arm/command', 'gripper': 'gripper'}}
+
+
+@pytest.fixture(name='read')
+def make_read(monkeypatch):
+    def read(**given):
+        values = dict({'arms': ARMS}, **given)
+        monkeypatch.setattr(rospy, 'get_param', lambda key, default=None: values.get(key.lstrip('~'), default))
+        monkeypatch.setattr(rospy, 'resolve_name', lambda name: '/node/' + name.lstrip('~'))
+        return TeleoperationSettings.from_parameters()
+    return read
+
+
+def test_what_is_not_given_has_its_default(read):
+    settings = read(limits={'linear': 0.1, 'workspace': [[-1, -1, 0], [1, 1, 2]]}, states={'PICK': {'arm': 'right'}})
+    assert settings.limits.linear == 0.1 and settings.limits.angular == 1.0
+    assert settings.limits.workspace == ((-1.0, -1.0, 0.0), (1.0, 1.0, 2.0))
+    assert settings.watchdog_s == 0.06 and settings.period_s == pytest.approx(1 / 60) and not settings.lock_step
+    assert settings.arm_of('PICK', 'left') == 'right' and settings.arm_of('OTHER', 'left') == 'left'
+    assert settings.outputs_of('PICK') == {}
+
+
+@pytest.mark.parametrize('given, says', [
+    ({'arms': {}}, 'arms'), ({'arms': {'right': {'base': 'torso'}}}, 'arms/right'),
+    ({'arms': {'right': dict(ARMS['right'], tool='')}}, 'arms/right.tool'),
+    ({'arms': {'right': dict(ARMS['right'], posture=[0.0, math.nan])}}, 'posture'),
+    ({'rate_hz': 10}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'), ({'watchdog_s': 3.0}, 'watchdog_s'),
+    ({'lead': True}, 'lead'), ({'lock_step': 'yes'}, 'lock_step'), ({'success': 'succeeded'}, 'success'),
+    ({'limits': {'speed': 1.0}}, 'limits/speed'), ({'limits': {'linear': 0.0}}, 'limits/linear'),
+    ({'limits': {'joint_share': 0.0}}, 'limits/joint_share'), ({'limits': {'angular': 0}}, 'limits/angular'),
+    ({'limits': {'stop_below': 0.2}}, 'limits/stop_below'),
+    ({'limits': {'workspace': [[0, 0, 0], [1, 1]]}}, 'limits/workspace'),
+    ({'limits': {'workspace': [[0, 0, 0], [1, 1, -1]]}}, 'limits/workspace'),
+    ({'states': {'PICK': {'arm': 'left'}}}, 'states/PICK/arm'),
+    ({'states': {'PICK': {'outputs': {'grasp': 'pose'}}}}, 'states/PICK/outputs/grasp')])
+def test_what_cannot_be_is_refused_by_name(read, given, says):
+    with pytest.raises(ConfigError, match=says):
+        read(**given)
