@@ -1,4 +1,5 @@
 """What a driven arm could hit, kept up to date from joint_states and the collision map that the robot publishes."""
+import math
 import re
 import threading
 from typing import List, Optional
@@ -62,7 +63,7 @@ class Surroundings:
         for name, pose, size in zip(message.names, message.poses, message.sizes):
             at, turn = pose.position, pose.orientation
             centre = from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
-            if not min(size.x, size.y, size.z) > 0.0:
+            if not all(0.0 < side < math.inf for side in (size.x, size.y, size.z)):
                 raise ValueError('size of {!r}: {}'.format(name, (size.x, size.y, size.z)))
             boxes.append(Box(name, base_from_map @ centre, (size.x, size.y, size.z)))
         return boxes
