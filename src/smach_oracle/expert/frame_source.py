@@ -93,7 +93,7 @@ class FrameSource:
             return None
         try:
             answer = self._snapshot(camera=True)
-        except rospy.ServiceException as err:
+        except (rospy.ServiceException, rospy.ROSException, OSError) as err:
             raise FrameError('{}: {}'.format(self._snapshot.resolved_name, err)) from err
         if not answer.ok:
             raise FrameError('{}: {}'.format(self._snapshot.resolved_name, answer.message))
