@@ -144,7 +144,10 @@ def put_down(attempt: Attempt, place: np.ndarray) -> None:
     pilot.shift(offset[0], offset[1], share=0.5)
     _as_far_as_it_goes(lambda: pilot.shift(z=-down + 0.004, share=0.3))
     let_go(pilot)
-    _check_stands(attempt.look().bodies[thing.name], place)
+    left = attempt.look().bodies.get(thing.name)
+    if left is None:
+        raise Failed('{} is gone'.format(thing.name))
+    _check_stands(left, place)
 
 
 def carry(attempt: Attempt, thing: Seen, centre: np.ndarray) -> None:

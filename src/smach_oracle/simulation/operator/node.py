@@ -23,6 +23,7 @@ from .topic_hand import Interrupted
 from .work import Interfaces, Job, connect, do, think
 
 _PAUSE_S = 0.2
+_ATTEMPTS = 3  # at one question, where the world or its server does not answer
 _THINKING_S = 120.0  # wall time at most, where the clock stands
 
 
@@ -52,7 +53,8 @@ class Operator:
         self._interfaces = interfaces
         self._trial: Tuple[str, str] = ('', '')
         self._asked: Dict[str, int] = {}
-        self._done: List[str] = []
+        self._done: List[str] = []  # keys of questions that were attended to
+        self._spoilt: List[str] = []  # of those that came to nothing, once for each time
 
     def run(self) -> None:
         """Until the node ends."""
@@ -70,6 +72,9 @@ class Operator:
         except (ServerGoneError, EyeError, Interrupted, rospy.ServiceException) as err:
             rospy.logwarn('%s of %s: %s', listed.goal.failed_state, listed.goal.container_path, err)
             self._front_end.release(listed)
+            self._spoilt = self._spoilt[-99:] + [listed.key]
+            if self._spoilt.count(listed.key) < _ATTEMPTS:
+                self._done.remove(listed.key)
 
     def _answer(self, listed: Listed) -> None:
         goal = listed.goal

@@ -5,7 +5,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseStamped
 
-from .eye import Eye, EyeError, pose_of
+from .eye import Eye, EyeError
 from .manoeuvres import Attempt, Failed, pick, pull_out, put_down
 from .pilot import Pilot, Stuck
 from .plans import PUT_DOWN, SHOW, Means
@@ -44,14 +44,14 @@ class Job(NamedTuple):
 
 
 def do(job: Job, interfaces: Interfaces, eye: Eye) -> str:
-    """Do the work, and end the interface's goal; '' where the state was superseded, else why not.
-
-    :raises Interrupted: where the goal ended under our hands.
-    """
+    """Do the work, and end the interface's goal, whatever happens; '' where the state was superseded, else why not."""
     settling = interfaces.drawing_settling if job.means.means == SHOW else interfaces.hand_settling
-    wrong = _shown(job, interfaces, eye) if job.means.means == SHOW else _driven(job, interfaces, eye)
-    if not wrong:
-        wrong = settling.finish(SUCCESS, 'by the scripted expert')
+    try:
+        wrong = _shown(job, interfaces, eye) if job.means.means == SHOW else _driven(job, interfaces, eye)
+        if not wrong:
+            wrong = settling.finish(SUCCESS, 'by the scripted expert')
+    except (Interrupted, rospy.ServiceException) as err:
+        wrong = str(err)
     if wrong:
         settling.give_up(wrong)
     return wrong
@@ -125,7 +125,8 @@ def point_in_base(pose: Any) -> Optional[np.ndarray]:
     heights = {BASE: 0.0, 'base_link': BASE_LINK_HEIGHT}
     if not isinstance(pose, PoseStamped) or pose.header.frame_id not in heights:
         return None
-    return np.asarray(pose_of(pose)[:3, 3] + [0.0, 0.0, heights[pose.header.frame_id]])
+    at = pose.pose.position
+    return np.array([at.x, at.y, at.z + heights[pose.header.frame_id]])
 
 
 def connect(perception: str, manipulation: str, operator: str, image: Tuple[int, int], rate_hz: float) -> Interfaces:

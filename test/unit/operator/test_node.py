@@ -1,0 +1,94 @@
+"""The scripted operator when others fail it: a world or an interface that does not answer must not end the trial."""
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import Point, PoseStamped
+
+from smach_oracle.msg import OpenQuery
+from smach_oracle.simulation.operator.eye import EyeError
+from smach_oracle.simulation.operator.node import Operator
+from smach_oracle.simulation.operator.plans import Means
+from smach_oracle.simulation.operator.sight import Sight
+from smach_oracle.simulation.operator.topic_hand import Interrupted
+from smach_oracle.simulation.operator.work import Job, do, point_in_base
+
+QUESTION = SimpleNamespace(key='r/q1', status=OpenQuery.PENDING, goal=SimpleNamespace(
+    failed_state='PICK', container_path='SM', robot='r', trial_id='t'))
+
+
+class Questions:
+    """A front end with one question that stays open, for so many looks at the list."""
+
+    def __init__(self, rounds):
+        self._rounds = rounds
+        self.claims = 0
+
+    def wait_for_change(self, version, _timeout_s):
+        self._rounds -= 1
+        if self._rounds < 0:
+            raise KeyboardInterrupt
+        return version
+
+    def questions(self):
+        return [QUESTION]
+
+    def release(self, _listed):
+        pass
+
+    def claim(self, _listed):
+        self.claims += 1
+        return SimpleNamespace(ok=False)
+
+
+class Eye:
+    """Blind at first."""
+
+    def __init__(self, blind):
+        self.looks = 0
+        self._blind = blind
+
+    def look(self):
+        self.looks += 1
+        if self.looks <= self._blind:
+            raise EyeError('the world does not answer')
+        return Sight({}, 1, '')
+
+
+@pytest.mark.parametrize('blind, looks, claims', [(0, 1, 1), (2, 3, 1), (9, 3, 0)])
+def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_ever(blind, looks, claims):
+    questions, eye = Questions(10), Eye(blind)
+    with pytest.raises(KeyboardInterrupt):
+        Operator(SimpleNamespace(seed=1), questions, eye, None).run()
+    assert (eye.looks, questions.claims) == (looks, claims)
+
+
+class Settled:
+    """How the goal of an interface was ended."""
+
+    def __init__(self):
+        self.gave_up = []
+
+    def give_up(self, text):
+        self.gave_up.append(text)
+
+
+@pytest.mark.parametrize('fault', [Interrupted('no frame within 20 s'), rospy.ServiceException('gone')])
+def test_an_interface_that_fails_under_the_hands_is_given_up_so_that_the_question_is_asked_again(fault):
+    def take_frame(_limit_s):
+        raise fault
+    settled = Settled()
+    interfaces = SimpleNamespace(drawing=SimpleNamespace(take_frame=take_frame), drawing_settling=settled,
+                                 hand_settling=None)
+    job = Job('q1', Means('show'), {}, 0, np.random.default_rng(1))
+    assert do(job, interfaces, None) == str(fault)
+    assert settled.gave_up == [str(fault)]
+
+
+def test_places_are_read_from_poses_in_frames_that_are_known():
+    pose = PoseStamped()
+    pose.pose.position = Point(0.6, 0.1, 0.7)
+    assert point_in_base(pose) is None and point_in_base('here') is None
+    pose.header.frame_id = 'base_link'
+    assert point_in_base(pose) == pytest.approx([0.6, 0.1, 0.751]), 'whatever its orientation'
