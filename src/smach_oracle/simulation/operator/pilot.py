@@ -7,6 +7,7 @@ from smach_oracle.geometry.transforms import inverse, rotation_vector
 
 _FINE = 0.35  # share of the way to the goal that is driven in one period near its end, at most
 _PATIENCE = 25  # periods without getting nearer
+_EASE_S = 30.0  # within which an arm that sways on comes to its ease, or is taken as it is
 _AT_EASE = 8  # periods in which the hand hardly moves any more
 
 
@@ -73,7 +74,9 @@ class Pilot:
         """Drive the tool to a point (3,) m, and let the arm come to its ease there. Raises Stuck."""
         before = self.hand.tool()
         still, limit = 0, ''
-        while still < _AT_EASE:
+        for _ in range(int(_EASE_S / self.hand.period)):
+            if still >= _AT_EASE:
+                break
             way = point - before[:3, 3]
             velocity = way / self._time_for(float(np.linalg.norm(way)), 0.0, 1.0)
             limit = self.hand.move(np.concatenate([velocity, np.zeros(3)]), turn_freely=True) or limit
