@@ -1,4 +1,5 @@
 """Who may import whom: the executive is free of ROS, the use cases are free of us, the analysis runs anywhere."""
+import re
 import subprocess
 import sys
 from typing import Set
@@ -20,8 +21,10 @@ ARROWS = {
 }
 ROS = {'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros', 'smach_msgs'}
 ROS_PACKAGES = ROS - {'rospkg'} | {'smach', 'actionlib_msgs', 'control_msgs', 'geometry_msgs', 'move_base_msgs',
-                                   'rosgraph_msgs', 'roslaunch', 'rostest', 'sensor_msgs', 'std_msgs', 'std_srvs',
-                                   'tf2_msgs', 'tf2_ros', 'trajectory_msgs', 'visualization_msgs'}
+                                   'rosgraph_msgs', 'roslaunch', 'rosservice', 'rostest', 'sensor_msgs', 'std_msgs',
+                                   'std_srvs', 'tf2_msgs', 'tf2_ros', 'trajectory_msgs', 'visualization_msgs'}
+STAND_INS = {'smach', 'smach_ros', 'smach_msgs', 'control_msgs'}
+PINNED = {'cv2': 'opencv-python-headless', 'ompl': 'ompl', 'pybullet': 'pybullet', 'rosbags': 'rosbags'}
 STDLIB = getattr(sys, 'stdlib_module_names', frozenset())
 
 without_stdlib_names = pytest.mark.skipif(not STDLIB, reason='Python before 3.10 cannot list its own modules')
@@ -97,3 +100,14 @@ def test_every_ros_package_that_is_imported_is_a_declared_dependency():
     # rospkg comes with roslib, and is no ROS package itself
     declared = {name for name in used & ROS_PACKAGES if 'depend>{}<'.format(name) in manifest}
     assert used & ROS_PACKAGES == declared
+
+
+@without_stdlib_names
+def test_everything_that_is_imported_is_set_up_on_debian():
+    lists = [ROOT / name for name in ('debian-packages.txt', 'requirements.txt')]
+    there = {re.split('[=<]', line.split()[0])[0] for path in lists
+             for line in path.read_text(encoding='utf-8').splitlines() if line and not line.startswith('#')}
+    used = {name.split('.')[0] for path in python_files('src') for _, name in imports(path)}
+    missing = {name for name in used - STDLIB - STAND_INS - {'smach_oracle'}
+               if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there}
+    assert not missing

@@ -72,7 +72,8 @@ def test_every_launch_argument_in_the_readme_is_one_that_the_file_takes():
 
 def test_every_command_named_in_the_text_is_there():
     names = set(re.findall(r'`([a-z]+_[a-z_]+)`', README))
-    commands = {name for name in names if re.match(r'(expert|scripted|bag|oracle|run|stub)_', name)}
+    prefixes = r'(expert|scripted|bag|oracle|run|pr2|perception|manipulation)_'
+    commands = {name for name in names if re.match(prefixes, name)}
     assert commands and all((ROOT / 'scripts' / name).is_file() for name in commands - {'oracle_run.launch'}), commands
 
 
