@@ -61,7 +61,7 @@ class Controller:
         self._handle = handle
 
     def _cancel(self, handle: Any) -> None:
-        if handle == self._handle:
+        if self._handle is not None and handle == self._handle:  # else it has ended since it was cancelled
             self._motions.stop(self._part, 'preempted')
 
     def _end(self, handle: Any, motion: Motion, ending: Ending) -> None:
