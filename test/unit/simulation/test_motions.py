@@ -91,6 +91,11 @@ def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, p
     assert world.time == time and np.array_equal(arm(world), before)
 
 
+def test_a_trajectory_that_would_pass_a_point_too_fast_is_refused(world, robot):
+    motion = Trajectory(RIGHT[:1], np.array([[-1.0], [-1.1]]), np.array([2.0, 4.0]), np.array([[1e300], [0.0]]))
+    assert 'r_shoulder_pan_joint would pass a point at 1e+300/s' in motion.refusal(world)
+
+
 def test_an_arm_that_meets_a_wall_stops_and_says_so(world):
     wall = Body('wall', 'box', (1.0, 0.05, 2.0), (0.8, -0.75, 0.9))
     ahead = (0.0, 0.0, -1.5, -0.1, 0.5, -0.6, 0.0)

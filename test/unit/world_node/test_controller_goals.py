@@ -54,6 +54,7 @@ def test_velocities_count_where_every_point_has_them():
     (trajectory(([0.0, 0.0], 1.0), ([1.5, 0.0], 2.0)), 'INVALID_GOAL',
      'point 1: pan cannot be at 1.5 rad; allowed: -1 to 1'),
     (trajectory(([0.0, 0.0], 1.0), ([0.0, 0.0], 1.0)), 'INVALID_GOAL', 'times must increase'),
+    (trajectory(([0.0, 0.0], 1e9)), 'INVALID_GOAL', 'point 0 is at 1000000000 s; allowed: up to 600 s'),
     (trajectory(([0.0, 0.0], 1.0, {'velocities': [1.0]})), 'INVALID_GOAL', '1 velocities'),
     (trajectory(([0.0, 0.0], 1.0, {'velocities': [1.0, float('nan')]})), 'INVALID_GOAL', 'finite one for each'),
     (trajectory(([0.0, 0.0], 1.0), path_tolerance=[JointTolerance(name='x', position=1.0)]), 'INVALID_GOAL',
@@ -91,7 +92,8 @@ def test_a_point_is_taken_from_the_frames_that_the_robot_knows(frame, expected):
 
 @pytest.mark.parametrize('frame, x, words', [('map', 0.0, "unknown frame 'map'; allowed: base_footprint"),
                                              ('', 0.0, "unknown frame ''"),
-                                             ('base_link', float('nan'), 'not a finite point')])
+                                             ('base_link', float('nan'), 'not a finite point'),
+                                             ('base_link', 1e300, 'at most 1000 m away')])
 def test_other_points_are_refused(frame, x, words):
     with pytest.raises(goals.BadGoal, match=words):
         goals.point_in_base(PointStamped(Header(frame_id=frame), Point(x, 0.0, 0.0)), ODOM_FROM_BASE)
@@ -109,7 +111,10 @@ def test_the_base_is_sent_to_where_odometry_has_the_goal():
 
 @pytest.mark.parametrize('goal, words', [(pose('map'), "unknown frame 'map'"), (pose(x=float('inf')), 'not finite'),
                                          (pose(turn=(0.0, 0.0, 0.0, 0.0)), 'target_pose'),
-                                         (pose(turn=(0.5, 0.0, 0.0, 0.5)), 'cannot be tilted')])
+                                         (pose(turn=(0.5, 0.0, 0.0, 0.5)), 'cannot be tilted'),
+                                         (pose(turn=(1.0, 0.0, 0.0, 1e-9)), 'cannot be tilted'),
+                                         (pose(turn=(0.0, 0.0, 0.0, 1e200)), 'cannot be tilted'),
+                                         (pose(x=1e300), r'x 1e\+300, .* allowed: -20 to 20 m')])
 def test_a_base_goal_that_cannot_be_is_refused(goal, words):
     with pytest.raises(goals.BadGoal, match=words):
         goals.odom_from_pose(goal, ODOM_FROM_BASE)

@@ -114,6 +114,9 @@ class Trajectory:
                 if abs(step) > limit * span + 0.01:
                     return '{} would go {:.3g} in {:.3g} s; its limit is {:.3g}/s'.format(
                         name, abs(step), span, world.robot.speeds[name])
+            if self._velocities is not None and np.abs(self._velocities[:, column]).max() > limit:
+                return '{} would pass a point at {:.3g}/s; its limit is {:.3g}/s'.format(
+                    name, np.abs(self._velocities[:, column]).max(), world.robot.speeds[name])
         return ''
 
     def _from_here(self, world: World) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:

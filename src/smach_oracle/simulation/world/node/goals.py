@@ -17,6 +17,9 @@ FRAMES = (BASE_FRAME, 'base_link', ODOM_FRAME)
 LEAD_S = 1.0  # a trajectory that is to begin so much later begins at once
 LEVEL = 0.02  # rad that a goal of the base may be tilted
 MOST_EFFORT = 200.0  # N
+LONGEST_S = 600.0  # of a trajectory
+FARTHEST = 20.0  # m from the origin of odom_combined that the base may be sent
+LOOKS_TO = 1000.0  # m away that a point to look at may be
 Limits = Mapping[str, Tuple[float, float]]
 
 
@@ -94,6 +97,8 @@ def _check_point(point: JointTrajectoryPoint, where: str, joints: Sequence[str],
     if time_s <= before and not (where == 'point 0' and time_s == 0):
         raise BadGoal('{} is at {:.3f} s, and the one before it at {:.3f} s; times must increase from 0'.format(
             where, time_s, before))
+    if time_s > LONGEST_S:
+        raise BadGoal('{} is at {:.0f} s; allowed: up to {:g} s'.format(where, time_s, LONGEST_S))
     return time_s
 
 
@@ -128,8 +133,8 @@ def height_of(position: float, limits: Tuple[float, float]) -> float:
 def point_in_base(point: PointStamped, odom_from_base: np.ndarray) -> np.ndarray:
     """(3,) m in base_footprint. Raises BadGoal."""
     where = np.array([point.point.x, point.point.y, point.point.z])
-    if not np.isfinite(where).all():
-        raise BadGoal('target {} is not a finite point'.format(where.tolist()))
+    if not np.isfinite(where).all() or np.abs(where).max() > LOOKS_TO:
+        raise BadGoal('target {} is not a finite point at most {:g} m away'.format(where.tolist(), LOOKS_TO))
     return apply(_base_from(point.header, odom_from_base), where)
 
 
@@ -140,9 +145,13 @@ def odom_from_pose(pose: PoseStamped, odom_from_base: np.ndarray) -> np.ndarray:
         goal = from_quaternion((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
     except ValueError as err:
         raise BadGoal('target_pose: {}'.format(err)) from err
-    if math.acos(min(1.0, goal[2, 2])) > LEVEL:
+    if not goal[2, 2] >= math.cos(LEVEL):
         raise BadGoal('target_pose: the base cannot be tilted; only turns about z are allowed')
-    return odom_from_base @ _base_from(pose.header, odom_from_base) @ goal
+    found: np.ndarray = odom_from_base @ _base_from(pose.header, odom_from_base) @ goal
+    if np.abs(found[:2, 3]).max() > FARTHEST:
+        raise BadGoal('target_pose: x {:.3g}, y {:.3g} m in {}; allowed: -{:g} to {:g} m'.format(
+            *found[:2, 3], ODOM_FRAME, FARTHEST, FARTHEST))
+    return found
 
 
 def _base_from(header: Header, odom_from_base: np.ndarray) -> np.ndarray:
