@@ -9,7 +9,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from .transforms import from_rpy
+from .transforms import from_rpy, rotation_vector
 
 POSITION_TOLERANCE = 1e-3  # m
 ANGLE_TOLERANCE = 5e-3  # rad
@@ -247,7 +247,10 @@ def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
     sine = np.linalg.norm(vector, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
     scale = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
-    return np.concatenate([pose[:3, 3] - tips[:, :3, 3], scale[:, None] * vector], axis=1)
+    vector = scale[:, None] * vector
+    for k in np.flatnonzero((sine <= 1e-9) & (angle > 1.0)):  # half a turn: its axis is not in the skew part
+        vector[k] = rotation_vector(turn[k])
+    return np.concatenate([pose[:3, 3] - tips[:, :3, 3], vector], axis=1)
 
 
 def _step(jacobians: np.ndarray, error: np.ndarray) -> np.ndarray:

@@ -84,6 +84,14 @@ def test_inverse_repeats_with_the_same_generator(arm):
     assert np.array_equal(first, arm.inverse(pose, SEED, np.random.default_rng(5)))
 
 
+def test_inverse_is_not_content_with_the_tool_half_a_turn_off(arm):
+    for axis in ('roll', 'pitch', 'yaw'):
+        goal = arm.forward(SEED) @ from_rpy((0.0, 0.0, 0.0), **{axis: np.pi})
+        found = arm.inverse(goal, SEED, np.random.default_rng(1), restarts=40)
+        if axis == 'roll' or found is not None:  # the last joint alone can roll it
+            assert np.linalg.norm(rotation_vector(arm.forward(found) @ np.linalg.inv(goal))) < 0.006
+
+
 def test_inverse_gives_none_out_of_reach(arm):
     assert arm.inverse(from_rpy((3.0, 0.0, 1.0)), SEED, np.random.default_rng(1)) is None
 
