@@ -24,7 +24,8 @@ from .bag_events import BagError, EventReader, find_bags
 from .trials import summarise
 
 ENOUGH_VISITS = 50
-OUTCOMES = ('same', 'would ask', 'would recover', 'recovers otherwise', 'not known')
+SAME, NOT_KNOWN = 'same', 'not known'
+OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
 RUN_FOR = (int(FailureClass.LOW), int(FailureClass.MODERATE))  # classes for which every policy runs preconditions
 _ROUNDING = 1e-9
 
@@ -37,7 +38,7 @@ class Tried(NamedTuple):
     settings: Mapping[str, Any]
     counts: Mapping[str, int]  # by OUTCOMES
     trials: int
-    other_trials: int  # in which at least one decision is another
+    other_trials: int  # in which at least one decision is known to be another
 
 
 class _State:
@@ -127,7 +128,7 @@ class Replay:
         failure_class = classify(state.estimator.rate, self._settings['moderate_from'], self._settings['high_from'])
         preconditions = self._preconditions(event, state, failure_class)
         if preconditions is None or state.chain is None:
-            return OUTCOMES[-1]
+            return NOT_KNOWN
         return self._policy.decide(Situation(failure_class, preconditions,
                                              self._policy.is_continuous(state.chain))).value
 
@@ -172,8 +173,7 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     counts = dict.fromkeys(OUTCOMES, 0)
     other_trials = 0
     for trial in trials:
-        before = counts['same']
-        decisions = 0
+        another = False
         for event in trial:
             _check_rate(own, event)
             if event.kind == EventKind.STATE_START:
@@ -182,9 +182,10 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
             done, tried = own.take(event), other.take(event)
             if done is not None and tried is not None:
                 _check_decision(done, event)
-                decisions += 1
-                counts[_outcome(event.outcome, tried)] += 1
-        other_trials += counts['same'] - before < decisions
+                outcome = _outcome(event.outcome, tried)
+                counts[outcome] += 1
+                another = another or outcome not in (SAME, NOT_KNOWN)
+        other_trials += another
     return Tried(dict(settings), counts, len(trials), other_trials)
 
 
@@ -196,14 +197,14 @@ def _check_rate(own: Replay, event: Event) -> None:
 
 
 def _check_decision(done: str, event: Event) -> None:
-    if done not in (event.outcome, OUTCOMES[-1]):
+    if done not in (event.outcome, NOT_KNOWN):
         raise BagError('{}: {}: it decided {}, where its own settings say {}'.format(
             event.trial_id, event.state, event.outcome, done))
 
 
 def _outcome(recorded: str, tried: str) -> str:
-    if tried in (recorded, OUTCOMES[-1]):
-        return 'same' if tried == recorded else tried
+    if tried in (recorded, NOT_KNOWN):
+        return SAME if tried == recorded else tried
     if tried == Action.ASK.value:
         return 'would ask'
     return 'would recover' if recorded == Action.ASK.value else 'recovers otherwise'

@@ -79,6 +79,7 @@ def test_what_was_not_tried_is_not_known():
     trials = run(60, memory=1)  # every failure is HIGH: no precondition was run, if there are any
     tried = what_if.compare(trials, {'memory': 50})
     assert tried.counts['not known'] > 5 and tried.counts['would recover'] == 0
+    assert tried.other_trials <= sum(tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
 
 
 def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
