@@ -14,6 +14,7 @@ import rostest
 from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from ports import free_port  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
@@ -23,13 +24,6 @@ if WITH_BROWSER:
     from browser import Browser  # noqa: E402
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'
-
-
-def free_port():
-    """A port that nobody listens on now."""
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 class Node:

@@ -12,7 +12,8 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node, free_port  # noqa: E402
+from console_browser import Node  # noqa: E402
+from ports import free_port  # noqa: E402
 from published_camera import OPTICAL, PublishedCamera  # noqa: E402
 from roslib.packages import find_node  # noqa: E402
 from waiting import wait_for  # noqa: E402

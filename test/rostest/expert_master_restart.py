@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """The master dies while a robot waits for an expert at a shared server. Masters and nodes of its own."""
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -12,16 +11,11 @@ import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import Process  # noqa: E402
+from ports import free_port  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 SHARED = '/shared/expert_query'
 RESTART_S = 8.0  # within which a master is back, also on a machine busy with other tests
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
 
 
 class TestMasterRestart(unittest.TestCase):

@@ -2,7 +2,6 @@
 import glob
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -12,6 +11,7 @@ from typing import Any, Dict, List, Optional
 
 import rosbag
 import rospy
+from ports import free_port
 from waiting import wait_for
 
 from smach_oracle.msg import OpenQueries, OracleEvent
@@ -74,12 +74,6 @@ def script(test: Any, text: str, name: str = 'task.py') -> str:
     with open(path, 'w') as file:
         file.write(text)
     return path
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return int(probe.getsockname()[1])
 
 
 class OwnMaster:
