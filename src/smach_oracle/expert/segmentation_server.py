@@ -19,6 +19,7 @@ from ..oracle.question import names
 from ..ros.command_line import parameters_only
 from ..ros.images import mask_image
 from ..ros.master_watch import start_master_watch
+from ..ros.parameters import name_of, number_of
 from .frame_source import NO_SNAPSHOT, FrameError, FrameSource, Shot
 from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
 from .marking import Marking, ingredients
@@ -134,15 +135,18 @@ def main() -> None:
                     '~depth, ~camera_info, ~snapshot, ~base_frame, ~frame_limit_s, ~states; see doc/perception.md.')
     rospy.init_node('perception_interface')
     start_master_watch()
-    source = FrameSource(rospy.get_param('~rgb', 'head_camera/rgb/image_raw'),
-                         rospy.get_param('~depth', 'head_camera/depth_registered/image_raw'),
-                         rospy.get_param('~camera_info', 'head_camera/rgb/camera_info'),
-                         rospy.get_param('~base_frame', 'base_footprint'),
-                         rospy.get_param('~snapshot', NO_SNAPSHOT), float(rospy.get_param('~frame_limit_s', 20.0)))
     try:
-        server = SegmentationServer(rospy.get_param('~states', {}), source)
+        server = SegmentationServer(rospy.get_param('~states', {}), _source())
     except ConfigError as err:
         rospy.logfatal('perception_interface: %s', err)
         raise SystemExit(2) from err
     rospy.loginfo('%s: waiting for the oracle', rospy.get_name())
     server.watch()
+
+
+def _source() -> FrameSource:
+    return FrameSource(name_of('~rgb', 'head_camera/rgb/image_raw'),
+                       name_of('~depth', 'head_camera/depth_registered/image_raw'),
+                       name_of('~camera_info', 'head_camera/rgb/camera_info'),
+                       name_of('~base_frame', 'base_footprint'), name_of('~snapshot', NO_SNAPSHOT),
+                       number_of('~frame_limit_s', 20.0, 0.1, 600.0))

@@ -5,6 +5,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 import rospy
 
 from ..oracle.errors import ConfigError
+from ..ros.parameters import checked_mapping, checked_number, flag_of, mapping_of, name_of, names_of, number_of
 from .arm_port import ArmNames, JointListener
 from .hand import Hand, Robot
 from .surroundings import Surroundings
@@ -40,17 +41,16 @@ class TeleoperationSettings(NamedTuple):
 
         :raises ConfigError: naming the parameter, its value and what is allowed.
         """
-        arms = _mapping('~arms', rospy.get_param('~arms', {}))
+        arms = mapping_of('~arms')
         if not arms:
             raise ConfigError(rospy.resolve_name('~arms'), arms, 'one arm or more; see manipulation_interface.yaml')
         names = {name: ArmNames.parse('~arms/' + name, value) for name, value in arms.items()}
-        states = {state: _state(state, value, names) for state, value in _mapping(
-            '~states', rospy.get_param('~states', {})).items()}
-        return cls(names, str(rospy.get_param('~base_frame', 'base_footprint')), _limits(), states,
-                   _names('~success', ['succeeded']), _number('~rate_hz', 60.0, 30.0, 500.0),
-                   _number('~watchdog_s', 0.06, 0.01, 0.5), _number('~lead', 0.12, 0.01, 1.0),
-                   _number('~gripper_effort', 60.0, 1.0, 500.0), _flag('~lock_step', False),
-                   str(rospy.get_param('~snapshot', NO_SNAPSHOT)), _flag('~clearance', True))
+        states = {state: _state(state, value, names) for state, value in mapping_of('~states').items()}
+        return cls(names, name_of('~base_frame', 'base_footprint'), _limits(), states,
+                   names_of('~success', ['succeeded']), number_of('~rate_hz', 60.0, 30.0, 500.0),
+                   number_of('~watchdog_s', 0.06, 0.01, 0.5), number_of('~lead', 0.12, 0.01, 1.0),
+                   number_of('~gripper_effort', 60.0, 1.0, 500.0), flag_of('~lock_step', False),
+                   name_of('~snapshot', NO_SNAPSHOT), flag_of('~clearance', True))
 
     @property
     def period_s(self) -> float:
@@ -94,12 +94,12 @@ def _description() -> object:
 
 
 def _limits() -> DriveLimits:
-    given = dict(_mapping('~limits', rospy.get_param('~limits', {})))
+    given = dict(mapping_of('~limits'))
     workspace = given.pop('workspace', None)
     unknown = sorted(set(given) - set(DriveLimits._fields))
     if unknown:
         raise ConfigError('~limits/' + unknown[0], given[unknown[0]], 'the keys ' + ', '.join(DriveLimits._fields))
-    values = {key: _checked('~limits/' + key, value, 1e-3 if key in _NEVER_ZERO else 0.0, 100.0)
+    values = {key: checked_number('~limits/' + key, value, 1e-3 if key in _NEVER_ZERO else 0.0, 100.0)
               for key, value in given.items()}
     if workspace is not None:
         values['workspace'] = _corners(workspace)
@@ -122,43 +122,13 @@ def _corners(value: Any) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
 
 def _state(state: str, value: Any, arms: Mapping[str, ArmNames]) -> Dict[str, Any]:
     key = '~states/' + state
-    found = dict(_mapping(key, value))
+    found = dict(checked_mapping(key, value))
     unknown = sorted(set(found) - {'arm', 'outputs'})
     if unknown:
         raise ConfigError('{}/{}'.format(key, unknown[0]), found[unknown[0]], 'the keys arm, outputs')
     if found.get('arm', next(iter(arms))) not in arms:
         raise ConfigError(key + '/arm', found['arm'], ', '.join(sorted(arms)))
-    for name, what in _mapping(key + '/outputs', found.get('outputs', {})).items():
+    for name, what in checked_mapping(key + '/outputs', found.get('outputs', {})).items():
         if what not in _OUTPUTS:
             raise ConfigError('{}/outputs/{}'.format(key, name), what, ', '.join(_OUTPUTS))
     return found
-
-
-def _mapping(key: str, value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError(key, value, 'a mapping')
-    return value
-
-
-def _names(key: str, default: List[str]) -> List[str]:
-    value = rospy.get_param(key, default)
-    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        raise ConfigError(key, value, 'a list of names')
-    return value
-
-
-def _flag(key: str, default: bool) -> bool:
-    value = rospy.get_param(key, default)
-    if not isinstance(value, bool):
-        raise ConfigError(key, value, 'true or false')
-    return value
-
-
-def _number(key: str, default: float, low: float, high: float) -> float:
-    return _checked(key, rospy.get_param(key, default), low, high)
-
-
-def _checked(key: str, value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise ConfigError(key, value, 'a number from {:g} to {:g}'.format(low, high))
-    return float(value)

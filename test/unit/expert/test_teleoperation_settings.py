@@ -30,7 +30,8 @@ def test_what_is_not_given_has_its_default(read):
 
 
 @pytest.mark.parametrize('given, says', [
-    ({'arms': {}}, 'arms'), ({'arms': {'right': {'base': 'torso'}}}, 'arms/right'),
+    ({'arms': {}}, 'arms'), ({'arms': 7}, 'arms'), ({'base_frame': ''}, 'base_frame'), ({'snapshot': 3}, 'snapshot'),
+    ({'states': ['PICK']}, 'states'), ({'arms': {'right': {'base': 'torso'}}}, 'arms/right'),
     ({'arms': {'right': dict(ARMS['right'], tool='')}}, 'arms/right.tool'),
     ({'arms': {'right': dict(ARMS['right'], posture=[0.0, math.nan])}}, 'posture'),
     ({'rate_hz': 10}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'), ({'watchdog_s': 3.0}, 'watchdog_s'),
@@ -45,3 +46,8 @@ def test_what_is_not_given_has_its_default(read):
 def test_what_cannot_be_is_refused_by_name(read, given, says):
     with pytest.raises(ConfigError, match=says):
         read(**given)
+
+
+def test_the_keys_of_refusals_are_whole_names(read):
+    with pytest.raises(ConfigError, match='/node/limits/linear: -1'):
+        read(limits={'linear': -1})

@@ -13,6 +13,7 @@ from smach_oracle.msg import ExpertDecision, OpenQuery, UserdataItem
 from smach_oracle.oracle.errors import ConfigError
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.master_watch import start_master_watch
+from smach_oracle.ros.parameters import name_of, number_of
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
 from .eye import Eye, EyeError
@@ -35,12 +36,14 @@ class Settings:
 
     def __init__(self) -> None:
         self.plans = Plans(rospy.get_param('~states', {}))
-        self.seed = int(_number('~seed', 0, 0, 2 ** 31))
-        self.median_s = _number('~delay_median_s', 15.0, 0.0, 3600.0)
-        self.sigma = _number('~delay_sigma', 0.5, 0.0, 3.0)
-        self.most_questions = int(_number('~most_questions', 12, 1, 1000))
-        self.rate_hz = _number('~rate_hz', 30.0, 10.0, 500.0)
-        self.image = (int(_number('~image_width', 640, 1, 10000)), int(_number('~image_height', 480, 1, 10000)))
+        self.seed = int(number_of('~seed', 0, 0, 2 ** 31))
+        self.median_s = number_of('~delay_median_s', 15.0, 0.0, 3600.0)
+        self.sigma = number_of('~delay_sigma', 0.5, 0.0, 3.0)
+        self.most_questions = int(number_of('~most_questions', 12, 1, 1000))
+        self.rate_hz = number_of('~rate_hz', 30.0, 10.0, 500.0)
+        self.perception = name_of('~perception', 'perception_interface')
+        self.manipulation = name_of('~manipulation', 'manipulation_interface')
+        self.image = (int(number_of('~image_width', 640, 1, 10000)), int(number_of('~image_height', 480, 1, 10000)))
 
 
 class Operator:
@@ -141,13 +144,6 @@ def userdata_of(items: List[UserdataItem]) -> Dict[str, Any]:
     return found
 
 
-def _number(key: str, default: float, low: float, high: float) -> float:
-    value = rospy.get_param(key, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise ConfigError(rospy.resolve_name(key), value, 'a number from {:g} to {:g}'.format(low, high))
-    return value
-
-
 def main() -> None:
     """Entry point of the node."""
     parameters_only('Node: a scripted expert who works with the interfaces of people. Parameters: ~states, ~seed, '
@@ -162,7 +158,5 @@ def main() -> None:
     name = rospy.get_name().strip('/')
     front_end = FrontEnd(name)
     rospy.on_shutdown(front_end.stop)
-    interfaces = connect(rospy.get_param('~perception', 'perception_interface'),
-                         rospy.get_param('~manipulation', 'manipulation_interface'), name, settings.image,
-                         settings.rate_hz)
+    interfaces = connect(settings.perception, settings.manipulation, name, settings.image, settings.rate_hz)
     Operator(settings, front_end, Eye(), interfaces).run()
