@@ -1,10 +1,13 @@
 """Collision checks, ways and their timing, for the right arm of the PR2."""
+from types import SimpleNamespace
+
 import numpy as np
+import pybullet
 import pytest
 from arms import REST, box, clutter, deepest, model, right_arm
 
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.simulation.robot.arm import READY
+from smach_oracle.simulation.robot.arm import READY, Arm, Means, SkillError
 from smach_oracle.simulation.robot.arms_aside import ASIDE
 from smach_oracle.simulation.robot.collision import CollisionWorld, model_from
 from smach_oracle.simulation.robot.planner import ACCELERATION, PlanningError, plan, straight, timed
@@ -141,3 +144,23 @@ def test_an_unknown_arm_and_a_broken_description_are_named():
         CollisionWorld(model(), 'middle', {})
     with pytest.raises(ValueError, match='robot_description_semantic'):
         model_from(model().urdf, '<robot')
+
+
+def clients():
+    """The numbers of the physics clients that are open."""
+    return [number for number in range(50) if pybullet.isConnected(number)]
+
+
+def test_what_cannot_be_built_leaves_no_physics_client_behind(monkeypatch):
+    robot = SimpleNamespace(joints=lambda: REST)
+    before = clients()
+    with pytest.raises(ValueError):
+        Arm(Means(robot, model()), 'right', {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])}, 1)
+    assert clients() == before
+
+    def broken(*_, **__):
+        raise pybullet.error('Cannot load URDF file.')
+    monkeypatch.setattr(pybullet, 'loadURDF', broken)
+    with pytest.raises(SkillError, match='robot description: Cannot load'):
+        Arm(Means(robot, model()), 'right', {}, 1)
+    assert clients() == before

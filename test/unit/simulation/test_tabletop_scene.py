@@ -2,9 +2,11 @@
 import collections
 
 import numpy as np
+import pybullet
 
 from smach_oracle.simulation.world.judge import judge
 from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.rehearsal import rehearse
 from smach_oracle.simulation.world.tabletop_causes import CHANCE
 from smach_oracle.simulation.world.tabletop_scene import GOAL, draw
 
@@ -47,3 +49,10 @@ def test_nothing_stands_at_the_goal_and_the_things_stand_apart_and_at_rest():
         assert nearest.name == 'object_0'
         assert np.hypot(nearest.position[0] - GOAL[0], nearest.position[1] - GOAL[1]) > 0.15
     world.close()
+
+
+def test_a_rehearsal_in_a_world_of_its_own_leaves_none_behind():
+    before = [number for number in range(50) if pybullet.isConnected(number)]
+    done = rehearse(draw(3, benign=True)._replace(bodies=()))
+    assert done.failed == 'DETECT_TABLETOP' and not done.success
+    assert [number for number in range(50) if pybullet.isConnected(number)] == before

@@ -56,8 +56,12 @@ class Arm:
             self.space = CollisionWorld(means.model, arm, joints)
         except ValueError as err:
             raise SkillError(str(err)) from err
-        for name in sorted(boxes):
-            self.space.add_box(name, boxes[name])
+        try:
+            for name in sorted(boxes):
+                self.space.add_box(name, boxes[name])
+        except Exception:
+            self.space.close()
+            raise
         self.chain = self.space.chain
         self.generator = np.random.default_rng(seed)
 

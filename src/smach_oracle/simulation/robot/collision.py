@@ -56,14 +56,25 @@ class CollisionWorld:
         """
         :param arm: the arm that moves, 'left' or 'right'; all other joints stay as in `joints`.
         :param joints: encoder readings; joints that are missing stand at 0.
-        :raises ValueError: for an unknown arm.
+        :raises ValueError: for an unknown arm, or a description that cannot be loaded.
         """
         if arm not in ARMS:
             raise ValueError('arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
         lift = 'torso_lift_joint'
         self.chain = Chain.from_urdf(model.urdf, BASE_FRAME, TOOL_FRAME[arm], fixed={lift: joints.get(lift, 0.0)})
         self.checks = 0  # how often a configuration was looked at, the measure of planning effort
+        self._boxes: Dict[str, int] = {}
+        self._held: Optional[Tuple[int, np.ndarray]] = None
+        self._touchable: Set[int] = set()
         self._client = pybullet.connect(pybullet.DIRECT)
+        try:
+            self._build(model, arm)
+            self.place_rest(joints)
+        except Exception:
+            self.close()
+            raise
+
+    def _build(self, model: RobotModel, arm: str) -> None:
         self._robot = self._load(model.urdf)
         self._links = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[12].decode(): k
                        for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
@@ -74,10 +85,6 @@ class CollisionWorld:
         self._moving_links = {self._links[name] for name in self._moving}
         self._hand = {self._links[name] for name in self._moving if '_gripper_' in name}
         self._pairs = self._filter(model.allowed)
-        self._boxes: Dict[str, int] = {}
-        self._held: Optional[Tuple[int, np.ndarray]] = None
-        self._touchable: Set[int] = set()
-        self.place_rest(joints)
 
     def __enter__(self) -> 'CollisionWorld':
         return self
@@ -207,6 +214,8 @@ class CollisionWorld:
             with os.fdopen(handle, 'w') as stream:
                 stream.write(urdf)
             return int(pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS, physicsClientId=self._client))
+        except pybullet.error as err:
+            raise ValueError('robot description: {}'.format(err)) from err
         finally:
             os.remove(path)
 

@@ -78,9 +78,14 @@ class Trial:
 
 
 def rehearse(scene: Scene, world: Optional[World] = None) -> Rehearsed:
-    """One trial up to its first failure."""
+    """One trial up to its first failure; in a world of its own, where none is given."""
+    if world is None:
+        world = World()
+        try:
+            return rehearse(scene, world)
+        finally:
+            world.close()
     begun = time.perf_counter()
-    world = World() if world is None else world
     world.reset(scene)
     trial = Trial(world)
     wall = {'reset': time.perf_counter() - begun}
