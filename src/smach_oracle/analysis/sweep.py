@@ -12,7 +12,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .bag_events import BagError
 from .groups import ENDED_IN_FAILURE, QUESTIONS, RECOVERIES, TRUE_SUCCESS, Arm, Count, find_arms, make_group
-from .table import percent
+from .table import over_replicates, percent
 from .trials import load_trials
 
 ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2
@@ -72,10 +72,9 @@ def _parts(points: Sequence[Point]) -> List[Tuple[str, str]]:
 
 
 def _line(point: Point) -> str:
-    over = point.asked.over_replicates
     return '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format(
         '?' if point.memory is None else point.memory, point.runs, _with_interval(point.asked),
-        '' if over is None else percent(over).strip(), _with_interval(point.recovered),
+        over_replicates(point.asked).strip(), _with_interval(point.recovered),
         '{:.1f}%'.format(100 * point.failed.share),
         'unknown' if point.true_success is None else _with_interval(point.true_success)).rstrip()
 

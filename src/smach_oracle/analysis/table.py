@@ -59,9 +59,17 @@ def _group_lines(group: Group) -> List[str]:
 def _count_line(count: Count) -> str:
     indent = '  ' if count.name in _INDENTED else ''
     events = '' if count.events is None else str(count.events)
-    over = '' if count.over_replicates is None else percent(count.over_replicates)
+    over = over_replicates(count)
     return '  {:<26}{:>8}{:>8.1f}%   {:<16}{:>8}   {}'.format(
         indent + count.name, count.trials, 100 * count.share, percent(count.interval), events, over).rstrip()
+
+
+def over_replicates(count: Count) -> str:
+    """The interval over replicates in words; those that all agree tell nothing of how much others would differ."""
+    if count.over_replicates is None:
+        return ''
+    low, high = count.over_replicates
+    return 'all alike' if high - low < 1e-9 else percent(count.over_replicates)
 
 
 def percent(interval: Sequence[float]) -> str:

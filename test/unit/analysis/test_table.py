@@ -208,3 +208,11 @@ def test_csv_and_json_tell_seed_cause_and_truth():
     table.write_json(target, [], [told(7, True, False, ['noise'])], [])
     data = json.loads(target.getvalue())
     assert data['trials'][0]['truth']['success'] is False and data['causes'][0]['kind'] == 'noise'
+
+
+def test_replicates_that_all_agree_are_given_no_interval_without_width():
+    trials = [trial(number, recoveries=int(number % 5 == 0), bags=('/{}/a.bag'.format(number // 10),))
+              for number in range(20)] + [trial(20, failures=1, bags=('/0/a.bag',))]
+    rows = {line.strip().split('  ')[0]: line for line in table.format_text(make_groups(trials)).splitlines()}
+    assert rows['unfinished'].endswith('   all alike')
+    assert rows['failures of states'].endswith('%') and 'all alike' not in rows['failures of states']
