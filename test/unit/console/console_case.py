@@ -36,6 +36,30 @@ class FakeDesk:
         self.left.append(browser)
 
 
+class FakeHands:
+    """One hand, whose wheel a page has once it has taken it."""
+
+    def __init__(self):
+        self.wheels = set()
+        self.relayed = []
+
+    def drives(self, browser):
+        return browser in self.wheels
+
+    def drive(self, command, browser):
+        if browser not in self.wheels:
+            return Reply(False, 'Take the wheel first.')
+        self.relayed.append(command.arguments)
+        return Reply(True)
+
+    def carry_out(self, command, person, browser):
+        self.wheels.add(browser)
+        return Reply(True, '', {'wheel': browser})
+
+    def leave(self, browser):
+        self.wheels.discard(browser)
+
+
 class FakeAudit:
     """Remembers what it is told."""
 
@@ -56,8 +80,9 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         book = TokenBook(text, 'tokens') if self.tokens else None
         self.audit, self.desk, self.sections, self.log = FakeAudit(), FakeDesk(), Sections(), TrialLog()
         settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), '', '')
+        self.hands = FakeHands()
         self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
-        self.office = Office(self.sections, self.log, self.desk)
+        self.office = Office(self.sections, self.log, self.desk, self.hands)
         self.sensors = Sensors()
         return make_app(self.gate, self.office, self.sensors)
 
@@ -81,6 +106,16 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS[role]}), Cookie=cookie, Origin=self.origin,
                           X_Xsrf=said['xsrf'])
         assert answer.code == 200
+        return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
+
+    async def signed(self, role):
+        """Sign in without leaving the loop."""
+        client = self.http_client
+        answer = await client.fetch(self.get_url('/session'))
+        cookie = answer.headers['Set-Cookie'].split(';')[0]
+        headers = {'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']}
+        answer = await client.fetch(self.get_url('/session'), method='POST', headers=headers,
+                                    body=json.dumps({'token': TOKENS[role]}))
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
     def connect(self, cookie='', **headers):

@@ -83,10 +83,11 @@ def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
 
 def test_viewers_may_only_look():
     assert {name for name in COMMANDS if needed_role(name) == 'viewer'} == {'hello', 'watch'}
-    assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator'}
+    assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
+    assert {name for name in COMMANDS if needed_role(name) == 'teleoperator'} == {'take_wheel', 'leave_wheel', 'drive'}
 
 
 def test_no_command_names_a_topic_a_service_or_a_type():
     fields = {field for spec in COMMANDS.values() for field in spec.checks}
     assert fields == {'xsrf', 'expert', 'trial', 'question', 'kind', 'name', 'outputs', 'why',
-                      'stamp', 'region', 'strokes', 'frame', 'outcome'}
+                      'stamp', 'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent'}

@@ -111,16 +111,6 @@ class TestSocket(console_case.ConsoleCase):
             assert await self.refused(cookie, **headers) == 403
         assert await self.refused(cookie, Host='evil.example', Origin='http://evil.example') == 421
 
-    async def signed(self, role):
-        """Sign in without leaving the loop."""
-        client = self.http_client
-        answer = await client.fetch(self.get_url('/session'))
-        cookie = answer.headers['Set-Cookie'].split(';')[0]
-        headers = {'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']}
-        answer = await client.fetch(self.get_url('/session'), method='POST', headers=headers,
-                                    body=json.dumps({'token': TOKENS[role]}))
-        return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
-
     @tornado.testing.gen_test
     async def test_nothing_is_told_or_done_before_a_hello_that_is_not_forged(self):
         cookie, said = await self.signed('operator')

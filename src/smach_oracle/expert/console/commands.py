@@ -10,6 +10,7 @@ from typing import Any, Dict, List, NamedTuple
 from ...oracle.errors import OracleError
 from .checks import QUESTION, Spec, one_of, shown, text
 from .eye_commands import EYE_COMMANDS
+from .hand_commands import HAND_COMMANDS
 
 MOST_BYTES = 65536
 _MOST_OUTPUTS = 64
@@ -137,4 +138,5 @@ COMMANDS: Dict[str, Spec] = {
     'answer': Spec('operator', dict(QUESTION, kind=one_of(KINDS), name=text(400), outputs=_outputs,
                                     why=text(2000))),
     **EYE_COMMANDS,
+    **HAND_COMMANDS,
 }

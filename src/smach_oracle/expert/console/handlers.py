@@ -196,6 +196,7 @@ class Limits(NamedTuple):
     """Of one socket."""
 
     commands: Bucket
+    driving: Bucket  # commands of a page that has the wheel of a hand
     unruly: Bucket  # how often it may go beyond before it is closed
 
 

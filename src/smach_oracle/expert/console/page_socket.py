@@ -15,6 +15,8 @@ from .access import Bucket, may
 from .audit import Person
 from .commands import BadCommand, Command, needed_role, parse
 from .desk import Desk, Reply
+from .hand_commands import HAND_COMMANDS
+from .hands import Hands
 from .handlers import Gate, Limits, guard
 from .sections import Sections
 from .trial_log import TrialLog
@@ -22,6 +24,7 @@ from .trial_log import TrialLog
 MOST_SOCKETS = 64
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
+LONGEST_DRIVE = 2000
 RENAMED = 4001
 TOO_FAST = 4008
 FORGED = 4003
@@ -30,10 +33,11 @@ FORGED = 4003
 class Office:
     """What all sockets share."""
 
-    def __init__(self, sections: Sections, log: TrialLog, desk: Desk) -> None:
+    def __init__(self, sections: Sections, log: TrialLog, desk: Desk, hands: Hands) -> None:
         self.sections = sections
         self.log = log
         self.desk = desk
+        self.hands = hands
         self.sockets: Set['Socket'] = set()
         self.numbers = itertools.count(1)
         self.workers = ThreadPoolExecutor(8, 'command')
@@ -55,7 +59,7 @@ class Socket(tornado.websocket.WebSocketHandler):
         self._session: Optional[sessions.Session] = None
         self._name = ''
         self._number = next(office.numbers)
-        self._limits = Limits(Bucket(10.0, 40.0), Bucket(0.5, 20.0))
+        self._limits = Limits(Bucket(10.0, 40.0), Bucket(70.0, 70.0), Bucket(0.5, 20.0))
         self._sent_version = 0
         self._watched = ''
         self._watched_from = 0
@@ -95,10 +99,11 @@ class Socket(tornado.websocket.WebSocketHandler):
         """Claims run out unless the page comes back."""
         self._office.sockets.discard(self)
         self._office.desk.leave(self._number)
+        self._office.hands.leave(self._number)
 
     async def on_message(self, message: Any) -> None:
         """One command."""
-        if not self._limits.commands.take():
+        if not self._bucket(message).take():
             if not self._limits.unruly.take():
                 self.close(TOO_FAST, 'too many commands')
             return
@@ -108,7 +113,13 @@ class Socket(tornado.websocket.WebSocketHandler):
             self._note(None, Reply(False, str(err)))
             self._reply(err.number, Reply(False, str(err)))
             return
-        self._reply(command.number, await self._carry_out(command))
+        reply = await self._carry_out(command)
+        if command.name != 'drive' or not reply.ok:
+            self._reply(command.number, reply)
+
+    def _bucket(self, message: Any) -> Bucket:
+        driving = isinstance(message, str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
+        return self._limits.driving if driving and self._office.hands.drives(self._number) else self._limits.commands
 
     async def _carry_out(self, command: Command) -> Reply:
         if command.name == 'hello':
@@ -121,6 +132,8 @@ class Socket(tornado.websocket.WebSocketHandler):
         if command.name == 'watch':
             self._watched, self._watched_from = command.arguments['trial'], 0
             return self._note(command, Reply(True))
+        if command.name == 'drive':
+            return self._office.hands.drive(command, self._number)
         if self._at_work >= MOST_AT_WORK:
             return self._note(command, Reply(False, 'too many commands at a time'))
         return await self._work(self._person, command)
@@ -129,12 +142,13 @@ class Socket(tornado.websocket.WebSocketHandler):
         self._at_work += 1
         try:
             loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(self._office.workers, self._office.desk.carry_out, command, person,
-                                              self._number)
+            carry_out = (self._office.hands if command.name in HAND_COMMANDS else self._office.desk).carry_out
+            return await loop.run_in_executor(self._office.workers, carry_out, command, person, self._number)
         finally:
             self._at_work -= 1
             if self.ws_connection is None or self.ws_connection.is_closing():  # gone while the robot was asked
                 self._office.desk.leave(self._number)
+                self._office.hands.leave(self._number)
 
     def _hello(self, command: Command) -> Reply:
         session, identity = self._session, self._gate.identity(self._session)

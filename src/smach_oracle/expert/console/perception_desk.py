@@ -19,7 +19,7 @@ from .desk import Reply, Worker
 from .eye_commands import FRESH
 
 FRAME_LIMIT_S = 15.0
-NOT_RUNNING = 'No perception interface runs for this question any more.'
+NOT_RUNNING = 'No interface runs for this question any more.'
 _MOST_CORNERS = 6000  # of a mask's outline
 
 
@@ -35,7 +35,7 @@ class PerceptionDesk:
     """Works on questions for which a perception interface runs."""
 
     def __init__(self, known: Callable[[str], bool], call: Callable[..., Any] = call_service) -> None:
-        """`known`: whether an action is that of a perception interface. `call`: as call_service."""
+        """`known`: whether there is a SharedAutonomy action of that name. `call`: as call_service."""
         self._known = known
         self._call = call
 

@@ -22,6 +22,7 @@ from .commands import MOST_BYTES
 from .desk import Desk
 from .eye import Eye
 from .frames import FrameHandler, FrameRoom
+from .hands import Hands
 from .handlers import Gate, NotThere, SessionHandler, StaticFile
 from .layout import Layouter
 from .questions import QuestionBoard
@@ -79,8 +80,9 @@ class Console:
         self._front_end = FrontEnd('expert_console')
         self._eye = Eye(self._sections, self._front_end)
         self._board = QuestionBoard(self._front_end, self._log)
+        self._hands = Hands(self._sections, self._front_end, self._audit)
         self._office = Office(self._sections, self._log, Desk(
-            self._front_end, self._audit, PerceptionDesk(self._eye.is_perception).commands))
+            self._front_end, self._audit, PerceptionDesk(self._hands.is_interface).commands), self._hands)
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office, self._eye.sensors)
         server = tornado.httpserver.HTTPServer(
@@ -91,6 +93,7 @@ class Console:
     def run(self) -> None:
         """Serve until the node goes down."""
         self._eye.start()
+        self._hands.start()
         for target in (self._robots.run, self._draw):
             threading.Thread(target=target, name=target.__name__, daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()

@@ -129,6 +129,12 @@ export class Link {
     });
   }
 
+  // A command whose reply nobody waits for. `unlessLate`: not where earlier ones are still on their way out.
+  tell(name, args, unlessLate) {
+    if (!this.socket || this.socket.readyState !== WebSocket.OPEN || (unlessLate && this.socket.bufferedAmount > 0)) return;
+    this.socket.send(JSON.stringify(Object.assign({ id: ++this.number, do: name }, args)));
+  }
+
   async signIn(token) {
     const answer = await this.change('POST', JSON.stringify({ token }));
     if (answer.ok) this.connect();

@@ -5,6 +5,7 @@ import { Lost } from './link.js';
 import { MachineView } from './machines.js';
 import { AnswerForm } from './answer_form.js';
 import { FollowUp } from './follow_up.js';
+import { InterfacePanel } from './interface_panel.js';
 import { PerceptionPanel } from './perception_panel.js';
 import { SituationCamera } from './situation_camera.js';
 
@@ -21,11 +22,12 @@ export class Detail {
     this.machine = new MachineView(app.store, () => {});
     this.camera = new SituationCamera(app, question);
     this.workbench = h('div', { class: 'workbench', hidden: true });
+    this.bench = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
     this.claimBar = h('div', { class: 'claim-bar', role: 'status' });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'), this.form.root);
-    this.root = h('article', { class: 'detail', 'data-question': question.key }, this.head(), this.claimBar, this.workbench,
+    this.root = h('article', { class: 'detail', 'data-question': question.key }, this.head(), this.claimBar, this.workbench, this.bench,
       h('div', { class: 'detail-body' }, h('div', { class: 'situation' }, this.failure(), this.camera.root, this.machineCard(), this.visits(), this.userdata()), this.answers));
     this.machine.show(question.robot, question.path);
     this.show();
@@ -80,6 +82,7 @@ export class Detail {
   // Take the question, unless somebody else works on it.
   begin() {
     this.showWorkbench();
+    this.showInterface();
     if (this.app.mayAnswer && this.question.status === 'pending') this.claim('claim');
     this.show();
   }
@@ -95,6 +98,7 @@ export class Detail {
     this.ended = true;
     this.camera.stop();
     if (this.perception) this.perception.stop();
+    if (this.tools) this.tools.stop();
   }
 
   async claim(command) {
@@ -183,7 +187,25 @@ export class Detail {
     this.show();
   }
 
+  // What the interface that runs prints, its end, and the controls of the hand that it moves.
+  showInterface() {
+    const now = this.now;
+    const running = Boolean(now && now.status === 'interface') && !this.ended;
+    if (running && !this.tools) {
+      this.tools = new InterfacePanel(this.app, this.question, now.interface, () => this.follow());
+      replace(this.bench, this.tools.root);
+    } else if (running) {
+      this.tools.update();
+    } else if (this.tools) {
+      this.tools.stop();
+      this.tools = null;
+      replace(this.bench);
+    }
+    this.bench.hidden = !this.tools;
+  }
+
   update(names) {
+    if (names.some((name) => ['questions', 'hand', 'output', 'eye'].includes(name))) this.showInterface();
     if (names.includes('eye')) {
       this.camera.update();
       this.showWorkbench();

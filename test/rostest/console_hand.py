@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+"""A hand driven from a real browser, by held keys and buttons, through an interface that is started on demand."""
+import os
+import shutil
+import signal
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from roslib.packages import find_node
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_browser import Node, free_port  # noqa: E402
+from teleoperation_fixtures import FakeArm  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+
+WITH_BROWSER = bool(shutil.which('chromedriver'))
+if WITH_BROWSER:
+    from browser import Browser  # noqa: E402
+    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+HERE = os.path.dirname(os.path.abspath(__file__))
+STOPS_WITHIN_S = 0.1
+QUESTION = '.question-row[data-key^="/alpha/"]'
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class TheHand(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.arm = FakeArm()
+        cls.audited, cls.states, cls.commands = [], [], []
+        rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
+        rospy.Subscriber('/manipulation_interface/state', TeleopState, cls.states.append, tcp_nodelay=True)
+        rospy.Subscriber('/manipulation_interface/command', TeleopCommand, cls.heard, tcp_nodelay=True)
+        port = free_port()
+        cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
+                           '__name:=expert_console')
+        cls.robot = Node(sys.executable, os.path.join(HERE, 'console_hand_robot.py'), '__name:=alpha')
+        cls.browser = Browser(1360, 1000)
+        cls.page = 'http://localhost:{}/'.format(port)
+        wait_for(cls.page_is_served, 40.0)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.robot.stop()
+        cls.console.stop()
+
+    @classmethod
+    def heard(cls, command):
+        cls.commands.append((time.monotonic(), command))
+
+    @classmethod
+    def page_is_served(cls):
+        try:
+            cls.browser.driver.get(cls.page)
+            return cls.browser.driver.title
+        except Exception:  # whatever the driver says of a page that is not there yet
+            return False
+
+    def height(self):
+        return self.states[-1].tool_pose.position.z
+
+    def moves(self):
+        begun_s = time.monotonic()
+        return wait_for(lambda: self.arm.moved_s > begun_s + 0.2)
+
+    def assert_stops(self, let_go):
+        let_go()
+        stopped_s = time.monotonic()
+        time.sleep(0.5)  # as long as nothing may move
+        self.assertLess(self.arm.moved_s - stopped_s, STOPS_WITHIN_S)
+
+    def key(self, down):
+        chain = ActionChains(self.browser.driver, duration=0)
+        (chain.key_down if down else chain.key_up)('r').perform()
+
+    def told(self, name):
+        return [told for told in self.audited if told.command == name]
+
+    def test_1_the_wheel_of_an_interface_that_is_started_on_demand(self):
+        browser = self.browser
+        browser.click(QUESTION)
+        browser.click('.choice.interface[data-name=manipulation]')
+        browser.find('.hand', 40.0)
+        self.assertTrue(browser.says('was started for this question', '.output'), 'its output is there')
+        self.assertFalse(browser.find('.pad[data-move=up]').is_enabled(), 'nobody drives yet')
+        browser.click('.wheel')
+        self.assertTrue(browser.says('You drive.', '.driver'))
+        browser.click('[data-frame=base]')
+
+    def test_2_a_held_key_moves_the_hand_and_one_that_is_let_go_stops_it(self):
+        before = self.height()
+        self.key(True)
+        self.assertTrue(self.moves())
+        self.assertTrue(self.browser.says('Moves freely', '.drive-light'))
+        times = [at for at, command in self.commands if command.dead_man][-30:]
+        self.assert_stops(lambda: self.key(False))
+        self.assertGreater(self.height(), before + 0.01, 'upwards')
+        self.assertFalse(self.commands[-1][1].dead_man, 'the page has said so')
+        gaps = sorted(after - before for before, after in zip(times, times[1:]))
+        self.assertLess(gaps[len(gaps) // 2], 1 / 30.0, '30 commands a second or more')
+
+    def test_3_a_button_held_with_the_mouse_stops_when_the_page_loses_the_focus(self):
+        before = self.height()
+        pad = self.browser.find('.pad[data-move=down]')
+        ActionChains(self.browser.driver, duration=0).click_and_hold(pad).perform()
+        self.assertTrue(self.moves())
+        self.assert_stops(lambda: self.browser.run('window.dispatchEvent(new Event("blur"))'))
+        self.assertLess(self.height(), before)
+        ActionChains(self.browser.driver, duration=0).release().perform()
+        ActionChains(self.browser.driver, duration=0).click_and_hold(pad).perform()
+        self.assertTrue(self.moves(), 'pressed anew')
+        self.assert_stops(lambda: self.browser.run(
+            'Object.defineProperty(document, "hidden", {value: true, configurable: true});'
+            'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'))
+        ActionChains(self.browser.driver, duration=0).release().perform()
+
+    def test_4_a_link_that_is_lost_stops_the_hand_and_what_was_held_back_does_not_move_it(self):
+        self.key(True)
+        self.assertTrue(self.moves())
+        process = self.console._process
+        self.assert_stops(lambda: process.send_signal(signal.SIGSTOP))
+        self.key(False)
+        time.sleep(0.2)  # so long have the youngest of those that are held back waited
+        relayed = len(self.commands)
+        process.send_signal(signal.SIGCONT)
+        self.assertTrue(wait_for(lambda: len(self.commands) > relayed), 'the late ones have come')
+        self.assert_stops(lambda: None)
+        self.assertFalse(any(command.dead_man for _, command in self.commands[relayed:]), 'none that moves it')
+
+    def test_5_the_gripper_and_the_end(self):
+        browser = self.browser
+        if not browser.says('You drive.', '.driver', 5.0):  # the page had given the link up meanwhile
+            browser.click('.wheel')
+            self.assertTrue(browser.says('You drive.', '.driver', 30.0))
+        ActionChains(browser.driver, duration=0).key_down('c').perform()
+        self.assertTrue(wait_for(lambda: self.states[-1].gripper_stalled), 'it has met something')
+        ActionChains(browser.driver, duration=0).key_up('c').perform()
+        self.assertTrue(browser.says('holds something', '.drive-facts'))
+        browser.click('.finish')
+        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'))
+        self.assertTrue(wait_for(lambda: rospy.get_param('/alpha/placed', '') == 'base_footprint'), 'the grasp is told')
+        self.assertTrue(wait_for(lambda: self.told('leave_wheel')))
+        self.assertEqual({told.ok for told in self.told('take_wheel') + self.told('hand_over')}, {True})
+        self.assertIn('relayed', self.told('leave_wheel')[-1].arguments)
+        self.assertTrue(self.told('take_wheel')[0].query_id)
+        self.assertEqual(self.told('drive'), [], 'sessions are audited, not every command')
+        self.assertEqual(browser.errors(), [])
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_hand')
+    rostest.rosrun('smach_oracle', 'console_hand', TheHand)
