@@ -1,4 +1,5 @@
 """scripts/test itself: what it counts, how it ends, and that it leaves nothing running."""
+import os
 import subprocess
 import sys
 import threading
@@ -19,6 +20,7 @@ JUNIT = '''<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
 <testcase classname="a" name="worse"><error message="it fell"/></testcase>
 <testcase classname="a" name="not_here"><skipped/></testcase></testsuite>'''
 # a grandchild in a session of its own, as roslaunch starts its nodes
+UNIQUE = '{:07d}'.format(os.getpid())  # whoever else runs these tests on this machine at the same time has another
 DETACHED = 'import subprocess, sys, time; subprocess.Popen(["sleep", "{}"], start_new_session=True); {}'
 
 
@@ -72,22 +74,22 @@ def test_a_command_that_hangs_is_ended_and_told(bench):
 
 
 def test_nothing_is_left_running_even_what_left_its_process_group(bench):
-    bench.run('detached', [sys.executable, '-c', DETACHED.format('61.25', 'pass')], 20.0)
-    assert not sleeping('61.25')
+    bench.run('detached', [sys.executable, '-c', DETACHED.format('61.' + UNIQUE, 'pass')], 20.0)
+    assert not sleeping('61.' + UNIQUE)
     assert 'left behind, and killed' in (bench.results / 'log/detached.log').read_text()
 
 
 def test_an_interrupt_ends_what_runs_and_starts_nothing_more(bench):
-    command = [sys.executable, '-c', DETACHED.format('62.25', 'time.sleep(60)')]
+    command = [sys.executable, '-c', DETACHED.format('62.' + UNIQUE, 'time.sleep(60)')]
     outcomes = []
     thread = threading.Thread(target=lambda: outcomes.append(bench.run('long', command, 60.0)))
     thread.start()
     deadline = time.monotonic() + 20.0
-    while not sleeping('62.25') and time.monotonic() < deadline:
+    while not sleeping('62.' + UNIQUE) and time.monotonic() < deadline:
         time.sleep(0.05)
     bench.runner.stop()
     thread.join(20.0)
-    assert not thread.is_alive() and not sleeping('62.25')
+    assert not thread.is_alive() and not sleeping('62.' + UNIQUE)
     assert outcomes[0].failed == 1
     assert 'interrupted' in bench.run('late', ['true'], 5.0).detail
 
