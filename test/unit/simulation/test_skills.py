@@ -105,6 +105,21 @@ def test_nothing_in_the_hand_is_felt(bench):
         bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
 
 
+def test_what_a_hand_held_in_another_trial_does_not_count(bench):
+    bench.pick(bench.map().map_id)
+    bench.world.reset(scene(TABLE, CAN._replace(position=(0.72, -0.1, 0.78)), CARTON))
+    made, before = bench.map(), bench.world.periods
+    with pytest.raises(SkillError, match='too wide for the gripper'):
+        bench.skills.pick(PickGoal('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+    fresh = bench.world.periods - before
+    bench.skills.held.clear()
+    bench.world.reset(bench.world.scene)
+    before = bench.world.periods
+    with pytest.raises(SkillError, match='too wide for the gripper'):
+        bench.skills.pick(PickGoal('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+    assert bench.world.periods - before == fresh  # as in a process that has run no trial before
+
+
 def test_without_a_map_pick_makes_its_own_of_what_the_camera_sees(bench):
     bench.robot.look_at((0.7, -0.1, 0.75))
     bench.pick('')

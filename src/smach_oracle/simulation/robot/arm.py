@@ -13,6 +13,7 @@ from .planner import BUDGET, PlanningError, plan, straight, timed
 FAST, SLOW = 0.45, 0.2  # of the joints' velocity limits
 FEEL_EFFORT = 40.0  # N with which the gripper closes
 LEAST_GAP = 0.012  # m between the tips, below which there is nothing in the hand
+WIDE_OPEN = 0.0025  # m that the gap may lack
 READY = {'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
          'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])}  # rad, a posture for work in front of the robot
 ENOUGH = 3  # solutions of the inverse kinematics that are tried for one pose
@@ -165,6 +166,12 @@ def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
     if missing:
         raise SkillError('no encoder reading of {}'.format(', '.join(missing)))
     return np.array([joints[name] for name in ARM_JOINTS[arm]])
+
+
+def stands_open(joints: Mapping[str, float], arm: str) -> bool:
+    """Whether a gripper is as wide open as it gets, by its encoders: nothing that it can hold is as wide."""
+    fingers = [joints.get('{}_gripper_{}_finger_joint'.format(arm[0], side), 0.0) for side in 'lr']
+    return sum(fingers) > GRIPPER_OPEN - WIDE_OPEN
 
 
 def lifted(pose: np.ndarray, height: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from smach_oracle.msg import (BuildCollisionMapGoal, BuildCollisionMapResult, Mo
 from ...geometry import chain
 from ...geometry.box import UprightBox
 from ...geometry.transforms import inverse, yaw_of
-from .arm import Means, SkillError, read_joints
+from .arm import Means, SkillError, read_joints, stands_open
 from .arms_aside import arms_aside, is_aside
 from .clusters import NotSeen
 from .collision_map import CollisionMap, MapBook, around, map_of, map_of_frame, nearest_object
@@ -114,9 +114,12 @@ class Manipulation:
             raise
 
     def _put_back(self, arm: str, boxes: Dict[str, MapBox]) -> None:
-        """An object that the hand still holds goes straight down again."""
+        """An object that the hand still holds goes straight down again; in a hand that stands open there is none.
+
+        What was held may have been taken from the hand since then, or have been in another trial's world.
+        """
         held = self.held.pop(arm, None)
-        if held is not None:
+        if held is not None and not stands_open(read_joints(self.means.robot), arm):
             put_back(self.means, arm, held, boxes)
 
     def _held_object(self, arm: str, grasp: np.ndarray, made: CollisionMap) -> Tuple[Held, Dict[str, MapBox]]:
