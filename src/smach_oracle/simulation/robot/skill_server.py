@@ -1,5 +1,6 @@
 """Skills as actions: one at a time, each failure an aborted action with its reason."""
 import threading
+import traceback
 from typing import Any, Callable, List, Tuple, Type
 
 import actionlib
@@ -71,10 +72,10 @@ class SkillServer:
                     server.set_aborted(result, result.reason)
                 return
             except Exception as err:  # a goal must not stay open, whatever went wrong
-                rospy.logerr('%s: %r', name, err)
+                rospy.logerr('%s: %s', name, traceback.format_exc())
                 result.reason = 'error in {}: {!r}'.format(name, err)
                 server.set_aborted(result, result.reason)
-                raise
+                return
             finally:
                 self._running = ''
             server.set_succeeded(server_result)
