@@ -129,6 +129,14 @@ def test_a_gripper_closes_opens_and_stalls(world):
     assert world.gap('left') == pytest.approx(0.09, abs=1e-3)
 
 
+def test_a_gripper_that_does_not_come_to_rest_ends_all_the_same(world, robot, monkeypatch):
+    gaps = iter([0.030, 0.031] * 1000)
+    monkeypatch.setattr(world, 'gap', lambda arm: next(gaps))
+    begun = world.time
+    state = robot.gripper('right', 0.0)
+    assert state.stalled and not state.reached and world.time - begun < 10.1
+
+
 @pytest.mark.parametrize('arguments, text', [
     (('middle', 0.0), "'middle'; allowed: left, right"), (('left', -0.01), 'allowed: 0 to 0.09 m'),
     (('left', math.nan), 'nan m'), (('left', 0.0, 0.0), '0.0 N')])

@@ -15,13 +15,14 @@ from .trajectory import GOAL_TOLERANCE, SETTLE_S, Result, Trajectory
 
 CLOSING_SPEED = 0.08  # m/s of the gap
 STALL_S = 0.25
+LONGEST_S = 10.0  # for what trembles between the fingers
 TORSO_SPEED = 0.013  # m/s, a PR2's
 HEAD_SPEED = 1.0  # rad/s, mean of a turn
 BASE_SPEED, BASE_TURN = 0.25, 0.4  # m/s, rad/s, means of a drive
 
 
 class Gripper:
-    """The two fingers of a hand to a gap; ends when they are there, or stall."""
+    """The two fingers of a hand to a gap; ends when they are there, or stall, or have not come to rest in LONGEST_S."""
 
     def __init__(self, arm: str, position: float, max_effort: float = 50.0) -> None:
         """Raises ValueError for an unknown arm, a gap (m) outside 0 to 0.09, an effort (N) outside 0 to 200."""
@@ -43,7 +44,8 @@ class Gripper:
         self._sent += min(max(self._goal - self._sent, -step), step)
         world.set_gripper(self._arm, min(max(self._sent, 0.0), GRIPPER_OPEN), self._effort)
         window = round(STALL_S / PERIOD)
-        if len(self._gaps) <= window or max(self._gaps[-window:]) - min(self._gaps[-window:]) > 3e-4:
+        trembling = len(self._gaps) <= window or max(self._gaps[-window:]) - min(self._gaps[-window:]) > 3e-4
+        if trembling and len(self._gaps) * PERIOD < LONGEST_S:
             return None
         reached = abs(gap - self._goal) < 2e-3
         if not reached and abs(self._sent - self._goal) > 1e-6:
