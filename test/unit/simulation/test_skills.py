@@ -165,6 +165,13 @@ def test_goals_that_cannot_be_are_refused_and_say_why(still, text, change):
     assert np.abs(np.array(list(still.robot.joints().values())) - np.array(list(before.values()))).max() < 0.01
 
 
+def test_a_map_has_its_id_from_all_that_is_in_it(still):
+    turned = BuildCollisionMapGoal(pose(0.85, 0.0, 0.72), [], [])
+    ids = [still.skills.build_collision_map(turned, say).map_id for _ in range(2)]
+    turned.table.pose.orientation = Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+    assert ids[0] == ids[1] != still.skills.build_collision_map(turned, say).map_id
+
+
 def test_other_goals_that_cannot_be(still):
     with pytest.raises(SkillError, match="unknown arm 'both'"):
         still.skills.move_arms_aside(MoveArmsAsideGoal(['both']), say)

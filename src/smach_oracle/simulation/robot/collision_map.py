@@ -1,6 +1,6 @@
 """Maps to plan in: boxes made of what was detected, or of what a frame shows anywhere; kept by name."""
 import collections
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class MapBook:
     def keep(self, made: CollisionMap) -> str:
         """Its id, which depends on its content alone."""
         name = 'map_{:08x}'.format(seed_of(*[part for key in sorted(made.boxes) for part in (
-            key, np.asarray(made.boxes[key].centre), np.asarray(made.boxes[key].half))]))
+            key, np.asarray(made.boxes[key].centre), np.asarray(made.boxes[key].half), made.boxes[key].yaw)]))
         self._maps.pop(name, None)
         self._maps[name] = made
         while len(self._maps) > KEPT:
@@ -119,8 +119,3 @@ def _columns(points: np.ndarray, least: int = 3) -> List[MapBox]:
 def _box(run: List[np.ndarray]) -> MapBox:
     lower, upper = run[0] * CELL, (run[-1] + 1) * CELL
     return MapBox((lower + upper) / 2, (upper - lower) / 2, 0.0)
-
-
-def boxes_with(made: CollisionMap, more: Mapping[str, MapBox]) -> Dict[str, MapBox]:
-    """The boxes of a map and further ones."""
-    return {**made.boxes, **more}
