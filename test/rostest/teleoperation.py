@@ -12,7 +12,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from teleoperation_fixtures import FakeArm, Person, result_of  # noqa: E402
+from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, result_of  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import CollisionBoxes  # noqa: E402
@@ -131,14 +131,18 @@ class Teleoperation(unittest.TestCase):
     def test_another_ones_refused_command_changes_nothing_for_who_drives(self):
         bob = Person(SERVER, 'bob')
         ROBOT.blocked = True
-        self.assertTrue(wait_for(lambda: self.ann.hold(0.1, linear=(0.0, 0.0, 0.2)) and max(ROBOT.leads) > 0.12))
-        seen = len(ROBOT.leads)
-        for _ in range(15):
-            self.ann.hold(0.03, linear=(0.0, 0.0, 0.2))
+
+        def refusals():
+            return [state for state in bob.states if state.refused == 'ann drives; one at a time']
+
+        def refused_while_she_pushes():
+            before = len(refusals())
             bob.send(linear=(0.0, 0.0, -0.2))
-        refused = [state for state in bob.states if state.refused == 'ann drives; one at a time']
-        self.assertTrue(refused and {state.sender for state in refused} == {'bob'})
-        self.assertGreater(np.median(ROBOT.leads[seen:]), 0.1, 'her targets did not begin anew')
+            return wait_for(lambda: len(refusals()) > before, 0.2) and ROBOT.leads[-1] > 0.1
+
+        with self.ann.pressing(linear=(0.0, 0.0, 0.2)):  # each time she began anew, the lead would begin at nothing
+            self.assertTrue(wait_for(refused_while_she_pushes, 30.0))
+        self.assertEqual({state.sender for state in refusals()}, {'bob'})
 
     def test_an_arm_that_could_not_follow_pushes_no_more_once_the_dead_man_is_let_go(self):
         ROBOT.blocked = True
@@ -177,6 +181,7 @@ class Teleoperation(unittest.TestCase):
             self.assertIn(says, self.ann.states[-1].refused)
             setattr(ROBOT, fault, False)
             self.assertTrue(wait_for(lambda: not self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused))
+        self.assertTrue(np.isfinite(ROBOT.leads).all(), 'the arm was never told what is no number')
 
     def test_a_hand_that_is_still_held_does_not_drive_the_next_goal(self):
         self.ann.send(linear=(0.0, 0.0, 0.05))
@@ -189,6 +194,16 @@ class Teleoperation(unittest.TestCase):
         self.ann.send(held=False)
         with self.ann.pressing(linear=(0.0, 0.0, 0.05)):
             self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
+
+    def test_a_goal_whose_asker_is_killed_ends_under_the_hand_that_drives(self):
+        self.sent.cancel()
+        self.assertTrue(wait_for(lambda: self.ann.states[-1].query_id == ''))
+        with asker_of_its_own(SERVER, 'q4') as asker:
+            self.assertTrue(self.ann.active('q4'))
+            with self.ann.pressing(linear=(0.0, 0.0, 0.01)):
+                self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
+                asker.kill()
+                self.assertTrue(wait_for(lambda: 'no goal is active' in self.ann.states[-1].refused, 20.0))
 
     def test_the_end_of_a_goal_is_told_to_who_comes_later(self):
         self.sent.cancel()

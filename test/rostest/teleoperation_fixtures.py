@@ -1,5 +1,8 @@
 """An arm that goes at once where it is told, and a person's front end, to test the manipulation interface."""
 import contextlib
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -121,7 +124,8 @@ class Person:
 
     def answer(self, seq):
         """The first state that tells of a command."""
-        return wait_for(lambda: next((state for state in list(self.states) if state.seq == seq), None))
+        return wait_for(lambda: next(
+            (state for state in list(self.states) if (state.sender, state.seq) == (self.operator, seq)), None))
 
     def hold(self, seconds, rate_hz=30.0, **command):
         """Send a command again and again; monotonic times of the first and the last."""
@@ -154,6 +158,17 @@ class Person:
         return np.array([at.x, at.y, at.z])
 
 
+@contextlib.contextmanager
+def asker_of_its_own(server, query_id):
+    """Another process that sends a goal and waits for its end; killed at the latest in the end."""
+    process = subprocess.Popen([sys.executable, os.path.abspath(__file__), server, query_id])
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
 def result_of(sent, limit_s=10.0):
     """The end of a goal: (status, result)."""
     event = wait_for(lambda: _ended(sent), limit_s)
@@ -163,3 +178,9 @@ def result_of(sent, limit_s=10.0):
 def _ended(sent):
     event = sent.poll()
     return event if event is not None and event.status else None
+
+
+if __name__ == '__main__':
+    rospy.init_node('asker', anonymous=True)
+    GOAL = Person(sys.argv[1]).start(query_id=sys.argv[2])
+    rospy.spin()

@@ -69,7 +69,7 @@ class Hand:
     def rest(self, period_s: float) -> None:
         """The person has let go: an arm that could not follow its targets stops pushing."""
         targets, self._targets = self._targets, None
-        if targets is not None:
+        if targets is not None and not self._unknown((), False):
             near = pulled_back(targets, self.measured(self._robot.listener.now()[0]), _REST_LEAD)
             if (near != targets).any():
                 self._port.send(near, np.zeros(len(near)), period_s)
