@@ -6,8 +6,8 @@ import { Lost } from './link.js';
 import { Marking } from './marking.js';
 
 const TOOLS = [['rectangle', '▭ Rectangle', 'Drag from corner to corner around the object'], ['free', '✎ Free region', 'Draw a line around the object'],
-  ['object', '＋ Object', 'Paint what belongs to it'], ['background', '− Background', 'Paint what does not belong to it']];
-const COLOURS = { region: '#fff', under: '#000a', mask: '#5b8cff66', edge: '#7fb0ff', object: '#3ddc84cc', background: '#ff5a52cc' };
+  ['object', '+ Object', 'Paint what belongs to it'], ['background', '− Background', 'Paint what does not belong to it']];
+const COLOURS = { region: '#2f6bff', under: '#ffffffd0', mask: '#5b8cff66', edge: '#7fb0ff', object: '#3ddc84cc', background: '#ff5a52cc' };
 const FULL = 1280; // px: the width asked for
 
 // `onEnd(outcome)`: the expert has accepted an object ('' where the expert gave up).
