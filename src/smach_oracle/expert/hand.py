@@ -90,7 +90,8 @@ class Hand:
         except ValueError as err:
             return 'frame {!r}: {}; allowed: {}, {} or another link of the robot'.format(
                 command.header.frame_id, err, self._names.tool, self._robot.base)
-        return self._unknown(needed, frozen) or self._port.why_not() or (self.gripper.why_not() if command.move_gripper else '')
+        return (self._unknown(needed, frozen) or self._port.why_not()
+                or (self.gripper.why_not() if command.move_gripper else ''))
 
     def _unknown(self, more: Sequence[str], frozen: bool) -> str:
         """Which joints of the arm, or of `more`, are not where joint_states last said they were; '' : none."""
