@@ -20,6 +20,9 @@ class FakeHandle:
     def get_result(self):
         return 'the result'
 
+    def get_goal_status_text(self):
+        return 'as told'
+
 
 def sent_and_seen(*states):
     sent = SentGoal(time.monotonic())
@@ -39,4 +42,4 @@ def test_a_goal_nobody_took_up_and_an_end_without_a_result_are_lost_in_time(stat
 
 def test_a_result_that_is_here_is_an_event():
     event = sent_and_seen(CommState.ACTIVE, CommState.WAITING_FOR_RESULT, CommState.DONE).poll(0.0)
-    assert (event.status, event.result) == (3, 'the result')
+    assert (event.status, event.result, event.text) == (3, 'the result', 'as told')
