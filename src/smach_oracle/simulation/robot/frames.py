@@ -8,10 +8,8 @@ from std_msgs.msg import Header
 from ...geometry.box import UprightBox
 from ...geometry.transforms import apply, from_quaternion, inverse, quaternion, transform, yaw_of
 from .arm import SkillError
-from .interface import BASE_FRAME, ODOM_FRAME, Robot
+from .interface import BASE_FRAME, BASE_LINK_HEIGHT, GOAL_FRAMES, ODOM_FRAME, Robot
 
-BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
-FRAMES = (BASE_FRAME, 'base_link', ODOM_FRAME)
 LARGEST = 1.0  # m, of an object
 FARTHEST = 100.0  # m, of any pose
 
@@ -29,7 +27,7 @@ def base_from(frame: str, robot: Robot, what: str) -> np.ndarray:
         return transform((0.0, 0.0, BASE_LINK_HEIGHT))
     if name == ODOM_FRAME:
         return inverse(robot.odom_from_base())
-    raise SkillError('{}: frame {!r}; allowed: {}'.format(what, frame, ', '.join(FRAMES)))
+    raise SkillError('{}: frame {!r}; allowed: {}'.format(what, frame, ', '.join(GOAL_FRAMES)))
 
 
 def pose_in_base(message: PoseStamped, robot: Robot, what: str) -> np.ndarray:

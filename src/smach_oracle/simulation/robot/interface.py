@@ -14,7 +14,9 @@ ARM_JOINTS: Dict[str, List[str]] = {
                                      '_wrist_roll_joint')] for arm in ARMS}
 TOOL_FRAME = {arm: arm[0] + '_gripper_tool_frame' for arm in ARMS}
 BASE_FRAME = 'base_footprint'  # on the floor below the middle of the base; the frame subsystems think in
+BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
 ODOM_FRAME = 'odom_combined'
+GOAL_FRAMES = (BASE_FRAME, 'base_link', ODOM_FRAME)  # in which goals may be given
 CAMERA_FRAME = 'wide_stereo_optical_frame'
 GRIPPER_OPEN = 0.09  # m between the finger tips
 

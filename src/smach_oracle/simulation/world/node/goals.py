@@ -9,11 +9,9 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from smach_oracle.geometry.transforms import apply, from_quaternion, inverse, transform
-from smach_oracle.simulation.robot.interface import BASE_FRAME, GRIPPER_OPEN, ODOM_FRAME
+from smach_oracle.simulation.robot.interface import BASE_LINK_HEIGHT, GOAL_FRAMES, GRIPPER_OPEN, ODOM_FRAME
 from smach_oracle.simulation.world.trajectory import Tolerances
 
-BASE_LINK_HEIGHT = 0.051  # m, of base_link above base_footprint
-FRAMES = (BASE_FRAME, 'base_link', ODOM_FRAME)
 LEAD_S = 1.0  # a trajectory that is to begin so much later begins at once
 LEVEL = 0.02  # rad that a goal of the base may be tilted
 MOST_EFFORT = 200.0  # N
@@ -157,8 +155,8 @@ def odom_from_pose(pose: PoseStamped, odom_from_base: np.ndarray) -> np.ndarray:
 def _base_from(header: Header, odom_from_base: np.ndarray) -> np.ndarray:
     """4x4, base_footprint from the header's frame."""
     frame = header.frame_id.lstrip('/')
-    if frame not in FRAMES:
-        raise BadGoal('unknown frame {!r}; allowed: {}'.format(header.frame_id, ', '.join(FRAMES)))
+    if frame not in GOAL_FRAMES:
+        raise BadGoal('unknown frame {!r}; allowed: {}'.format(header.frame_id, ', '.join(GOAL_FRAMES)))
     if frame == ODOM_FRAME:
         return inverse(odom_from_base)
     return transform((0.0, 0.0, BASE_LINK_HEIGHT if frame == 'base_link' else 0.0))
