@@ -1,0 +1,181 @@
+"""The node `joy_teleoperation`: a joystick (sensor_msgs/Joy: SpaceNav, gamepad) drives a manipulation interface."""
+import math
+import threading
+import time
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Header
+
+from smach_oracle.msg import TeleopCommand, TeleopState
+
+from ..oracle.errors import ConfigError
+from ..ros.command_line import parameters_only
+from ..ros.master_watch import start_master_watch
+
+AXES = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
+_MOST_INDEX = 63
+
+
+class JoySettings(NamedTuple):
+    """See launch/joy_teleoperation.yaml."""
+
+    axes: Dict[str, Tuple[int, float]]  # by name: index in Joy.axes, and m/s or rad/s at full deflection
+    dead_man: int  # index in Joy.buttons
+    open: int  # -1: none
+    close: int
+    gripper_open: float  # m
+    dead_zone: float
+    silent_s: float  # without a message of the joystick for so long, its dead-man counts as let go
+    rate_hz: float
+    frame: str
+    arm: str  # '': the one that the interface has chosen for the state
+    operator: str
+
+    @classmethod
+    def from_dict(cls, given: Mapping[str, Any]) -> 'JoySettings':
+        """Check parameters.
+
+        :raises ConfigError: naming the parameter, its value and what is allowed.
+        """
+        axes = given.get('axes')
+        if not isinstance(axes, Mapping) or not axes:
+            raise ConfigError('~axes', axes, 'a mapping of {} to [index, speed]'.format(', '.join(AXES)))
+        buttons = given.get('buttons', {})
+        if not isinstance(buttons, Mapping) or 'dead_man' not in buttons:
+            raise ConfigError('~buttons', buttons, 'a mapping with dead_man, and open and close where there are such')
+        return cls({name: _axis(name, value) for name, value in axes.items()},
+                   _index('~buttons/dead_man', buttons['dead_man'], 0), _index('~buttons/open', buttons.get('open', -1), -1),
+                   _index('~buttons/close', buttons.get('close', -1), -1),
+                   _number('~gripper_open', given.get('gripper_open', 0.08), 0.0, 1.0),
+                   _number('~dead_zone', given.get('dead_zone', 0.05), 0.0, 0.9),
+                   _number('~silent_s', given.get('silent_s', 0.3), 0.02, 2.0),
+                   _number('~rate_hz', given.get('rate_hz', 50.0), 30.0, 200.0), _text('~frame', given.get('frame')),
+                   _text('~arm', given.get('arm', '')), _text('~operator', given.get('operator', 'joystick')))
+
+
+class Wish(NamedTuple):
+    """What the joystick wants."""
+
+    held: bool
+    linear: Tuple[float, float, float]
+    angular: Tuple[float, float, float]
+    gripper: Optional[float]  # m
+
+
+STILL = Wish(False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), None)
+
+
+def wish_of(settings: JoySettings, axes: Sequence[float], buttons: Sequence[int]) -> Wish:
+    """What a joystick's message means; what it lacks, or what is not finite, moves nothing."""
+    if not _pressed(buttons, settings.dead_man):
+        return STILL
+    speeds = []
+    for name in AXES:
+        index, most = settings.axes.get(name, (-1, 0.0))
+        value = axes[index] if 0 <= index < len(axes) else 0.0
+        if not math.isfinite(value):
+            return STILL
+        speeds.append(0.0 if abs(value) <= settings.dead_zone else max(-1.0, min(1.0, value)) * most)
+    gripper = None
+    if _pressed(buttons, settings.open) != _pressed(buttons, settings.close):
+        gripper = settings.gripper_open if _pressed(buttons, settings.open) else 0.0
+    return Wish(True, (speeds[0], speeds[1], speeds[2]), (speeds[3], speeds[4], speeds[5]), gripper)
+
+
+class JoyTeleoperation:
+    """Sends commands while the dead-man button is held, and one that stops when it is let go."""
+
+    def __init__(self, settings: JoySettings) -> None:
+        self._settings = settings
+        self._wish, self._came_s = STILL, -math.inf
+        self._arm = settings.arm
+        self._seq = 0
+        self._gripper: Optional[float] = None
+        self._lock = threading.Lock()
+        self._publisher = rospy.Publisher('command', TeleopCommand, queue_size=2, tcp_nodelay=True)
+        self._subscribers = [rospy.Subscriber('state', TeleopState, self._on_state, queue_size=2),
+                             rospy.Subscriber('joy', Joy, self._on_joy, queue_size=1, tcp_nodelay=True)]
+
+    def run(self) -> None:
+        """Until the node goes down; in wall time, as a joystick is."""
+        was_held = False
+        while not rospy.is_shutdown():
+            with self._lock:
+                fresh = time.monotonic() - self._came_s <= self._settings.silent_s
+                wish = self._wish if fresh else STILL
+            if wish.held or was_held:
+                self._send(wish)
+            was_held = wish.held
+            time.sleep(1.0 / self._settings.rate_hz)
+
+    def _send(self, wish: Wish) -> None:
+        self._seq += 1
+        moves_gripper = wish.gripper is not None and wish.gripper != self._gripper  # once for each press
+        self._gripper = wish.gripper
+        self._publisher.publish(TeleopCommand(
+            header=Header(frame_id=self._settings.frame, stamp=rospy.Time.now()), operator=self._settings.operator,
+            seq=self._seq, arm=self._arm, dead_man=wish.held,
+            twist=Twist(Vector3(*wish.linear), Vector3(*wish.angular)), move_gripper=moves_gripper,
+            gripper=wish.gripper or 0.0))
+
+    def _on_joy(self, message: Joy) -> None:
+        wish = wish_of(self._settings, message.axes, message.buttons)
+        with self._lock:
+            self._wish, self._came_s = wish, time.monotonic()
+
+    def _on_state(self, state: TeleopState) -> None:
+        if not self._settings.arm:
+            self._arm = state.arm
+
+
+def _pressed(buttons: Sequence[int], index: int) -> bool:
+    return 0 <= index < len(buttons) and buttons[index] == 1
+
+
+def _axis(name: str, value: Any) -> Tuple[int, float]:
+    key = '~axes/{}'.format(name)
+    if name not in AXES:
+        raise ConfigError(key, value, 'the keys ' + ', '.join(AXES))
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise ConfigError(key, value, '[index, speed at full deflection in m/s or rad/s]')
+    return _index(key, value[0], 0), _number(key, value[1], -5.0, 5.0)
+
+
+def _index(key: str, value: Any, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= _MOST_INDEX:
+        raise ConfigError(key, value, 'an index from {} to {}'.format(least, _MOST_INDEX))
+    return value
+
+
+def _number(key: str, value: Any, least: float, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise ConfigError(key, value, 'a number from {:g} to {:g}'.format(least, most))
+    return float(value)
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise ConfigError(key, value, 'text')
+    return value
+
+
+def _parameters() -> Dict[str, Any]:
+    names: List[str] = ['axes', 'buttons', 'gripper_open', 'dead_zone', 'silent_s', 'rate_hz', 'frame', 'arm', 'operator']
+    return {name: rospy.get_param('~' + name) for name in names if rospy.has_param('~' + name)}
+
+
+def main() -> None:
+    """Entry point of the node."""
+    parameters_only('Node: a joystick (topic joy) drives a manipulation interface (topics command and state). '
+                    'Parameters: ~axes, ~buttons, ~frame and more; see launch/joy_teleoperation.yaml.')
+    rospy.init_node('joy_teleoperation')
+    start_master_watch()
+    try:
+        settings = JoySettings.from_dict(_parameters())
+    except ConfigError as err:
+        rospy.logfatal('joy_teleoperation: %s', err)
+        raise SystemExit(2) from err
+    JoyTeleoperation(settings).run()

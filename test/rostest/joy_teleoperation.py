@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""A joystick drives the manipulation interface: held it moves, let go or silent it stands."""
+import os
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from sensor_msgs.msg import Joy
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from teleoperation_fixtures import FakeArm, Person  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+STOPS_WITHIN_S = 0.1
+SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it
+
+
+class JoyTeleoperation(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.arm = FakeArm()
+        cls.ann = Person('manipulation_interface')
+        cls.sent = cls.ann.start()
+        assert cls.ann.active()
+        cls.joy = rospy.Publisher('spacenav/joy', Joy, queue_size=1, tcp_nodelay=True)
+        assert wait_for(cls.joy.get_num_connections)
+
+    def push(self, axes, buttons):
+        self.joy.publish(Joy(axes=axes, buttons=buttons))
+
+    def push_until_it_moves(self, axes, buttons):
+        begun_s = time.monotonic()
+        while self.arm.moved_s < begun_s + 0.3 and time.monotonic() < begun_s + 15.0:
+            self.push(axes, buttons)
+            time.sleep(0.02)
+        self.assertGreater(self.arm.moved_s, begun_s + 0.3)
+
+    def stopped_after(self):
+        """Seconds from now until the arm moved last."""
+        now_s = time.monotonic()
+        time.sleep(1.0)  # as long as nothing may move
+        return self.arm.moved_s - now_s
+
+    def test_it_moves_while_the_button_is_held_and_stops_when_it_is_let_go(self):
+        before = self.ann.tool()
+        self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
+        self.push([0, 0, 1, 0, 0, 0], [0, 0])
+        self.assertLess(self.stopped_after(), STOPS_WITHIN_S)
+        way = self.ann.tool() - before
+        self.assertGreater(way[2], 0.02)
+        self.assertLess(abs(way[0]) + abs(way[1]), 0.1 * way[2])
+        self.assertEqual(self.ann.states[-1].operator, '')
+
+    def test_a_joystick_that_falls_silent_has_let_go(self):
+        self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])
+        self.assertLess(self.stopped_after(), SILENCE_S + STOPS_WITHIN_S)
+
+    def test_without_the_button_nothing_moves(self):
+        before_s = self.arm.moved_s
+        for _ in range(20):
+            self.push([1, 1, 1, 1, 1, 1], [0, 1])
+            time.sleep(0.02)
+        self.assertEqual(self.arm.moved_s, before_s)
+
+    def test_the_gripper_closes(self):
+        self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
+        begun_s = time.monotonic()
+        while not self.ann.states[-1].gripper_stalled and time.monotonic() < begun_s + 15.0:
+            self.push([0, 0, 0, 0, 0, 0], [1, 1])
+            time.sleep(0.02)
+        self.assertTrue(self.ann.states[-1].gripper_stalled)
+
+
+if __name__ == '__main__':
+    rospy.init_node('joy_teleoperation_test')
+    rostest.rosrun('smach_oracle', 'joy_teleoperation', JoyTeleoperation)

@@ -1,0 +1,57 @@
+"""A joystick's messages: what they move, what they do not, and settings that are refused."""
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+
+from smach_oracle.expert.joy_teleoperation import STILL, JoySettings, Wish, wish_of
+from smach_oracle.oracle.errors import ConfigError
+
+GIVEN = {'axes': {'x': [1, 0.2], 'y': [0, -0.2], 'yaw': [3, 0.5]}, 'buttons': {'dead_man': 5, 'open': 1, 'close': 0},
+         'frame': 'base_footprint'}
+HELD = [0, 0, 0, 0, 0, 1]
+
+
+def test_axes_move_only_while_the_dead_man_button_is_held():
+    settings = JoySettings.from_dict(GIVEN)
+    assert wish_of(settings, [1.0, 0.5, 0.0, -1.0], HELD) == Wish(True, (0.1, -0.2, 0.0), (0.0, 0.0, -0.5), None)
+    assert wish_of(settings, [1.0, 0.5, 0.0, -1.0], [1, 1, 1, 1, 1, 0]) == STILL
+    assert wish_of(settings, [1.0, 0.5, 0.0, -1.0], [1]) == STILL, 'a joystick without that button'
+
+
+def test_a_stick_at_rest_or_beyond_its_range():
+    settings = JoySettings.from_dict(GIVEN)
+    assert wish_of(settings, [0.04, -0.05, 0, 0], HELD).linear == (0.0, 0.0, 0.0)
+    assert wish_of(settings, [0, 350.0, 0, 0], HELD).linear == (0.2, 0.0, 0.0)
+    assert wish_of(settings, [], HELD) == Wish(True, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), None)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf])
+def test_what_is_not_finite_stops(value):
+    assert wish_of(JoySettings.from_dict(GIVEN), [value, 1.0, 0, 0], HELD) == STILL
+
+
+def test_the_gripper():
+    settings = JoySettings.from_dict(dict(GIVEN, gripper_open=0.07))
+    assert wish_of(settings, [], [1, 0, 0, 0, 0, 1]).gripper == 0.0
+    assert wish_of(settings, [], [0, 1, 0, 0, 0, 1]).gripper == 0.07
+    assert wish_of(settings, [], [1, 1, 0, 0, 0, 1]).gripper is None
+
+
+@pytest.mark.parametrize('key, changes', [
+    ('~axes', {'axes': {}}), ('~axes/up', {'axes': {'up': [0, 1]}}), ('~axes/x', {'axes': {'x': 0}}),
+    ('~axes/x', {'axes': {'x': [-1, 0.1]}}), ('~axes/x', {'axes': {'x': [0, 50.0]}}), ('~buttons', {'buttons': {}}),
+    ('~buttons/dead_man', {'buttons': {'dead_man': -1}}), ('~buttons/open', {'buttons': {'dead_man': 0, 'open': 'A'}}),
+    ('~dead_zone', {'dead_zone': 1.0}), ('~rate_hz', {'rate_hz': 10}), ('~silent_s', {'silent_s': True}),
+    ('~frame', {'frame': None})])
+def test_settings_that_are_refused_are_named(key, changes):
+    with pytest.raises(ConfigError) as error:
+        JoySettings.from_dict(dict(GIVEN, **changes))
+    assert error.value.key == key
+
+
+def test_the_settings_that_come_along_are_right():
+    path = Path(__file__).resolve().parents[3] / 'launch' / 'joy_teleoperation.yaml'
+    settings = JoySettings.from_dict(yaml.safe_load(path.read_text()))
+    assert settings.dead_man == 0 and len(settings.axes) == 6
