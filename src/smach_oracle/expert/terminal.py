@@ -21,9 +21,11 @@ from ..ros.userdata_codec import encode
 from . import render
 from .followed_server import Listed, ServerGoneError
 from .front_end import FrontEnd, wait_for_question
+from .interface_talk import InterfaceTalk
 from .next_steps import NextSteps
 from .options import Option, choose, options
 from .prompts import Choice, Interrupted, JsonValidator, Prompts
+from .running_interface import RunningInterface
 from .text import clean, duration
 
 _COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'), ('t', 'take it over from who holds it'),
@@ -44,8 +46,10 @@ class Terminal:
     """A conversation with one expert; claims are given back however it ends."""
 
     def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
-                 next_steps: Callable[[str, str], NextSteps] = NextSteps) -> None:
+                 next_steps: Callable[[str, str], NextSteps] = NextSteps,
+                 interface: Callable[[Listed, str], RunningInterface] = RunningInterface) -> None:
         self._next_steps = next_steps
+        self._interface = interface
         self._front_end = front_end
         self._console = console
         self._prompts = prompts
@@ -182,6 +186,22 @@ class Terminal:
         return decision
 
     def _send(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+        if decision.kind == ExpertDecision.INTERFACE:
+            return self._send_interface(listed, decision, steps)
+        return self._settle(listed, decision, steps)
+
+    def _send_interface(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+        interface = self._interface(listed, decision.interface)
+        try:
+            settled = self._settle(listed, decision, steps)
+            if settled:
+                InterfaceTalk(interface, self._prompts, self._say, self._front_end.find).run(listed)
+                self._tell_next(listed, steps)
+            return settled
+        finally:
+            interface.stop()
+
+    def _settle(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
         steps.forget()
         response = self._front_end.answer(listed, decision)
         if not response.ok:

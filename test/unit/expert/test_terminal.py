@@ -17,6 +17,7 @@ from smach_oracle.expert.followed_server import Listed, ServerGoneError
 from smach_oracle.expert.prompts import Interrupted, JsonValidator, Prompts, ValidationError
 from smach_oracle.expert.terminal import Terminal
 from smach_oracle.msg import ExpertDecision, OpenQuery, OracleEvent
+from smach_oracle.oracle.question import InterfaceOffer
 from smach_oracle.ros.question_messages import to_goal
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
 
@@ -275,3 +276,84 @@ def test_json_and_nothing_are_taken(text):
 def test_what_is_not_json_is_told_while_typing(text):
     with pytest.raises(ValidationError, match='not JSON'):
         JsonValidator().validate(FakeDocument(text))
+
+
+class FakeInterface:
+    """An interface that runs until it is finished or given up."""
+
+    def __init__(self, front_end):
+        self.front_end = front_end
+        self.done = []
+
+    def __call__(self, listed, name):
+        self.front_end.running, self.name = listed, name
+        return self
+
+    def end(self, *what):
+        self.done.append(what)
+        self.front_end.running = None
+        return ''
+
+    def finish(self, outcome, text):
+        return 'the gripper is empty' if text == 'too early' else self.end('finish', outcome, text)
+
+    def give_up(self, text):
+        return self.end('give up', text)
+
+    def lines(self):
+        return ['started', 'Now do the work of PICK']
+
+    def state_line(self):
+        return 'right hand stands'
+
+    def look(self):
+        pass
+
+    def stop(self):
+        self.done.append('stopped')
+
+
+class WithAnInterface(FakeFrontEnd):
+    """Its question's interface runs once it was chosen."""
+
+    running = None
+
+    def find(self, key):
+        if self.running is not None and key in self.settled:
+            return self.running._replace(status=OpenQuery.INTERFACE_RUNNING)
+        return super().find(key)
+
+
+def talk(typed, meanwhile=None):
+    front_end = WithAnInterface(goal(interfaces=(InterfaceOffer('assist', '/assist'),)))
+    interface = FakeInterface(front_end)
+    console = Console(file=io.StringIO(), width=100)
+    with create_pipe_input() as keys:
+        keys.send_text(ENTER.join(typed))
+        if meanwhile is not None:
+            threading.Timer(1.5, meanwhile, [front_end, keys]).start()
+        Terminal(front_end, console, Prompts(keys, DummyOutput()), FakeSteps, interface).run()
+    return front_end, interface, console.file.getvalue()
+
+
+def test_an_interface_is_chosen_its_output_shown_and_it_is_finished():
+    front_end, interface, shown = talk(['i1', '', 'o', 'f9', 'f1', 'too early', 'f1', 'in the hand', 'q', ''])
+    assert front_end.decisions[0].interface == interface.name == 'assist'
+    assert interface.done == [('finish', 'succeeded', 'in the hand'), 'stopped']
+    for part in ('| Now do the work of PICK', "'f9' is none of f1", 'Refused: the gripper is empty',
+                 'The interface has ended.', 'DETECT runs.'):
+        assert part in shown
+
+
+def test_an_interface_is_given_up():
+    _, interface, _ = talk(['i1', '', 'g', 'out of reach', 'q', ''])
+    assert interface.done == [('give up', 'out of reach'), 'stopped']
+
+
+def test_an_interface_that_ends_by_itself_ends_the_conversation_with_what_it_said_last():
+    def end(front_end, keys):
+        front_end.running = None
+        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
+    _, interface, shown = talk(['i1', '', ''], end)
+    assert interface.done == ['stopped']
+    assert 'Now do the work of PICK' in shown and 'The interface has ended.' in shown

@@ -1,0 +1,82 @@
+"""An interface that runs for a question, as far as text goes: what it prints, how it stands, its end."""
+import math
+import threading
+from typing import List, Optional
+
+import rosgraph
+import rosgraph.names
+import rospy
+
+from smach_oracle.msg import InterfaceOutput, TeleopState
+from smach_oracle.srv import FinishInterface, FinishInterfaceRequest, GiveUpInterface, GiveUpInterfaceRequest
+
+from .followed_server import Listed, call_service
+from .text import clean
+
+
+class RunningInterface:
+    """Listens from before it is started, so that nothing it prints is missed."""
+
+    def __init__(self, listed: Listed, name: str) -> None:
+        """`name`: under which the interface is offered for the question."""
+        goal = listed.goal
+        offer = next(each for each in goal.interfaces if each.name == name)
+        self._query_id = goal.query_id
+        self._action = rosgraph.names.resolve_name(offer.action, goal.robot)
+        self._lock = threading.Lock()
+        self._output: Optional[InterfaceOutput] = None
+        self._state: Optional[TeleopState] = None
+        self._state_subscriber: Optional[rospy.Subscriber] = None
+        self._subscriber = rospy.Subscriber(goal.robot + '/interface_output', InterfaceOutput, self._take, queue_size=5)
+
+    def finish(self, outcome: str, text: str) -> str:
+        """Supersede the state with an outcome; why not, or ''. Raises ServerGoneError."""
+        answer = call_service(self._action + '/finish', FinishInterface,
+                              FinishInterfaceRequest(outcome=outcome, text=text))
+        return '' if answer.ok else str(answer.message)
+
+    def give_up(self, text: str) -> str:
+        """End it without a result; why not, or ''. Raises ServerGoneError."""
+        answer = call_service(self._action + '/give_up', GiveUpInterface, GiveUpInterfaceRequest(text))
+        return '' if answer.ok else str(answer.message)
+
+    def lines(self) -> List[str]:
+        """The last lines that it has printed, and what became of its start."""
+        with self._lock:
+            return [] if self._output is None else [self._output.text] + list(self._output.lines)
+
+    def state_line(self) -> str:
+        """How it stands, in one line: the hand that it moves, else the last thing that it has printed."""
+        state = self._state
+        if state is not None:
+            told = state.limit or ('moves' if state.moving else 'stands')
+            near = '' if math.isinf(state.clearance) else ', {:.0f} cm clear'.format(100 * state.clearance)
+            return '{} hand {}{}{}'.format(clean(state.arm), clean(told), near,
+                                           ', driven by ' + clean(state.operator) if state.operator else '')
+        lines = [line for line in self.lines() if line.strip()]
+        return clean(lines[-1]) if lines else ''
+
+    def look(self) -> None:
+        """Follow the state of a hand, as soon as there is one; asks the master."""
+        if self._state_subscriber is not None:
+            return
+        try:
+            types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
+        except (OSError, rosgraph.MasterException):
+            return
+        if types.get(self._action + '/state') == TeleopState._type:
+            self._state_subscriber = rospy.Subscriber(self._action + '/state', TeleopState, self._on_state, queue_size=2)
+
+    def stop(self) -> None:
+        """Listen no longer."""
+        self._subscriber.unregister()
+        if self._state_subscriber is not None:
+            self._state_subscriber.unregister()
+
+    def _take(self, output: InterfaceOutput) -> None:
+        if output.query_id == self._query_id:
+            with self._lock:
+                self._output = output
+
+    def _on_state(self, state: TeleopState) -> None:
+        self._state = state
