@@ -80,8 +80,8 @@ export class JointsView {
     const series = this.chosen.map((name) => this.samples.filter((sample) => sample.known.has(name)).map((sample) => [sample.time, sample.known.get(name)[this.quantity]]).filter(([, value]) => value !== null));
     const values = series.flat().map(([, value]) => value);
     const low = values.length ? Math.min(...values) : 0;
-    const high = Math.max(low + 1e-3, ...values);
-    const [bottom, top] = [low - 0.08 * (high - low), high + 0.08 * (high - low)];
+    const high = Math.max(low + 0.01, ...values);
+    const [bottom, top] = [low - 0.08 * (high - low), high + 0.2 * (high - low)];
     context.font = '11px ' + style.fontFamily;
     context.fillStyle = style.color;
     context.strokeStyle = style.borderBottomColor;

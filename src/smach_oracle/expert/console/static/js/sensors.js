@@ -41,7 +41,7 @@ class Sensors {
 
   group(kind, found) {
     return found.length > 0 && h('div', { class: 'group' }, h('span', { class: 'robot' }, TITLES[kind]), found.map((sensor) =>
-      h('button', { class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': this.wanted.includes(nameOf(sensor)), onclick: () => this.toggle(sensor) },
+      h('button', { class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': String(this.wanted.includes(nameOf(sensor))), onclick: () => this.toggle(sensor) },
         sensor.topic.replace(/^\//, ''))));
   }
 
