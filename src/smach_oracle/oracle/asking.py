@@ -106,13 +106,17 @@ class Inquiry:
             self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(), target=_named(answer),
                        by=answer.by, text=answer.why)
             if answer.kind is AnswerKind.INTERFACE:
-                return self._run_interface(answer, question)
+                return self._try_interface(answer, question)
             return self._obey(answer)
-        except InterfaceError as err:
-            self._ledger.warn('interface {}: {}'.format(answer.interface, err), self._recovery.label)
-            return None
         except AnswerError as err:
             self._ledger.warn('an answer does not fit: {}'.format(err), self._recovery.label)
+            return None
+
+    def _try_interface(self, answer: Answer, question: Question) -> Optional[Verdict]:
+        try:
+            return self._run_interface(answer, question)
+        except InterfaceError as err:
+            self._ledger.warn('interface {}: {}'.format(answer.interface, err), self._recovery.label)
             return None
 
     def _guarded(self, call: Callable[[], Optional[Answer]]) -> Optional[Answer]:

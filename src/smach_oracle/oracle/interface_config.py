@@ -4,7 +4,7 @@ from typing import Any, List, Mapping, Optional, Tuple
 
 from . import config_values as values
 from .errors import ConfigError
-from .question import InterfaceOffer, InterfaceStart
+from .question import START_LIMIT_S, InterfaceOffer, InterfaceStart
 
 _KEYS = ('action', 'args', 'description', 'launch', 'node', 'start_limit_s', 'states')
 _NAME = r'[A-Za-z0-9_.+-]+'
@@ -51,14 +51,15 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
         raise ConfigError(prefix + kind, entry[kind], allowed)
     args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
     return InterfaceStart(kind, found.group(1), found.group(2), tuple(args),
-                          _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', InterfaceStart.LIMIT_S)))
+                          _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', START_LIMIT_S)))
 
 
 def _launch_args(key: str, given: Any) -> List[str]:
     args = []
     for name, value in values.mapping(key, given).items():
         if not _ARGUMENT.fullmatch(name) or not isinstance(value, (str, int, float)):
-            raise ConfigError('{}.{}'.format(key, name), value, 'the name of a launch argument, and text, a number or true or false')
+            raise ConfigError('{}.{}'.format(key, name), value,
+                              'the name of a launch argument, and text, a number or true or false')
         args.append('{}:={}'.format(name, str(value).lower() if isinstance(value, bool) else value))
     return args
 

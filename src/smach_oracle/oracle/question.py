@@ -51,16 +51,17 @@ class OutcomeChoice(NamedTuple):
     target: str
 
 
+START_LIMIT_S = 60.0
+
+
 class InterfaceStart(NamedTuple):
     """How an interface that is not there is started; who can do that is not this room's business."""
-
-    LIMIT_S = 60.0
 
     kind: str  # 'launch' or 'node'
     package: str
     target: str  # file name or node type
     args: Tuple[str, ...] = ()
-    limit_s: float = LIMIT_S  # how long its action server may take to come
+    limit_s: float = START_LIMIT_S  # how long its action server may take to come
 
 
 class InterfaceOffer(NamedTuple):

@@ -7,7 +7,7 @@ import smach
 from machines import (FakeExpert, Scripted, Watched, chain_of, give_up, goto, in_thread, interface, supersede, waits,
                       watched)
 
-from smach_oracle.oracle.errors import AnswerError
+from smach_oracle.oracle.errors import AnswerError, InterfaceError
 from smach_oracle.oracle.events import EventKind
 
 
@@ -96,7 +96,8 @@ def test_preconditions_that_ran_before_are_told():
 
 @pytest.mark.parametrize('wrong', [goto('NOWHERE'), goto('ORACLE'), goto(''), supersede('nonsense'),
                                    give_up('nonsense'), interface('none'),
-                                   supersede('ok', outputs={'k': 1}), AnswerError('cannot decode')])
+                                   supersede('ok', outputs={'k': 1}), AnswerError('cannot decode'),
+                                   InterfaceError('gone before it was chosen')])
 def test_an_answer_that_does_not_fit_is_warned_of_and_asked_again_under_a_new_id(wrong):
     machine, expert = asking(wrong, goto('C'))
     assert machine.run() == 'done'
