@@ -47,7 +47,8 @@ class JoySettings(NamedTuple):
         if not isinstance(buttons, Mapping) or 'dead_man' not in buttons:
             raise ConfigError('~buttons', buttons, 'a mapping with dead_man, and open and close where there are such')
         return cls({name: _axis(name, value) for name, value in axes.items()},
-                   _index('~buttons/dead_man', buttons['dead_man'], 0), _index('~buttons/open', buttons.get('open', -1), -1),
+                   _index('~buttons/dead_man', buttons['dead_man'], 0),
+                   _index('~buttons/open', buttons.get('open', -1), -1),
                    _index('~buttons/close', buttons.get('close', -1), -1),
                    _number('~gripper_open', given.get('gripper_open', 0.08), 0.0, 1.0),
                    _number('~dead_zone', given.get('dead_zone', 0.05), 0.0, 0.9),
@@ -163,7 +164,8 @@ def _text(key: str, value: Any) -> str:
 
 
 def _parameters() -> Dict[str, Any]:
-    names: List[str] = ['axes', 'buttons', 'gripper_open', 'dead_zone', 'silent_s', 'rate_hz', 'frame', 'arm', 'operator']
+    names: List[str] = ['axes', 'buttons', 'gripper_open', 'dead_zone', 'silent_s', 'rate_hz', 'frame', 'arm',
+                        'operator']
     return {name: rospy.get_param('~' + name) for name in names if rospy.has_param('~' + name)}
 
 

@@ -65,7 +65,8 @@ class RunningInterface:
         except (OSError, rosgraph.MasterException):
             return
         if types.get(self._action + '/state') == TeleopState._type:
-            self._state_subscriber = rospy.Subscriber(self._action + '/state', TeleopState, self._on_state, queue_size=2)
+            self._state_subscriber = rospy.Subscriber(self._action + '/state', TeleopState, self._on_state,
+                                                      queue_size=2)
 
     def stop(self) -> None:
         """Listen no longer."""

@@ -70,7 +70,8 @@ class StartedInterface:
         environment = dict(os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/', PYTHONUNBUFFERED='1')
         try:
             self._process = subprocess.Popen(
-                [sys.executable, '-I', str(_KEEPER), str(INTERRUPT_S), str(TERMINATE_S), *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                [sys.executable, '-I', str(_KEEPER), str(INTERRUPT_S), str(TERMINATE_S), *command],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT, env=environment, start_new_session=True)
         except OSError as err:
             raise InterfaceError('it cannot be started: {}'.format(err)) from err

@@ -1,7 +1,7 @@
 """Keeps one command and everything that it starts; ends all of it when its standard input closes.
 
-Run as a program, by its path and in isolation (`python3 -I`); standard library only. Arguments: the limits after SIGINT and
-after SIGTERM (s), then the command.
+Run as a program, by its path and in isolation (`python3 -I`); standard library only. Arguments: the limits after SIGINT
+and after SIGTERM (s), then the command.
 Whoever started it holds the other end of the pipe: if that process dies, in whatever way, the pipe closes as well. All
 descendants stay its own, also those that begin a session of their own, because it is their subreaper.
 """
@@ -72,7 +72,7 @@ def _gone_within(limit_s: float) -> bool:
 
 
 def end_all(main_pid: int, interrupt_s: float, terminate_s: float) -> None:
-    """End everything: SIGINT to the command, which ends its own children in order; SIGTERM to all that is left; SIGKILL."""
+    """End everything: SIGINT to the command, which ends its children in order; SIGTERM to all that is left; SIGKILL."""
     left = descendants(os.getpid())
     _send([main_pid] if main_pid in left else left, signal.SIGINT)
     if _gone_within(interrupt_s):

@@ -1,4 +1,4 @@
-"""Driving through the console: what is said is checked, what is late stops the hand, one page at a time has the wheel."""
+"""Driving through the console: what is said is checked, what is late stops the hand, one page has the wheel."""
 import asyncio
 import json
 

@@ -52,7 +52,8 @@ class Hand:
     def frames(self) -> Dict[str, str]:
         """The links by which a page may name a frame; those that are not known are left out."""
         tool = self._tools.get(self.state.arm, '') if self.state is not None else ''
-        return {name: frame for name, frame in (('tool', tool), ('base', self._base), ('camera', self._camera)) if frame}
+        frames = {'tool': tool, 'base': self._base, 'camera': self._camera}
+        return {name: frame for name, frame in frames.items() if frame}
 
     def send(self, operator: str, said: Dict[str, Any], held: bool) -> None:
         """One command, along the axes of the frame named."""
