@@ -23,10 +23,13 @@ def from_rpy(position: Sequence[float], roll: float = 0.0, pitch: float = 0.0, y
 def from_quaternion(position: Sequence[float], xyzw: Sequence[float]) -> np.ndarray:
     """4x4 of a position (m) and a quaternion (x, y, z, w), which need not have unit length.
 
-    :raises ValueError: for a quaternion of zero length or one that is not finite.
+    :raises ValueError: for a quaternion of a length that is (next to) zero or beyond all measure, or one that is not
+        finite.
     """
     if not np.isfinite(xyzw).all() or not np.isfinite(position).all():
         raise ValueError('pose is not finite: position {}, quaternion {}'.format(list(position), list(xyzw)))
+    if not 1e-6 <= np.abs(xyzw).max() <= 1e6:
+        raise ValueError('quaternion {} is no rotation; allowed: a length of about 1'.format(list(xyzw)))
     return transform(position, Rotation.from_quat(xyzw).as_matrix())
 
 

@@ -136,7 +136,8 @@ def test_a_head_that_is_told_looks_there(bench):
 BAD = [
     ('an unknown arm', "unknown arm 'third'; allowed: left, right", dict(arm='third')),
     ('NaN', 'object: .*not finite', dict(object=pose(math.nan, 0.0, 0.8))),
-    ('a quaternion of no length', 'object: ', dict(object=pose(0.6, 0.0, 0.8, w=0.0))),
+    ('a quaternion of no length', 'object: quaternion .* is no rotation', dict(object=pose(0.6, 0.0, 0.8, w=0.0))),
+    ('a quaternion beyond measure', 'object: .*no rotation', dict(object=pose(0.6, 0.0, 0.8, w=1e200))),
     ('a wrong frame', "object: frame 'moon'; allowed: base_footprint, base_link, odom_combined",
      dict(object=pose(0.6, 0.0, 0.8, frame='moon'))),
     ('an unknown map', "no collision map 'x'", dict(map_id='x')),
