@@ -1,14 +1,10 @@
 """The terminal front end: shows open questions, one at a time, and takes an expert's answers."""
-import argparse
-import getpass
 import json
 import math
-import socket
 import sys
 import time
 from typing import Callable, List, Optional, Sequence, Set
 
-import rosgraph
 import rospy
 from rich.console import Console
 from rich.text import Text
@@ -26,6 +22,7 @@ from .next_steps import NextSteps
 from .options import Option, choose, options
 from .prompts import Choice, Interrupted, JsonValidator, Prompts
 from .running_interface import RunningInterface
+from .terminal_start import parse, wait_for_master
 from .text import clean, duration
 
 _COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'), ('t', 'take it over from who holds it'),
@@ -287,30 +284,12 @@ def _quit_on(line: str) -> None:
         raise Quit
 
 
-def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog='expert_terminal', description='Answers the questions of robots.')
-    parser.add_argument('--server', action='append', default=[], metavar='NAME',
-                        help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
-                             '(default: all that the master knows)')
-    parser.add_argument('--name', default='{}@{}'.format(getpass.getuser(), socket.gethostname()),
-                        help='your name, as robots and other experts see it (default: %(default)s)')
-    return parser.parse_args(arguments)
-
-
-def _wait_for_master(console: Console) -> None:
-    """rospy would wait without a word."""
-    if not rosgraph.is_master_online():
-        console.print(Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()), 'yellow'))
-    while not rosgraph.is_master_online():
-        time.sleep(0.5)
-
-
 def main() -> None:
     """Entry point of `expert_terminal`."""
-    options_given = _parse(rospy.myargv(sys.argv)[1:])
+    options_given = parse(rospy.myargv(sys.argv)[1:])
     console = Console()
     try:
-        _wait_for_master(console)
+        wait_for_master(console)
         # a name of its own each; Ctrl-C is ours; the log stays off the screen (its file has it)
         rospy.init_node('expert_terminal', anonymous=True, disable_signals=True, log_level=rospy.FATAL)
     except KeyboardInterrupt:
