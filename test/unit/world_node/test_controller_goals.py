@@ -113,7 +113,7 @@ def test_the_base_is_sent_to_where_odometry_has_the_goal():
                                          (pose(turn=(0.0, 0.0, 0.0, 0.0)), 'target_pose'),
                                          (pose(turn=(0.5, 0.0, 0.0, 0.5)), 'cannot be tilted'),
                                          (pose(turn=(1.0, 0.0, 0.0, 1e-9)), 'cannot be tilted'),
-                                         (pose(turn=(0.0, 0.0, 0.0, 1e200)), 'target_pose: quaternion .* is no rotation'),
+                                         (pose(turn=(0.0, 0.0, 0.0, 1e200)), 'target_pose: .* is no rotation'),
                                          (pose(x=1e300), r'x 1e\+300, .* allowed: -20 to 20 m')])
 def test_a_base_goal_that_cannot_be_is_refused(goal, words):
     with pytest.raises(goals.BadGoal, match=words):
