@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from recorded import active, events, finished, messages, numbers
@@ -14,6 +15,9 @@ from smach_oracle.oracle.events import EventKind, EventSource
 from smach_oracle.ros import bag_writer
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recorder_status import RecorderState
+
+
+TEXT = 'x' * 200  # of every event
 
 
 class Watched:
@@ -34,7 +38,7 @@ class Watched:
 
     def emit(self, kind, count=1):
         for _ in range(count):
-            self.source.emit(kind, 'TOP', text='x' * 200)
+            self.source.emit(kind, 'TOP', text=TEXT)
         self.told += count
 
     def trial(self, trial_id, steps):
@@ -48,6 +52,14 @@ class Watched:
             assert time.monotonic() < deadline, 'the operator was never told {}'.format(state)
             time.sleep(0.02)
         self.statuses.clear()
+
+    def wait_for_disk(self, trial_id, count):
+        """Until so many events of the trial can be read from its file."""
+        deadline = time.monotonic() + 20.0
+        while sum(Path(path).read_bytes().count(TEXT.encode()) for path in active(self.folder)
+                  if trial_id in path) < count:
+            assert time.monotonic() < deadline, 'the events never reach the disk'
+            time.sleep(0.05)
 
     def close(self):
         assert self.recorder.close(20.0)
@@ -66,7 +78,7 @@ def survive_full_disk(folder, fill, empty):
     watched.trial('before', 10)
     watched.start('full')
     watched.emit(EventKind.STATE_START, 200)
-    time.sleep(1.0)  # these reach the disk
+    watched.wait_for_disk('full', 201)
     fill()
     began = time.monotonic()
     watched.emit(EventKind.STATE_START, 3000)
