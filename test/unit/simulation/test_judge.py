@@ -1,8 +1,9 @@
 """The judge: he knows success from what only looks like it."""
 import re
 
+import pybullet
 import pytest
-from worlds import CAN, CARTON, GOAL, TABLE, Hand, scene
+from worlds import CAN, GOAL, TABLE, Hand, scene
 
 from smach_oracle.simulation.world.direct import DirectRobot
 from smach_oracle.simulation.world.judge import judge
@@ -42,10 +43,21 @@ def test_what_is_no_success_has_its_reason(world, can, why):
     assert re.search(why, found.why), found.why
 
 
-def test_any_body_will_do_where_the_goal_names_none(world):
-    goal = GOAL._replace(body='', position=CARTON.position)
-    assert verdict(world, goal=goal).success
+def test_any_body_that_was_carried_will_do_where_the_goal_names_none(world):
+    goal = GOAL._replace(body='')
+    elsewhere = CAN._replace(position=(CAN.position[0], CAN.position[1] + 0.12, CAN.position[2]))
+    world.reset(scene(TABLE, elsewhere, goal=goal))
+    assert not judge(world, goal).success
+    number = next(index for index in range(20) if world.seen_as(index) == 'can')
+    pybullet.resetBasePositionAndOrientation(number, CAN.position, (0.0, 0.0, 0.0, 1.0), physicsClientId=world.client)
+    world.step(60)
+    assert judge(world, goal).success
     assert not verdict(world, TABLE, goal=goal).success
+
+
+def test_what_was_pushed_to_the_goal_was_not_brought_there(world):
+    found = verdict(world, goal=GOAL._replace(body='', position=CAN.position))
+    assert not found.success and 'never carried' in found.why
 
 
 def test_what_the_robot_still_holds_is_no_success(world):

@@ -9,6 +9,7 @@ from .scene import Goal
 UPRIGHT = np.cos(np.radians(15.0))
 RESTING = (0.03, 0.3)  # m/s, rad/s: what is slower is at rest
 HEIGHT = 0.05  # m, that a body may be off the goal's height
+CARRIED = 0.08  # m from where the scene put it: what was merely pushed towards the goal was not brought there
 RECEIVER = 'palm'  # the body that takes what is handed over
 
 
@@ -49,6 +50,9 @@ def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:
     faults = []
     if off > goal.tolerance:
         faults.append('is {:.1f} cm from the goal'.format(100 * off))
+    way = float(np.linalg.norm(pose[:3, 3] - world.body(name).position))
+    if goal.kind == 'stands_at' and not goal.body and way < CARRIED:
+        faults.append('was never carried')
     if 'robot' in touching:
         faults.append('is touched by the robot')
     if pose[2, 2] < UPRIGHT:
