@@ -13,7 +13,7 @@ PALM = 'palm'
 NEAR = 0.16  # m around the place where the palm is expected, horizontally
 LEVEL = 0.06  # m, vertically
 LEAST_POINTS = 150
-LEAST_EXTENT = 0.06  # m that a palm extends
+LEAST_EXTENT = 0.09  # m that a palm extends; a sleeve is narrower
 LEAST_HALF = 0.11  # m: part of it may be hidden
 THICK = 0.03  # m of a hand
 STRIDE = 2
@@ -46,7 +46,7 @@ def find_palm(frame: Frame, expected: np.ndarray) -> MapBox:
     if len(points) < LEAST_POINTS:
         raise SkillError('no hand waits where it should: {} points within {:.0f} cm of it'.format(
             len(points), 100 * NEAR))
-    height = float(np.median(points[:, 2]))
+    height = float(np.percentile(points[:, 2], 90))  # a palm that is held out lies higher than the arm behind it
     level = points[np.abs(points[:, 2] - height) < 0.015]
     low, high = np.percentile(level[:, :2], [2, 98], axis=0)
     if np.min(high - low) < LEAST_EXTENT:
