@@ -25,7 +25,7 @@ FRIDGE = 'fridge'  # the collision map that PICK plans in: the known furniture, 
 TORSO_HEIGHT = 0.25  # m
 # x, y in m, yaw in rad, in odom_combined
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
-OUT_OF_THE_FRIDGE = (0.65, -0.30, 0.0)
+OUT_OF_THE_FRIDGE = (0.68, -0.30, 0.0)
 HOME = (0.0, 0.0, math.pi / 2)
 PALM = (0.0, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
 

@@ -18,7 +18,7 @@ from .travel import TRAVEL, carry, draw_back, drive, stow
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
 CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, for whoever drives in next
-CLOSING = (-0.87, -0.30, 0.0)
+CLOSING = (-0.92, -0.30, 0.0)
 
 AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
 PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside

@@ -24,7 +24,7 @@ from .physics import World
 
 TORSO_HEIGHT = 0.25  # m
 MIN_HEIGHT = 0.05  # m
-DRIVES = {'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.65, -0.30, 0.0), 'MOVE_HOME': (0.0, 0.0, math.pi / 2)}
+DRIVES = {'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.68, -0.30, 0.0), 'MOVE_HOME': (0.0, 0.0, math.pi / 2)}
 
 
 class DrinkTrial:
