@@ -18,6 +18,7 @@ from .interface import Frame, RobotError
 KEPT = {Image: 4}  # messages of a topic
 KEPT_OTHERS = 200
 SHAKE_S = 0.1  # after a subscriber knows of its publisher, until surely the publisher knows of it
+AGAIN_S = 3.0  # wall s after which joint states that were asked for are asked for anew
 
 
 class Recent:
@@ -25,6 +26,7 @@ class Recent:
 
     def __init__(self, topic: str, kind: Any) -> None:
         self.name = rospy.resolve_name(topic)
+        self.greeted = False  # its publisher surely knows of us
         self._arrived = threading.Condition()
         kept = KEPT.get(kind, KEPT_OTHERS)
         self._messages: Deque[Any] = collections.deque(maxlen=kept)
@@ -79,7 +81,7 @@ class RosSenses:
 
     def joints(self) -> Dict[str, float]:
         """Joint positions, rad or m, now."""
-        message = self._states.at(self._shot(False), self._timeout_s) if self._snapshot else self._next_states()
+        message = self._states_of_snapshot() if self._snapshot else self._next_states()
         return dict(zip(message.name, message.position))
 
     def transform(self, target: str, source: str) -> np.ndarray:
@@ -116,6 +118,16 @@ class RosSenses:
         return [Recent('head_camera/rgb/image_raw', Image), Recent('head_camera/depth_registered/image_raw', Image),
                 Recent('head_camera/rgb/camera_info', CameraInfo)]
 
+    def _states_of_snapshot(self) -> JointState:
+        """Asked for again where they do not come: a publisher may have been slow to learn who listens."""
+        until = time.monotonic() + self._timeout_s
+        while True:
+            try:
+                return self._states.at(self._shot(False), min(AGAIN_S, self._timeout_s))
+            except RobotError:
+                if time.monotonic() > until or rospy.is_shutdown():
+                    raise
+
     def _next_states(self) -> JointState:
         return self._states.next(self._timeout_s)
 
@@ -132,7 +144,7 @@ class RosSenses:
         return answer.stamp
 
     def _connected(self, topic: Recent) -> None:
-        if topic.connected:
+        if topic.connected and topic.greeted:
             return
         until = time.monotonic() + self._timeout_s
         while not topic.connected:
@@ -140,6 +152,7 @@ class RosSenses:
                 raise RobotError('nobody publishes {}'.format(topic.name))
             time.sleep(0.005)
         time.sleep(SHAKE_S)
+        topic.greeted = True
 
     def _looked_up(self, target: str, source: str, stamp: rospy.Time) -> np.ndarray:
         """4x4. tf2's own waiting goes by ROS time, which may stand still; this goes by the wall's."""
