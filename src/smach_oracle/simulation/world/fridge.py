@@ -5,7 +5,7 @@ from typing import Tuple
 from ..robot.kitchen import Kitchen
 
 DOOR_JOINT = 'door_hinge'  # rad; 0 closed, positive open
-DOOR_LIMIT = 2.2  # rad
+DOOR_LIMIT = 1.75  # rad; a stop, as of a cabinet beside it
 WHITE, GLASS, DARK = (0.93, 0.93, 0.95), (0.75, 0.82, 0.90), (0.20, 0.20, 0.22)
 DOOR_MASS, BODY_MASS = 8.0, 60.0  # kg
 GAP = 0.02  # m below and above the door
