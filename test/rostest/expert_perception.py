@@ -9,8 +9,8 @@ import numpy as np
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from geometry_msgs.msg import Point32, Polygon
-from sensor_msgs.msg import Image, RegionOfInterest
+from geometry_msgs.msg import Point32, Polygon, PoseStamped, Vector3
+from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from published_camera import PublishedCamera  # noqa: E402
@@ -18,7 +18,7 @@ from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import SegmentStroke, SharedAutonomyAction, SharedAutonomyGoal  # noqa: E402
 from smach_oracle.ros.images import colour_of  # noqa: E402
-from smach_oracle.ros.userdata_codec import decode_all  # noqa: E402
+from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 from smach_oracle.srv import (FinishInterface, GiveUpInterface, SegmentObject, SegmentObjectRequest,  # noqa: E402
                               UseFrame, UseFrameRequest)
@@ -113,7 +113,7 @@ class PerceptionInterface(unittest.TestCase):
         self.assertGreater((mask & truth).sum() / (mask | truth).sum(), 0.9)
         self.assertEqual(answer.cloud.header, answer.object.header)
         self.assertGreater(answer.cloud.width, 500)
-        self.assertTrue(self.interface.finish('succeeded', [], 'marked').ok)
+        self.assertTrue(self.interface.finish(outcome='succeeded', text='marked').ok)
         self.assertEqual(self.interface.ended(self.handle), GoalStatus.SUCCEEDED)
         result = self.handle.get_result()
         outputs = decode_all(result.outputs)
@@ -128,7 +128,7 @@ class PerceptionInterface(unittest.TestCase):
     def test_another_state_gets_what_its_own_template_says(self):
         self.begin('DETECT_DRINK', output_keys=['drink', 'size'])
         self.assertTrue(self.segment(polygon=Polygon([Point32(*corner) for corner in self.corners()])).ok)
-        self.assertTrue(self.interface.finish('succeeded', [], '').ok)
+        self.assertTrue(self.interface.finish(outcome='succeeded', text='').ok)
         self.interface.ended(self.handle)
         outputs = decode_all(self.handle.get_result().outputs)
         self.assertEqual(sorted(outputs), ['drink', 'size'])
@@ -152,7 +152,7 @@ class PerceptionInterface(unittest.TestCase):
         self.assertFalse(self.segment(region=region).ok, 'now it is gone')
         stale = self.segment(region=region, stamp=first.header.stamp)
         self.assertIn('is in use', stale.message)
-        self.assertFalse(self.interface.finish('succeeded', [], '').ok, 'nothing is marked in this frame')
+        self.assertFalse(self.interface.finish(outcome='succeeded', text='').ok, 'nothing is marked in this frame')
         again = self.interface.use_frame(UseFrameRequest.AT_GOAL)
         self.assertEqual(again.stamp, first.header.stamp)
         self.assertTrue(self.segment(region=region, stamp=first.header.stamp).ok)
@@ -165,21 +165,41 @@ class PerceptionInterface(unittest.TestCase):
         row, column = np.argwhere(self.camera.pixels(CAN_INDEX)).mean(axis=0)
         rubbed_out = SegmentStroke(False, [Point32(column, row, 0)], 300.0)
         self.assertIn('collapsed', self.segment(region=self.around(), strokes=[rubbed_out]).message)
-        refused = self.interface.finish('succeeded', [], '')
+        refused = self.interface.finish(outcome='succeeded', text='')
         self.assertFalse(refused.ok)
-        self.assertIn('no object is marked', refused.message)
-        self.assertIn('allowed', self.interface.finish('shattered', [], '').message)
+        self.assertIn('no object is marked, so objects, sizes, table cannot be told', refused.message)
+        self.assertIn('allowed', self.interface.finish(outcome='shattered', text='').message)
         self.assertIn('unknown', self.interface.use_frame(7).message)
-        self.assertTrue(self.interface.finish('aborted', [], 'there is none').ok, 'a failure needs no object')
+        self.assertTrue(self.interface.finish(outcome='aborted', text='there is none').ok, 'a failure needs no object')
         self.interface.ended(self.handle)
         self.assertEqual(self.handle.get_result().outcome, 'aborted')
+
+    def test_who_gives_every_output_himself_need_mark_nothing(self):
+        self.begin()
+        given = encode_all({'table': PoseStamped(), 'objects': [PoseStamped()]})
+        self.assertIn('so sizes cannot be told', self.interface.finish('succeeded', given, '').message)
+        given += encode_all({'sizes': [Vector3(1, 2, 3)]})
+        self.assertTrue(self.interface.finish('succeeded', given, '').ok)
+        self.interface.ended(self.handle)
+        self.assertEqual(decode_all(self.handle.get_result().outputs)['sizes'][0].z, 3)
+
+    def test_the_cloud_of_the_frame_in_use_is_told_in_the_frame_of_the_base(self):
+        clouds = []
+        subscriber = rospy.Subscriber('perception_interface/cloud', PointCloud2, clouds.append)
+        self.begin()
+        stamp = self.interface.shown().header.stamp
+        self.assertTrue(wait_for(lambda: clouds and clouds[-1].header.stamp == stamp))
+        subscriber.unregister()
+        points = np.frombuffer(clouds[-1].data, '<f4').reshape(-1, clouds[-1].point_step // 4)[:, :3]
+        self.assertEqual(clouds[-1].header.frame_id, 'base_footprint')
+        self.assertAlmostEqual(np.median(points[:, 2]), 0.72, delta=0.03, msg='the top of the table')
 
     def test_one_goal_at_a_time_and_only_for_states_that_it_knows(self):
         self.begin()
         second = self.interface.start(goal_for('DETECT_TABLETOP', 'q2'))
         self.assertEqual(self.interface.ended(second), GoalStatus.REJECTED)
         self.assertIn('one goal at a time', second.get_goal_status_text())
-        self.assertTrue(self.interface.give_up('too dark').ok)
+        self.assertTrue(self.interface.give_up(text='too dark').ok)
         self.assertEqual(self.interface.ended(self.handle), GoalStatus.ABORTED)
         unknown = self.interface.start(goal_for('DANCE'))
         self.assertEqual(self.interface.ended(unknown), GoalStatus.REJECTED)
@@ -190,7 +210,7 @@ class PerceptionInterface(unittest.TestCase):
         self.handle.cancel()
         self.assertEqual(self.interface.ended(self.handle), GoalStatus.PREEMPTED)
         for answer in (self.segment(region=self.around()), self.interface.use_frame(UseFrameRequest.FRESH),
-                       self.interface.finish('succeeded', [], ''), self.interface.give_up('')):
+                       self.interface.finish(outcome='succeeded', text=''), self.interface.give_up(text='')):
             self.assertFalse(answer.ok)
             self.assertIn('no goal is active', answer.message)
 
@@ -199,7 +219,7 @@ class PerceptionInterface(unittest.TestCase):
         handle = blind.start(goal_for('DETECT_TABLETOP'))
         self.assertIn('nobody publishes /nowhere/rgb', blind.segment(region=self.around()).message)
         self.assertIn('nobody publishes', blind.use_frame(UseFrameRequest.AT_GOAL).message)
-        self.assertTrue(blind.give_up('no picture').ok)
+        self.assertTrue(blind.give_up(text='no picture').ok)
         self.assertEqual(blind.ended(handle), GoalStatus.ABORTED)
 
     def test_a_robot_that_takes_snapshots_is_asked_for_one(self):
@@ -211,7 +231,7 @@ class PerceptionInterface(unittest.TestCase):
         fresh = interface.use_frame(UseFrameRequest.FRESH)
         self.assertTrue(fresh.ok, fresh.message)
         self.assertGreater(fresh.stamp, first.header.stamp)
-        self.assertTrue(interface.give_up('seen').ok)
+        self.assertTrue(interface.give_up(text='seen').ok)
         interface.ended(handle)
 
 

@@ -84,7 +84,7 @@ class Eyes(unittest.TestCase):
         answer = call('perception_interface/segment', SegmentObject, SegmentObjectRequest(region=seen.region))
         self.assertTrue(answer.ok, answer.message)
         self.assertLess(float(np.linalg.norm(place(answer.object) - place(seen.pose))), 2 * NEAR_M)
-        self.assertTrue(call('perception_interface/finish', FinishInterface, 'succeeded', [], '').ok)
+        self.assertTrue(call('perception_interface/finish', FinishInterface, 'succeeded', [], '', '').ok)
         self.assertTrue(wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
         outputs = decode_all(handle.get_result().outputs)
         self.assertEqual(sorted(outputs), ['objects', 'sizes', 'table'])

@@ -32,12 +32,13 @@ class RunningInterface:
     def finish(self, outcome: str, text: str) -> str:
         """Supersede the state with an outcome; why not, or ''. Raises ServerGoneError."""
         answer = call_service(self._action + '/finish', FinishInterface,
-                              FinishInterfaceRequest(outcome=outcome, text=text))
+                              FinishInterfaceRequest(outcome=outcome, text=text, query_id=self._query_id))
         return '' if answer.ok else str(answer.message)
 
     def give_up(self, text: str) -> str:
         """End it without a result; why not, or ''. Raises ServerGoneError."""
-        answer = call_service(self._action + '/give_up', GiveUpInterface, GiveUpInterfaceRequest(text))
+        answer = call_service(self._action + '/give_up', GiveUpInterface,
+                              GiveUpInterfaceRequest(text, self._query_id))
         return '' if answer.ok else str(answer.message)
 
     def lines(self) -> List[str]:

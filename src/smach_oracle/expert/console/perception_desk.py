@@ -49,26 +49,28 @@ class PerceptionDesk:
         action = action_of(listed)
         if not action or not self._known(action):
             return Reply(False, NOT_RUNNING)
-        return getattr(self, '_' + command.name)(action, command.arguments, person)  # type: ignore[no-any-return]
+        work = getattr(self, '_' + command.name)
+        return work(action, command.arguments, person, listed.goal.query_id)  # type: ignore[no-any-return]
 
-    def _mark(self, action: str, said: Dict[str, Any], _: Person) -> Reply:
+    def _mark(self, action: str, said: Dict[str, Any], *_: Any) -> Reply:
         request = SegmentObjectRequest(stamp=said['stamp'], polygon=Polygon(_corners(said['region'])), strokes=[
             SegmentStroke(stroke.foreground, _corners(stroke.points), stroke.width) for stroke in said['strokes']])
         answer = self._call(action + '/segment', SegmentObject, request)
         return Reply(answer.ok, answer.message, marked_view(answer))
 
-    def _use_frame(self, action: str, said: Dict[str, Any], _: Person) -> Reply:
+    def _use_frame(self, action: str, said: Dict[str, Any], *_: Any) -> Reply:
         which = UseFrameRequest.FRESH if said['frame'] == FRESH else UseFrameRequest.AT_GOAL
         answer = self._call(action + '/use_frame', UseFrame, UseFrameRequest(which), FRAME_LIMIT_S)
         return Reply(answer.ok, answer.message)
 
-    def _hand_over(self, action: str, said: Dict[str, Any], person: Person) -> Reply:
-        request = FinishInterfaceRequest(outcome=said['outcome'], text=_record(person, said['why']))
+    def _hand_over(self, action: str, said: Dict[str, Any], person: Person, query_id: str) -> Reply:
+        request = FinishInterfaceRequest(outcome=said['outcome'], text=_record(person, said['why']), query_id=query_id)
         answer = self._call(action + '/finish', FinishInterface, request)
         return Reply(answer.ok, answer.message)
 
-    def _give_up_interface(self, action: str, said: Dict[str, Any], person: Person) -> Reply:
-        answer = self._call(action + '/give_up', GiveUpInterface, GiveUpInterfaceRequest(_record(person, said['why'])))
+    def _give_up_interface(self, action: str, said: Dict[str, Any], person: Person, query_id: str) -> Reply:
+        request = GiveUpInterfaceRequest(_record(person, said['why']), query_id)
+        answer = self._call(action + '/give_up', GiveUpInterface, request)
         return Reply(answer.ok, answer.message)
 
 

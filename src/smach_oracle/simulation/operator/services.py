@@ -27,12 +27,12 @@ class Settling:
 
     def finish(self, outcome: str, text: str) -> str:
         """Supersede the state; why not, or ''."""
-        answer = self._finish(outcome, [], text)
+        answer = self._finish(outcome=outcome, text=text)
         return '' if answer.ok else answer.message
 
     def give_up(self, text: str) -> None:
         """End it without a result; one that has ended already is left."""
-        self._give_up(text)
+        self._give_up(text=text)
 
 
 class Drawing:
