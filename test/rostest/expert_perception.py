@@ -177,9 +177,10 @@ class PerceptionInterface(unittest.TestCase):
     def test_who_gives_every_output_himself_need_mark_nothing(self):
         self.begin()
         given = encode_all({'table': PoseStamped(), 'objects': [PoseStamped()]})
-        self.assertIn('so sizes cannot be told', self.interface.finish('succeeded', given, '').message)
+        refused = self.interface.finish(outcome='succeeded', outputs=given)
+        self.assertIn('so sizes cannot be told', refused.message)
         given += encode_all({'sizes': [Vector3(1, 2, 3)]})
-        self.assertTrue(self.interface.finish('succeeded', given, '').ok)
+        self.assertTrue(self.interface.finish(outcome='succeeded', outputs=given).ok)
         self.interface.ended(self.handle)
         self.assertEqual(decode_all(self.handle.get_result().outputs)['sizes'][0].z, 3)
 

@@ -9,17 +9,21 @@ from typing import Any, Dict, List, NamedTuple, Optional
 import numpy as np
 import rospy
 import tf2_ros
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Header
 
-from smach_oracle.srv import Snapshot
+from smach_oracle.srv import Snapshot, SnapshotRequest
 
+from ..geometry.depth import points_of
 from ..geometry.transforms import from_quaternion
-from ..ros.images import ImageError, colour_of, depth_of, intrinsics_of
+from ..ros.images import ImageError, cloud_message, colour_of, depth_of, intrinsics_of
+from .followed_server import ServerGoneError, call_service
 from .segmentation import Picture
 
 SAME_MOMENT_S = 0.02  # between the stamps of colour and depth
 ATTEMPT_S = 3.0  # wall time after which another snapshot is asked for: the first may have come before we listened
 POLL_S = 0.01
+CLOUD_STRIDE = 3
 NO_SNAPSHOT = 'none'
 
 
@@ -47,7 +51,7 @@ class FrameSource:
         """
         self.base_frame = base_frame
         self._topics = {'rgb': (rgb, Image), 'depth': (depth, Image), 'info': (camera_info, CameraInfo)}
-        self._snapshot = None if snapshot == NO_SNAPSHOT else rospy.ServiceProxy(snapshot, Snapshot)
+        self._snapshot = None if snapshot == NO_SNAPSHOT else rospy.resolve_name(snapshot)
         self._limit_s = limit_s
         self._one_at_a_time = threading.Lock()
 
@@ -72,13 +76,14 @@ class FrameSource:
                 raise FrameError('nobody publishes {}'.format(', '.join(listening.missing()) or '/tf'))
             time.sleep(POLL_S)
         while time.monotonic() < until and not rospy.is_shutdown():
-            shot = self._attempt(listening, min(until, time.monotonic() + ATTEMPT_S))
+            shot = self._attempt(listening, until)
             if shot is not None:
                 return shot
         raise FrameError('no frame within {:.0f} s: {}'.format(self._limit_s, listening.lacking(self.base_frame)))
 
     def _attempt(self, listening: '_Listening', until: float) -> Optional[Shot]:
-        stamp = self._snap()
+        stamp = self._snap(max(until - time.monotonic(), POLL_S))
+        until = min(until, time.monotonic() + ATTEMPT_S)
         while time.monotonic() < until and not rospy.is_shutdown():
             for images in listening.of_one_moment(stamp):
                 pose = listening.pose(self.base_frame, images['rgb'].header)
@@ -87,16 +92,16 @@ class FrameSource:
             time.sleep(POLL_S)
         return None
 
-    def _snap(self) -> Optional[rospy.Time]:
+    def _snap(self, limit_s: float) -> Optional[rospy.Time]:
         """The stamp of the frame to wait for; None: any."""
         if self._snapshot is None:
             return None
         try:
-            answer = self._snapshot(camera=True)
-        except (rospy.ServiceException, rospy.ROSException, OSError) as err:
-            raise FrameError('{}: {}'.format(self._snapshot.resolved_name, err)) from err
+            answer = call_service(self._snapshot, Snapshot, SnapshotRequest(camera=True), limit_s)
+        except ServerGoneError as err:
+            raise FrameError(str(err)) from err
         if not answer.ok:
-            raise FrameError('{}: {}'.format(self._snapshot.resolved_name, answer.message))
+            raise FrameError('{}: {}'.format(self._snapshot, answer.message))
         return answer.stamp
 
 
@@ -170,3 +175,13 @@ def _picture(images: Dict[str, Any], base_from_camera: np.ndarray) -> Picture:
         raise ImageError('colour is {1} x {0}, depth {3} x {2}: depth must be registered to colour'.format(
             *colour.shape[:2], *depth.shape))
     return Picture(images['rgb'].header.stamp.to_sec(), colour, depth, intrinsics_of(images['info']), base_from_camera)
+
+
+def cloud_of(shot: Shot, base_frame: str) -> PointCloud2:
+    """What a frame shows, with its colours, in the frame of the base: points of every CLOUD_STRIDE-th pixel."""
+    picture = shot.picture
+    points = points_of(picture.depth[::CLOUD_STRIDE, ::CLOUD_STRIDE], picture.intrinsics, picture.base_from_camera,
+                       stride=CLOUD_STRIDE)
+    known = np.isfinite(points[..., 2])
+    return cloud_message(points[known], Header(stamp=shot.image.header.stamp, frame_id=base_frame),
+                         picture.colour[::CLOUD_STRIDE, ::CLOUD_STRIDE][known])

@@ -3,7 +3,7 @@
 A second goal is refused with a text; a preempt, and the loss of the node that asked, end the goal.
 """
 import time
-from typing import Any, Callable, Dict, Mapping, Optional, Sequence
+from typing import Any, Callable, Collection, Dict, Mapping, Optional, Sequence
 
 import actionlib
 import rospy
@@ -73,18 +73,16 @@ class InterfaceGoal:
             handle.publish_feedback(SharedAutonomyFeedback(progress, text))
 
     def finish(self, outcome: str, known: Mapping[str, Any], given: Sequence[UserdataItem] = (),
-               text: str = '') -> None:
+               text: str = '', query_id: str = '') -> None:
         """Supersede the state with `outcome`.
 
         `known`: outputs that the interface can tell; keys that the state does not have are left out. `given`: outputs
-        that the person gave, which come first.
+        that the person gave, which come first. `query_id`: the question that is meant; '' for whichever is active.
 
-        :raises InterfaceGoalError: where no goal is active, or the outcome or an output given does not fit it.
+        :raises InterfaceGoalError: where no such goal is active, or the outcome or an output given does not fit it.
         """
         with self._lock:
-            goal = self.goal
-            if goal is None:
-                raise InterfaceGoalError(NO_GOAL)
+            goal = self._meant(query_id)
             if outcome not in goal.outcomes:
                 raise InterfaceGoalError('outcome {!r} is not one of {}; allowed: {}'.format(
                     outcome, goal.state, names(goal.outcomes)))
@@ -93,14 +91,13 @@ class InterfaceGoal:
             result = SharedAutonomyResult(outcome, [outputs[key] for key in sorted(outputs)], text)
             self._end(lambda handle: handle.set_succeeded(result, text))
 
-    def give_up(self, text: str) -> None:
-        """End the goal without a result; the oracle asks again.
+    def give_up(self, text: str, query_id: str = '') -> None:
+        """End the goal, of this question where one is named, without a result; the oracle asks again.
 
-        :raises InterfaceGoalError: where no goal is active.
+        :raises InterfaceGoalError: where no such goal is active.
         """
         with self._lock:
-            if self._handle is None:
-                raise InterfaceGoalError(NO_GOAL)
+            self._meant(query_id)
             self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(text=text), text))
 
     def drop_if_asker_is_gone(self) -> None:
@@ -109,6 +106,15 @@ class InterfaceGoal:
             if self._handle is not None and self._asker_missing_s() > ASKER_GONE_S:
                 rospy.logwarn('%s: whoever asked is gone; its goal for %s ends', self.name, self.goal.state)
                 self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(), 'the asker is gone'))
+
+    def _meant(self, query_id: str) -> SharedAutonomyGoal:
+        goal = self.goal
+        if goal is None:
+            raise InterfaceGoalError(NO_GOAL)
+        if query_id and query_id != goal.query_id:
+            raise InterfaceGoalError('question {} is over; the interface now works on another one, {}'.format(
+                query_id, goal.query_id))
+        return goal
 
     def stop(self) -> None:
         """Take the action down."""
@@ -163,8 +169,8 @@ class InterfaceGoal:
 class SettlingServices:
     """The services `~finish` and `~give_up` of an interface, for the front end of the person who uses it."""
 
-    def __init__(self, goal: InterfaceGoal, outputs: Callable[[str], Mapping[str, Any]]) -> None:
-        """`outputs`: for an outcome, what the interface can tell of the state's outputs."""
+    def __init__(self, goal: InterfaceGoal, outputs: Callable[[str, Collection[str]], Mapping[str, Any]]) -> None:
+        """`outputs`: for an outcome and the keys that the person gives, what the interface can tell of the others."""
         self._goal = goal
         self._outputs = outputs
         self._services = [rospy.Service('~finish', FinishInterface, self._finish),
@@ -172,14 +178,15 @@ class SettlingServices:
 
     def _finish(self, request: FinishInterfaceRequest) -> FinishInterfaceResponse:
         try:
-            self._goal.finish(request.outcome, self._outputs(request.outcome), request.outputs, request.text)
+            known = self._outputs(request.outcome, {item.key for item in request.outputs})
+            self._goal.finish(request.outcome, known, request.outputs, request.text, request.query_id)
         except (InterfaceGoalError, UserdataCodecError) as err:
             return FinishInterfaceResponse(False, str(err))
         return FinishInterfaceResponse(True, '')
 
     def _give_up(self, request: GiveUpInterfaceRequest) -> GiveUpInterfaceResponse:
         try:
-            self._goal.give_up(request.text)
+            self._goal.give_up(request.text, request.query_id)
         except InterfaceGoalError as err:
             return GiveUpInterfaceResponse(False, str(err))
         return GiveUpInterfaceResponse(True, '')

@@ -1,6 +1,6 @@
 """What an expert has marked while a goal is active: the frames to draw on, and the object cut out of one of them."""
 import threading
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
+from typing import Any, Callable, Collection, Dict, List, Mapping, NamedTuple, Optional
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
@@ -14,7 +14,8 @@ from .marked_scene import MarkedScene, SceneError, scene_of
 from .output_templates import OF_THE_SCENE, StateTemplate
 from .segmentation import Cutting, SegmentationError, Stroke, segment
 
-NO_MARK = 'no object is marked: call segment first, or give up'
+NO_MARK = ('no object is marked, so {} cannot be told: mark it (call segment) first, give them with the outcome, choose '
+           'another outcome, or give up')
 
 
 class Marked(NamedTuple):
@@ -96,21 +97,23 @@ class Marking:
             self._marked = marked
         return marked
 
-    def outputs(self, outcome: str) -> Mapping[str, Any]:
+    def outputs(self, outcome: str, given: Collection[str] = ()) -> Mapping[str, Any]:
         """What the template says for this outcome.
 
+        :param given: output keys that the person gives himself; nothing need be marked where they are all.
         :raises InterfaceGoalError: where nothing is marked, or the frame did not show what an output needs.
         """
-        if outcome != self.template.outcome:
+        wanted = {key: what for key, what in self.template.outputs.items() if key not in given}
+        if outcome != self.template.outcome or not wanted:
             return {}
         marked = self._marked
         if marked is None:
-            raise InterfaceGoalError(NO_MARK)
-        needy = [key for key, what in self.template.outputs.items() if what in OF_THE_SCENE]
+            raise InterfaceGoalError(NO_MARK.format(', '.join(sorted(wanted))))
+        needy = [key for key, what in wanted.items() if what in OF_THE_SCENE]
         if needy and marked.scene is None:
             raise InterfaceGoalError('{}: {}'.format(', '.join(sorted(needy)), marked.why_no_scene))
         parts = ingredients(marked)
-        return {key: parts[what] for key, what in self.template.outputs.items()}
+        return {key: parts[what] for key, what in wanted.items()}
 
     def _take_first(self) -> None:
         try:

@@ -1,14 +1,14 @@
 """The perception interface: a person marks the object in a camera frame, and the failed detection is superseded by it.
 
-A SharedAutonomy action beside `~image` (the frame in use), `~segment`, `~use_frame`, `~finish` and `~give_up`; for any
+A SharedAutonomy action beside `~image` and `~cloud` (the frame in use), `~segment`, `~use_frame`, `~finish` and `~give_up`; for any
 robot with a camera that gives colour and registered depth, and a tf tree from it to the base.
 """
 import time
-from typing import Any, List, Mapping, Optional
+from typing import Any, Collection, List, Mapping, Optional
 
 import numpy as np
 import rospy
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, PointCloud2
 
 from smach_oracle.msg import SegmentStroke, SharedAutonomyGoal
 from smach_oracle.srv import (SegmentObject, SegmentObjectRequest, SegmentObjectResponse, UseFrame, UseFrameRequest,
@@ -20,7 +20,7 @@ from ..ros.command_line import parameters_only
 from ..ros.images import mask_image
 from ..ros.master_watch import start_master_watch
 from ..ros.parameters import name_of, number_of
-from .frame_source import NO_SNAPSHOT, FrameError, FrameSource, Shot
+from .frame_source import NO_SNAPSHOT, FrameError, FrameSource, Shot, cloud_of
 from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
 from .marking import Marking, ingredients
 from .output_templates import templates_from
@@ -42,6 +42,7 @@ class SegmentationServer:
         self._source = source
         self._marking: Optional[Marking] = None
         self._image = rospy.Publisher('~image', Image, queue_size=2, latch=True)
+        self._cloud = rospy.Publisher('~cloud', PointCloud2, queue_size=2, latch=True)
         self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
         self._settling = SettlingServices(self._goal, self._outputs)
         self._services = [rospy.Service('~segment', SegmentObject, self._segment, buff_size=1 << 20),
@@ -64,12 +65,13 @@ class SegmentationServer:
         if marking is not None:
             marking.end()
 
-    def _outputs(self, outcome: str) -> Mapping[str, Any]:
+    def _outputs(self, outcome: str, given: Collection[str]) -> Mapping[str, Any]:
         marking = self._marking
-        return marking.outputs(outcome) if marking is not None else {}
+        return marking.outputs(outcome, given) if marking is not None else {}
 
     def _show(self, shot: Shot) -> None:
         self._image.publish(shot.image)
+        self._cloud.publish(cloud_of(shot, self._source.base_frame))
         self._goal.tell(0.2, 'the frame is shown: mark the object')
 
     def _use_frame(self, request: UseFrameRequest) -> UseFrameResponse:

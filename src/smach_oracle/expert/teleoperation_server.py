@@ -5,7 +5,7 @@ robot with a robot_description, joint_states, arms that take joint trajectories 
 """
 import threading
 import time
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Collection, Dict, Mapping, Optional
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -61,7 +61,7 @@ class TeleoperationServer:
         self._thread = threading.Thread(target=self._run, name='teleoperation', daemon=True)
         self._thread.start()
 
-    def outputs(self, outcome: str) -> Mapping[str, Any]:
+    def outputs(self, outcome: str, _given: Collection[str] = ()) -> Mapping[str, Any]:
         """What the interface can tell of the active state's outputs, as its settings for the state say."""
         goal = self._goal.goal
         known: Dict[str, Any] = {}
