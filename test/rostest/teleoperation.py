@@ -12,7 +12,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, result_of  # noqa: E402
+from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, driver_of_its_own, result_of  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import CollisionBoxes  # noqa: E402
@@ -224,12 +224,13 @@ class Teleoperation(unittest.TestCase):
                                  and self.ann.states[-1].gripper_stalled))
         grasp = self.robot_tool()
         self.ann.hold(0.3, linear=(0.0, 0.0, 0.1))
-        refused = self.ann.finish('finished', [], '')
+        refused = self.ann.finish(outcome='finished', outputs=[], text='')
         self.assertEqual((refused.ok, refused.message),
                          (False, "outcome 'finished' is not one of PICK; allowed: aborted, succeeded"))
-        refused = self.ann.finish('succeeded', encode_all({'other': 1}), '')
+        refused = self.ann.finish(outcome='succeeded', outputs=encode_all({'other': 1}), text='')
         self.assertIn("output 'other' is not one of PICK; allowed: grasp, note", refused.message)
-        self.assertTrue(self.ann.finish('succeeded', encode_all({'note': 'by the lid'}), 'done').ok)
+        outputs = encode_all({'note': 'by the lid'})
+        self.assertTrue(self.ann.finish(outcome='succeeded', outputs=outputs, text='done').ok)
         status, result = result_of(self.sent)
         self.assertEqual((status, result.outcome, result.text), (GoalStatus.SUCCEEDED, 'succeeded', 'done'))
         outputs = decode_all(result.outputs)
@@ -239,10 +240,12 @@ class Teleoperation(unittest.TestCase):
         self.assertLess(np.linalg.norm(grasp - [at.x, at.y, at.z]), 0.02)
 
     def test_the_person_gives_up(self):
-        self.assertTrue(self.ann.give_up('the arm does not reach').ok)
+        late = self.ann.give_up(text='late', query_id='another')
+        self.assertIn('another is over', late.message)
+        self.assertTrue(self.ann.give_up(text='the arm does not reach').ok)
         status, result = result_of(self.sent)
         self.assertEqual((status, result.text), (GoalStatus.ABORTED, 'the arm does not reach'))
-        self.assertIn('no goal is active', self.ann.give_up('again').message)
+        self.assertIn('no goal is active', self.ann.give_up(text='again').message)
 
     def test_the_hand_slows_near_the_collision_map(self):
         below = self.robot_tool() - [0.0, 0.0, 0.12]
@@ -274,8 +277,22 @@ class InLockStep(unittest.TestCase):
                 time.sleep(0.2)
         state = ann.answer(ann.send(move_gripper=True, gripper=0.0))
         self.assertTrue(state.gripper_stalled, 'the answer waits for the gripper')
-        self.assertTrue(ann.finish('succeeded', [], '').ok)
+        self.assertTrue(ann.finish(outcome='succeeded', outputs=[], text='').ok)
         self.assertEqual(result_of(sent)[0], GoalStatus.SUCCEEDED)
+
+    def test_a_driver_who_dies_keeps_the_others_out_no_longer_than_the_lease(self):
+        with driver_of_its_own('manipulation_in_steps', 'dead') as dead:
+            bob = Person('manipulation_in_steps', 'bob')
+            sent = bob.start()
+            self.assertTrue(wait_for(lambda: bob.states and bob.states[-1].operator == 'dead', 30.0))
+            self.assertEqual(bob.answer(bob.send()).refused, 'dead drives; one at a time')
+            dead.kill()
+            killed_s = time.monotonic()
+            self.assertTrue(wait_for(lambda: not bob.answer(bob.send()).refused))
+            self.assertGreater(time.monotonic() - killed_s, 0.5, 'she might have been slow')
+        self.assertEqual(bob.states[-1].operator, 'bob')
+        sent.cancel()
+        self.assertTrue(wait_for(lambda: bob.states[-1].query_id == ''))
 
 
 def all_tests():

@@ -158,10 +158,19 @@ class Person:
         return np.array([at.x, at.y, at.z])
 
 
-@contextlib.contextmanager
 def asker_of_its_own(server, query_id):
     """Another process that sends a goal and waits for its end; killed at the latest in the end."""
-    process = subprocess.Popen([sys.executable, os.path.abspath(__file__), server, query_id])
+    return _process('ask', server, query_id)
+
+
+def driver_of_its_own(server, operator):
+    """Another process that drives without end; killed at the latest in the end."""
+    return _process('drive', server, operator)
+
+
+@contextlib.contextmanager
+def _process(*arguments):
+    process = subprocess.Popen([sys.executable, os.path.abspath(__file__), *arguments])
     try:
         yield process
     finally:
@@ -180,7 +189,16 @@ def _ended(sent):
     return event if event is not None and event.status else None
 
 
+def _main(task, server, name):
+    rospy.init_node(task, anonymous=True)
+    person = Person(server, name)
+    if task == 'ask':
+        person.start(query_id=name)
+        rospy.spin()
+    while not rospy.is_shutdown():
+        person.send()
+        time.sleep(0.1)
+
+
 if __name__ == '__main__':
-    rospy.init_node('asker', anonymous=True)
-    GOAL = Person(sys.argv[1]).start(query_id=sys.argv[2])
-    rospy.spin()
+    _main(*sys.argv[1:])

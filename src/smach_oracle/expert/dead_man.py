@@ -7,10 +7,14 @@ _LET_GO_S = 0.3  # silence that counts as letting go, where the handle was taken
 class DeadMan:
     """Held by one operator at a time, by commands that keep coming."""
 
-    def __init__(self, watchdog_s: float) -> None:
-        """Held for `watchdog_s` after each command."""
+    def __init__(self, watchdog_s: float, lease_s: float = 0.0) -> None:
+        """Held for `watchdog_s` after each command; others may take it after `lease_s` where that is sooner.
+
+        A holder whom nobody has relieved goes on after that as if nothing had been.
+        """
         self._watchdog_s = watchdog_s
-        self._until_s = -math.inf
+        self._lease_s = lease_s or watchdog_s
+        self._until_s = self._leased_until_s = -math.inf
         self._operator = ''
         self._dropped = ''  # who pressed it when it was dropped, and has not let go since
         self._silent_until_s = -math.inf
@@ -19,15 +23,20 @@ class DeadMan:
         """Who holds it, '' for nobody."""
         return self._operator if now_s < self._until_s else ''
 
+    def lapsed(self, now_s: float) -> bool:
+        """Whether nobody has been heard for so long that anybody may take it."""
+        return now_s >= self._leased_until_s
+
     def press(self, operator: str, now_s: float) -> str:
         """Hold it, or keep holding it; why not, or ''."""
         holder = self.holder(now_s)
-        if holder and holder != operator:
+        if holder and holder != operator and not self.lapsed(now_s):
             return '{} drives; one at a time'.format(holder)
         if operator == self._dropped and now_s < self._silent_until_s:
             self._silent_until_s = now_s + _LET_GO_S
             return 'let go of the dead-man first: it was pressed before this goal began'
         self._operator, self._until_s = operator, now_s + self._watchdog_s
+        self._leased_until_s = now_s + self._lease_s
         return ''
 
     def release(self, operator: str) -> None:

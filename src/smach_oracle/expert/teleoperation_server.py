@@ -17,6 +17,7 @@ from smach_oracle.srv import Snapshot
 from ..oracle.errors import ConfigError
 from ..ros.command_line import parameters_only
 from ..ros.master_watch import start_master_watch
+from ..ros.userdata_codec import UserdataCodecError, decode_all
 from .command_inbox import Arrived, CommandInbox
 from .dead_man import DeadMan
 from .hand import Hand
@@ -43,8 +44,10 @@ class TeleoperationServer:
         self._hands = hands
         self._surroundings = surroundings
         self._arm = next(iter(hands))  # the one moved last
-        # in lock-step nothing moves between commands; a slow sender must not change what its commands do
-        self._dead_man = DeadMan(float('inf') if settings.lock_step else settings.watchdog_s)
+        # in lock-step nothing moves between commands; a slow sender must not change what its commands do, but one that
+        # is dead does not keep the others out
+        self._dead_man = (DeadMan(float('inf'), settings.lease_s) if settings.lock_step
+                          else DeadMan(settings.watchdog_s))
         self._held: Optional[TeleopCommand] = None
         self._commands = CommandInbox()
         self._told_s, self._told_query = 0.0, ''
@@ -74,10 +77,19 @@ class TeleoperationServer:
 
     def _begun(self, goal: SharedAutonomyGoal) -> None:
         self._seq, self._sender, self._refused, self._step = 0, '', '', standing()
-        self._arm = self._settings.arm_of(goal.state, self._arm)
+        self._arm = self._settings.arm_of(goal.state, self._named(goal), self._arm)
         self._unsure = True
         for hand in self._hands.values():
             hand.forget()
+
+    def _named(self, goal: SharedAutonomyGoal) -> Dict[str, Any]:
+        """The input userdata that may name an arm."""
+        items = [item for item in goal.userdata if item.key in self._settings.arm_keys]
+        try:
+            return decode_all(items, skip_unsent=True)
+        except UserdataCodecError as err:
+            rospy.logwarn('%s: which arm is meant cannot be read: %s', rospy.get_name(), err)
+            return {}
 
     def _ended(self) -> None:
         self._dead_man.drop(time.monotonic())
@@ -247,8 +259,9 @@ class TeleoperationServer:
         hand = self._hands[self._arm]
         self._told_s, self._told_query = time.monotonic(), self._query()
         state = TeleopState(query_id=self._told_query, arm=self._arm, seq=self._seq, sender=self._sender,
-                            operator=self._driver(), refused=self._refused,
-                            moving=bool(self._step.velocities.any()), speed=self._step.speed,
+                            operator='' if self._dead_man.lapsed(self._told_s) else self._driver(),
+                            refused=self._refused, moving=bool(self._step.velocities.any()),
+                            speed=self._step.speed,
                             limit=self._step.limit or hand.gripper.report.problem, clearance=self._step.clearance,
                             gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled,
                             gripper_moving=hand.gripper.moving)

@@ -1,4 +1,5 @@
 """The settings of the manipulation interface, from its node's parameters."""
+import re
 import time
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -26,9 +27,11 @@ class TeleoperationSettings(NamedTuple):
     base: str
     limits: DriveLimits
     states: Dict[str, Dict[str, Any]]
+    arm_keys: List[str]  # of input userdata whose value names an arm
     success: List[str]
     rate_hz: float
     watchdog_s: float
+    lease_s: float
     lead: float
     gripper_effort: float
     lock_step: bool
@@ -46,9 +49,10 @@ class TeleoperationSettings(NamedTuple):
             raise ConfigError(rospy.resolve_name('~arms'), arms, 'one arm or more; see manipulation_interface.yaml')
         names = {name: ArmNames.parse('~arms/' + name, value) for name, value in arms.items()}
         states = {state: _state(state, value, names) for state, value in mapping_of('~states').items()}
-        return cls(names, name_of('~base_frame', 'base_footprint'), _limits(), states,
+        return cls(names, name_of('~base_frame', 'base_footprint'), _limits(), states, names_of('~arm_keys', ['arm']),
                    names_of('~success', ['succeeded']), number_of('~rate_hz', 60.0, 30.0, 500.0),
-                   number_of('~watchdog_s', 0.06, 0.01, 0.5), number_of('~lead', 0.12, 0.01, 1.0),
+                   number_of('~watchdog_s', 0.06, 0.01, 0.5), number_of('~lease_s', 3.0, 0.5, 60.0),
+                   number_of('~lead', 0.12, 0.01, 1.0),
                    number_of('~gripper_effort', 60.0, 1.0, 500.0), flag_of('~lock_step', False),
                    name_of('~snapshot', NO_SNAPSHOT), flag_of('~clearance', True))
 
@@ -62,8 +66,13 @@ class TeleoperationSettings(NamedTuple):
         outputs: Mapping[str, str] = self.states.get(state, {}).get('outputs', {})
         return outputs
 
-    def arm_of(self, state: str, otherwise: str) -> str:
-        """The arm that does the state's work."""
+    def arm_of(self, state: str, userdata: Mapping[str, Any], otherwise: str) -> str:
+        """The arm that does the state's work: the one that its userdata names, else the one that is set for it."""
+        for key in self.arm_keys:
+            words = re.split('[^a-z0-9]+', str(userdata.get(key, '')).lower())  # of 'right_arm', too
+            named = [arm for arm in self.arms if arm.lower() in words]
+            if len(named) == 1:
+                return named[0]
         arm: str = self.states.get(state, {}).get('arm', otherwise)
         return arm
 

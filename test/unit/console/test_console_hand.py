@@ -12,7 +12,7 @@ from smach_oracle.expert.console.commands import BadCommand, parse
 from smach_oracle.expert.console.wheel import LATE_S, SILENT_S, Drive, Freshness, Wheel, along
 
 DRIVE = {'do': 'drive', 'question': 'q', 'held': True, 'frame': 'tool', 'linear': [1, 0, -0.5], 'angular': [0, 0, 0],
-         'gripper': '', 'sent': 12.5}
+         'gripper': '', 'sent': 12.5, 'arm': 'right'}
 
 
 def text(**fields):
@@ -21,14 +21,14 @@ def text(**fields):
 
 def test_a_driving_command_is_taken_apart():
     said = parse(text(**DRIVE)).arguments
-    assert (said['held'], said['linear'], said['sent']) == (True, (1.0, 0.0, -0.5), 12.5)
+    assert (said['held'], said['linear'], said['sent'], said['arm']) == (True, (1.0, 0.0, -0.5), 12.5, 'right')
 
 
 @pytest.mark.parametrize('wrong', [
     {'held': 1}, {'held': 'true'}, {'held': None}, {'frame': 'map'}, {'frame': 'base_footprint'}, {'frame': ['tool']},
     {'linear': [2, 0, 0]}, {'linear': [0, 0]}, {'linear': [0, 0, 0, 0]}, {'linear': [True, 0, 0]},
     {'linear': ['1', 0, 0]}, {'linear': {'x': 1}}, {'linear': None}, {'angular': [0, 0, -1.01]}, {'gripper': 0.05},
-    {'gripper': 'crush'}, {'sent': -1}, {'sent': '0'}, {'sent': 1e13}, {'arm': 'right'}, {'operator': 'bob'},
+    {'gripper': 'crush'}, {'sent': -1}, {'sent': '0'}, {'sent': 1e13}, {'arm': 3}, {'arm': 'x' * 101}, {'operator': 'bob'},
     {'topic': '/cmd_vel'}, {'gripper_effort': 500}])
 def test_anything_else_is_refused(wrong):
     with pytest.raises(BadCommand):

@@ -68,3 +68,14 @@ def test_who_presses_before_there_is_anything_to_hold_it_for_does_not_hold_what_
     in_steps = DeadMan(float('inf'))
     in_steps.press_for_nothing('ann', 1.0)
     assert in_steps.press('ann', 1.1) == '', 'where silence says nothing'
+
+
+def test_without_a_watchdog_it_is_a_lease_that_commands_renew():
+    handle = DeadMan(float('inf'), lease_s=3.0)
+    handle.press('ann', 1.0)
+    handle.press('ann', 3.0)
+    assert handle.press('bob', 5.9) == 'ann drives; one at a time' and not handle.lapsed(5.9)
+    assert handle.lapsed(6.0) and handle.holder(100.0) == 'ann', 'she was slow, and nobody has relieved her'
+    assert handle.press('ann', 100.0) == '' and 'ann drives' in handle.press('bob', 101.0)
+    assert handle.press('bob', 103.1) == '' and handle.holder(103.1) == 'bob'
+    assert handle.press('ann', 104.0) == 'bob drives; one at a time'

@@ -25,8 +25,17 @@ def test_what_is_not_given_has_its_default(read):
     assert settings.limits.linear == 0.1 and settings.limits.angular == 1.0
     assert settings.limits.workspace == ((-1.0, -1.0, 0.0), (1.0, 1.0, 2.0))
     assert settings.watchdog_s == 0.06 and settings.period_s == pytest.approx(1 / 60) and not settings.lock_step
-    assert settings.arm_of('PICK', 'left') == 'right' and settings.arm_of('OTHER', 'left') == 'left'
+    assert settings.arm_of('PICK', {}, 'left') == 'right' and settings.arm_of('OTHER', {}, 'left') == 'left'
     assert settings.outputs_of('PICK') == {}
+
+
+@pytest.mark.parametrize('userdata, arm', [
+    ({'arm': 'left'}, 'left'), ({'arm': 'LEFT_ARM'}, 'left'), ({'arm': 'upright'}, 'right'), ({'arm': 7}, 'right'),
+    ({'arm': 'left or right'}, 'right'), ({'hand': 'left'}, 'right'), ({'side': 'left'}, 'left'),
+    ({'arm': None, 'side': 'left'}, 'left')])
+def test_the_arm_is_the_one_that_the_userdata_names_else_the_state_s(read, userdata, arm):
+    settings = read(arms=dict(ARMS, left=ARMS['right']), states={'PICK': {'arm': 'right'}}, arm_keys=['arm', 'side'])
+    assert settings.arm_of('PICK', userdata, 'left') == arm
 
 
 @pytest.mark.parametrize('given, says', [
@@ -34,7 +43,7 @@ def test_what_is_not_given_has_its_default(read):
     ({'states': ['PICK']}, 'states'), ({'arms': {'right': {'base': 'torso'}}}, 'arms/right'),
     ({'arms': {'right': dict(ARMS['right'], tool='')}}, 'arms/right.tool'),
     ({'arms': {'right': dict(ARMS['right'], posture=[0.0, math.nan])}}, 'posture'),
-    ({'rate_hz': 10}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'), ({'watchdog_s': 3.0}, 'watchdog_s'),
+    ({'arm_keys': 'arm'}, 'arm_keys'), ({'lease_s': 0.0}, 'lease_s'), ({'rate_hz': 10}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'), ({'watchdog_s': 3.0}, 'watchdog_s'),
     ({'lead': True}, 'lead'), ({'lock_step': 'yes'}, 'lock_step'), ({'success': 'succeeded'}, 'success'),
     ({'limits': {'speed': 1.0}}, 'limits/speed'), ({'limits': {'linear': 0.0}}, 'limits/linear'),
     ({'limits': {'joint_share': 0.0}}, 'limits/joint_share'), ({'limits': {'angular': 0}}, 'limits/angular'),

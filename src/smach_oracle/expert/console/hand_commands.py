@@ -2,7 +2,7 @@
 import math
 from typing import Any, Dict, Tuple
 
-from .checks import QUESTION, Spec, one_of, shown
+from .checks import QUESTION, Spec, one_of, shown, text
 
 FRAMES = ('tool', 'base', 'camera')
 GRIPPER = ('', 'open', 'close')
@@ -35,7 +35,8 @@ def _milliseconds(value: Any) -> float:
 HAND_COMMANDS: Dict[str, Spec] = {
     'take_wheel': Spec('teleoperator', QUESTION),
     'leave_wheel': Spec('teleoperator', QUESTION),
-    # forward, left, up; and turns about these: shares of the interface's own limits. sent: the page's clock
+    # forward, left, up; and turns about these: shares of the interface's own limits. sent: the page's clock.
+    # arm: one of the interface's own, which are checked there; '': the one that it has chosen for the state
     'drive': Spec('teleoperator', dict(QUESTION, held=_flag, frame=one_of(FRAMES), linear=_axes, angular=_axes,
-                                       gripper=one_of(GRIPPER), sent=_milliseconds)),
+                                       gripper=one_of(GRIPPER), sent=_milliseconds, arm=text(100))),
 }

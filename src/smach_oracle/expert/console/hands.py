@@ -15,6 +15,7 @@ from smach_oracle.msg import SharedAutonomyActionResult, TeleopCommand, TeleopSt
 from ..followed_server import Listed
 from ..front_end import FrontEnd
 from .audit import Audit, Person
+from .checks import shown
 from .commands import Command
 from .desk import Reply
 from .interface_outputs import InterfaceOutputs
@@ -26,6 +27,7 @@ LOOK_PERIOD_S = 0.5
 DRAW_PERIOD_S = 0.1
 NOT_RUNNING = 'No manipulation interface runs for this question.'
 TAKE_FIRST = 'Take the wheel first.'
+STILL = {'frame': 'base', 'linear': (0, 0, 0), 'angular': (0, 0, 0), 'gripper': '', 'arm': ''}
 
 
 class Hand:
@@ -49,26 +51,35 @@ class Hand:
         self.state = state
 
     @property
-    def frames(self) -> Dict[str, str]:
+    def arms(self) -> List[str]:
+        """Their names."""
+        return sorted(self._tools)
+
+    @property
+    def arm(self) -> str:
+        """The one that the interface has chosen for the state, or moved last; '' before it has said so."""
+        return self.state.arm if self.state is not None else ''
+
+    def frames(self, arm: str) -> Dict[str, str]:
         """The links by which a page may name a frame; those that are not known are left out."""
-        tool = self._tools.get(self.state.arm, '') if self.state is not None else ''
-        frames = {'tool': tool, 'base': self._base, 'camera': self._camera}
+        frames = {'tool': self._tools.get(arm, ''), 'base': self._base, 'camera': self._camera}
         return {name: frame for name, frame in frames.items() if frame}
 
     def send(self, operator: str, said: Dict[str, Any], held: bool) -> None:
         """One command, along the axes of the frame named."""
-        frame = self.frames.get(said['frame'], self._base)
+        arm = said['arm'] or self.arm
+        frame = self.frames(arm).get(said['frame'], self._base)
         self._seq += 1
         self._publisher.publish(TeleopCommand(
             header=Header(frame_id=frame, stamp=rospy.Time.now()), operator=operator, seq=self._seq,
-            arm=self.state.arm if self.state is not None else '', dead_man=held,
+            arm=arm, dead_man=held,
             twist=Twist(Vector3(*along(said['frame'], said['linear'], self._linear)),
                         Vector3(*along(said['frame'], said['angular'], self._angular))),
             move_gripper=held and bool(said['gripper']), gripper=self._open if said['gripper'] == 'open' else 0.0))
 
     def release(self, operator: str) -> None:
         """Stop now."""
-        self.send(operator, {'frame': 'base', 'linear': (0, 0, 0), 'angular': (0, 0, 0), 'gripper': ''}, False)
+        self.send(operator, STILL, False)
 
     def stop(self) -> None:
         """Take the topics down."""
@@ -112,6 +123,9 @@ class Hands:
             drive = hand.wheel.drive
             if drive is None or drive.browser != browser:
                 return Reply(False, TAKE_FIRST)
+            if said['arm'] and said['arm'] not in hand.arms:
+                hand.release(_operator(drive))
+                return Reply(False, 'unknown arm {}; allowed: {}'.format(shown(said['arm']), ', '.join(hand.arms)))
             was_held = hand.wheel.held
             if hand.wheel.hear(said['sent'] / 1e3, said['held'], time.monotonic()):
                 hand.send(_operator(drive), said, True)
@@ -189,8 +203,8 @@ def _operator(drive: Drive) -> str:
 
 def _view(hand: Hand) -> Dict[str, Any]:
     state, drive = hand.state, hand.wheel.drive
-    view: Dict[str, Any] = {'frames': sorted(hand.frames), 'wheel': drive.browser if drive else None,
-                            'driver': drive.person.expert if drive else ''}
+    view: Dict[str, Any] = {'frames': sorted(hand.frames(hand.arm)), 'arms': hand.arms,
+                            'wheel': drive.browser if drive else None, 'driver': drive.person.expert if drive else ''}
     if state is not None:
         at, way = state.tool_pose.position, state.achieved.linear
         view['state'] = {

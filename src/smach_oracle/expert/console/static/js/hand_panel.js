@@ -17,6 +17,8 @@ export class HandPanel {
     this.input = new DriveInput((held) => this.changed(held));
     this.sentMs = 0;
     this.frame = remembered('drive frame', 'tool');
+    this.arm = ''; // the one that the interface has chosen, until the person chooses
+    this.arms = h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm' });
     this.wheelButton = h('button', { class: 'primary wheel', onclick: () => this.turn() });
     this.driver = h('span', { class: 'dim driver', role: 'status' });
     this.problem = h('p', { class: 'problem', role: 'alert' });
@@ -40,7 +42,7 @@ export class HandPanel {
       h('div', { class: 'hand-head' }, h('h3', {}, 'Drive the hand for ', this.question.state), this.driver, h('span', { class: 'spacer' }), this.wheelButton),
       this.problem,
       h('div', { class: 'hand-body' }, h('div', { class: 'hand-see' }, this.light, this.camera, this.facts),
-        h('div', { class: 'hand-controls' }, h('div', { class: 'row wrap' }, h('span', { class: 'dim' }, 'Along the axes of the'), [...this.frames.values()]),
+        h('div', { class: 'hand-controls' }, this.arms, h('div', { class: 'row wrap' }, h('span', { class: 'dim' }, 'Along the axes of the'), [...this.frames.values()]),
           h('label', { class: 'row' }, h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
           h('h4', {}, TITLES.linear), group('linear'), h('h4', {}, TITLES.angular), group('angular'),
           h('h4', {}, 'Gripper'), h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' }, this.pads.get('open'), this.pads.get('close')),
@@ -89,6 +91,25 @@ export class HandPanel {
     for (const [name, button] of this.frames) button.setAttribute('aria-pressed', name === frame);
   }
 
+  chooseArm(arm) {
+    this.input.releaseAll();
+    this.arm = arm;
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+    this.update();
+  }
+
+  // Where the interface offers several: the one that moves, and the others to change to.
+  showArms(view) {
+    const arms = view.arms || [];
+    if (this.arm && !arms.includes(this.arm)) this.arm = '';
+    const now = this.arm || (view.state ? view.state.arm : '');
+    const key = JSON.stringify([arms, now]);
+    if (key === this.armsKey) return;
+    this.armsKey = key;
+    this.arms.hidden = arms.length < 2;
+    replace(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { class: 'tool', 'data-arm': arm, 'aria-pressed': arm === now, onclick: () => this.chooseArm(arm) }, arm)));
+  }
+
   showScale() {
     setText(this.scaleText, this.scale.value + ' %');
     remember('drive speed', this.scale.value);
@@ -116,7 +137,7 @@ export class HandPanel {
 
   send(wish) {
     this.sentMs = performance.now();
-    this.app.link.tell('drive', { question: this.question.key, frame: this.frame, sent: this.sentMs, ...wish }, wish.held);
+    this.app.link.tell('drive', { question: this.question.key, frame: this.frame, arm: this.arm, sent: this.sentMs, ...wish }, wish.held);
   }
 
   showHeld(wish) {
@@ -137,6 +158,7 @@ export class HandPanel {
     for (const button of this.pads.values()) button.disabled = !mine;
     for (const [name, button] of this.frames) button.hidden = !view.frames.includes(name);
     if (view.frames.length && !view.frames.includes(this.frame)) this.choose(view.frames[0]);
+    this.showArms(view);
     this.showState(view.state);
     this.showCamera();
   }
@@ -148,7 +170,7 @@ export class HandPanel {
     const facts = state ? [['Speed', (state.speed === null ? '–' : Math.round(1000 * state.speed) + ' mm/s') + (state.moving && state.share !== null ? ', ' + Math.round(100 * state.share) + ' % of what is asked' : '')],
       ['Clearance', state.clearance === null ? 'nothing near' : (100 * state.clearance).toFixed(1) + ' cm'],
       ['Gripper', state.gripper === null ? 'not moved yet' : (1000 * state.gripper).toFixed(0) + ' mm' + (state.stalled ? ', holds something' : '')],
-      ['Tool at', state.at.map((value, axis) => 'xyz'[axis] + ' ' + (value === null ? '–' : value.toFixed(3))).join('  ')]] : [];
+      ['Tool at', (this.view.arms.length > 1 ? state.arm + ': ' : '') + state.at.map((value, axis) => 'xyz'[axis] + ' ' + (value === null ? '–' : value.toFixed(3))).join('  ')]] : [];
     const key = JSON.stringify(facts);
     if (key === this.factsKey) return;
     this.factsKey = key;
