@@ -1,5 +1,5 @@
 """Where the refrigerator's door stands, from what the camera sees: its angle, and its handle where it is in view."""
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def find_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> D
     angle, offset, count = _best_angle(points, kitchen, inverse(base_from_fridge)[:3, 3])
     if count < LEAST_POINTS:
         raise DoorNotSeen('no face of the door in view: {} points on the best one'.format(count))
-    along = _handle_shift(points, kitchen, angle, offset)
+    along = _handle_shift(apply(inverse(door_frame(kitchen, angle)), points), kitchen, offset)
     fridge_from_door = door_frame(kitchen, angle)
     shift = fridge_from_door[:3, :3] @ np.array([offset, along or 0.0, 0.0])
     return DoorView(angle, base_from_fridge @ from_rpy(shift), along is not None)
@@ -59,8 +59,11 @@ def _points_of_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray
     return points[level & near & (points[:, 0] < 0.5 * SLACK)]
 
 
-def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> 'tuple':
-    """The door's angle, how far its plane lies outside of where the map has it (m), and the points on it."""
+def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[float, float, int]:
+    """The door's angle, how far its plane lies outside of where the map has it (m), and the points on it.
+
+    The outer face is known by its handle: edges of shelves and walls make planes, too.
+    """
     best = (0.0, 0.0, 0)
     for angle in np.arange(0.0, MOST_OPEN, STEP):
         door_from_fridge = inverse(door_frame(kitchen, angle))
@@ -72,15 +75,17 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> 'tuple
         counts, edges = np.histogram(offsets, bins=np.arange(-SLACK, SLACK + BIN, BIN))
         pairs = counts[:-1] + counts[1:]
         peak = int(np.argmax(pairs))
-        if pairs[peak] > best[2]:
-            inside = offsets[(offsets >= edges[peak]) & (offsets < edges[peak + 2])]
+        inside = offsets[(offsets >= edges[peak]) & (offsets < edges[peak + 2])]
+        if pairs[peak] > best[2] and not (face and _handle_shift(local, kitchen, float(np.median(inside))) is None):
             best = (float(angle), float(np.median(inside)), int(pairs[peak]))
     return best
 
 
-def _handle_shift(points: np.ndarray, kitchen: Kitchen, angle: float, offset: float) -> Optional[float]:
-    """How much farther from the hinge than the map says the handle is seen, m; None where it is not seen."""
-    local = apply(inverse(door_frame(kitchen, angle)), points)
+def _handle_shift(local: np.ndarray, kitchen: Kitchen, offset: float) -> Optional[float]:
+    """How much farther from the hinge than the map says the handle is seen, m; None where it is not seen.
+
+    :param local: (n, 3) points in the door's frame.
+    """
     out = local[:, 0] - offset - kitchen.door_thickness
     place = kitchen.width - kitchen.handle_inset
     near = (np.abs(out - kitchen.handle_stand_off) < 0.025) & (np.abs(local[:, 1] - place) < SLACK)
