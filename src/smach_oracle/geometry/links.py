@@ -19,7 +19,7 @@ def link_pose(joints: Dict[str, Joint], root: str, link: str, positions: Mapping
     """
     result = np.eye(4)
     for joint in _upwards(joints, root, link):
-        result = joint.origin @ _moved(joint, positions.get(joint.name, 0.0)) @ result
+        result = joint.origin @ motion_of(joint, positions.get(joint.name, 0.0)) @ result
     return result
 
 
@@ -42,7 +42,8 @@ def _upwards(joints: Dict[str, Joint], root: str, link: str) -> Iterator[Joint]:
         at = joint.parent
 
 
-def _moved(joint: Joint, position: float) -> np.ndarray:
+def motion_of(joint: Joint, position: float) -> np.ndarray:
+    """4x4: the joint's frame at zero from that at a position (rad or m)."""
     if joint.kind == 'prismatic':
         return transform(joint.axis * position)
     if joint.kind in _MOVING:
