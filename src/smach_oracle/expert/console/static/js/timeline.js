@@ -10,10 +10,53 @@ const MARKS = { failure: 'bad', decision: 'oracle', jump: 'oracle', supersede: '
   precondition_start: 'oracle', precondition_end: 'oracle', preempt: 'warn' };
 
 export class Timeline {
-  constructor(onPick) {
-    this.onPick = onPick;
-    this.root = h('div', { class: 'timeline' });
+  // `onPick(seq)`: an event was chosen; `onSeek(t)`: a time; `onKey(event)`: a key while the cursor has the focus
+  constructor({ onPick, onSeek, onKey }) {
+    Object.assign(this, { onPick, onSeek });
+    this.canvas = h('div', { class: 'timeline-canvas' });
+    this.handle = h('div', { class: 'cursor-handle' });
+    this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0', 'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey }, this.handle);
+    this.cursor = h('div', { class: 'cursor-line' });
+    this.root = h('div', { class: 'timeline' }, this.canvas, this.cursor, this.slider);
+    for (const element of [this.slider, this.canvas]) this.listen(element);
     new ResizeObserver(() => this.draw()).observe(this.root);
+  }
+
+  // Press and drag, by mouse, pen or finger; up and down still scrolls the page.
+  listen(element) {
+    let dragged = -1;
+    const seek = (event) => {
+      if (!this.scale) return;
+      const { left, right, begin, whole } = this.scale;
+      const box = this.root.getBoundingClientRect();
+      const share = (event.clientX - box.left - left) / (right - left);
+      this.onSeek(begin + whole * Math.min(1, Math.max(0, share)));
+    };
+    element.addEventListener('pointerdown', (event) => {
+      if (event.button || event.target.classList.contains('mark') || event.clientX - this.root.getBoundingClientRect().left < (this.scale || { left: 0 }).left - 12) return;
+      dragged = event.pointerId;
+      element.setPointerCapture(dragged);
+      this.slider.focus({ preventScroll: true });
+      event.preventDefault();
+      seek(event);
+    });
+    element.addEventListener('pointermove', (event) => { if (event.pointerId === dragged) seek(event); });
+    for (const name of ['pointerup', 'pointercancel']) element.addEventListener(name, () => { dragged = -1; });
+  }
+
+  // The cursor to a time; `words`: what is there.
+  place(t, words) {
+    this.t = t;
+    this.wordsThere = words;
+    if (!this.scale) return;
+    const { left, right, begin, whole } = this.scale;
+    const share = Math.min(1, Math.max(0, (t - begin) / whole));
+    const at = left + (right - left) * share;
+    this.handle.style.setProperty('--at', at + 'px');
+    this.cursor.style.setProperty('--at', at + 'px');
+    this.slider.setAttribute('aria-valuemax', whole.toFixed(2));
+    this.slider.setAttribute('aria-valuenow', (whole * share).toFixed(2));
+    this.slider.setAttribute('aria-valuetext', words);
   }
 
   set(events, end) {
@@ -30,17 +73,21 @@ export class Timeline {
   draw() {
     const width = this.root.clientWidth;
     if (!this.events || !this.events.length || width < 50) {
-      replace(this.root, h('p', { class: 'empty' }, 'No events.'));
+      replace(this.canvas, h('p', { class: 'empty' }, 'No events.'));
+      this.scale = null;
+      this.slider.hidden = this.cursor.hidden = true;
       return;
     }
     const { lanes, bars } = spans(this.events, this.end);
     const name = Math.min(NAME, width * 0.3);
     const begin = this.events[0].t;
     const whole = Math.max(this.end - begin, 0.001);
+    this.scale = { left: name, right: width - 14, begin, whole };
+    this.slider.hidden = this.cursor.hidden = false;
     const x = (t) => name + (width - name - 14) * Math.min(1, Math.max(0, (t - begin) / whole));
     const height = TOP + lanes.length * LANE + 6;
     const y = (lane) => TOP + lanes.indexOf(lane) * LANE;
-    replace(this.root, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
+    replace(this.canvas, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
       ticks(whole).map((tick) => [s('line', { class: 'tick', x1: x(begin + tick), x2: x(begin + tick), y1: TOP - 6, y2: height }),
         s('text', { class: 'tick-text', x: x(begin + tick), y: 14 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))]),
       lanes.map((lane) => s('text', { class: 'lane', x: 0, y: y(lane) + 16 }, short(lane, name), s('title', {}, lane))),
@@ -49,6 +96,7 @@ export class Timeline {
       this.events.filter((event) => MARKS[event.kind]).map((event) => s('circle', {
         class: 'mark ' + MARKS[event.kind] + (event.seq === this.picked ? ' picked' : ''), cx: x(event.t), cy: y(laneOf(event)) + LANE / 2, r: 4.5,
         'data-seq': event.seq, onclick: () => this.onPick(event.seq) }, s('title', {}, event.words)))));
+    if (this.t !== undefined) this.place(this.t, this.wordsThere);
   }
 }
 

@@ -1,12 +1,14 @@
-// Trials: the counts of the paper's Table I, the list, and one trial on its time axis.
+// Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be replayed.
 import { h, replace, setText } from './dom.js';
 import { chip, clock, duration, percent } from './format.js';
-import { Timeline } from './timeline.js';
+import { Recorded } from './recorded.js';
+import { Replay } from './replay.js';
 
 export const trials = { id: 'trials', title: 'Trials', create: (app) => new Trials(app) };
 
 const SHOWN_EVENTS = 600;
-const ENDINGS = { success: 'good', failure: 'bad', preempted: 'warn', '': 'accent' };
+const ENDINGS = { success: 'good', failure: 'bad', preempted: 'warn', unfinished: 'warn', '': 'accent' };
+const COLUMNS = ['Experiment', 'Arm', 'Runs', 'Failures', 'Oracle recoveries', 'Questions', 'Expert interventions', 'Ended in failure'];
 
 class Trials {
   constructor(app) {
@@ -14,119 +16,179 @@ class Trials {
     this.chosen = '';
     this.events = [];
     this.table = h('div', { class: 'table-frame card' });
-    this.list = h('div', { class: 'trial-list' });
-    this.timeline = new Timeline((seq) => this.pick(seq));
+    this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
+    this.replay = new Replay((event) => this.mark(event.seq));
+    this.recorded = new Recorded(app, () => this.showRecorded());
     this.title = h('h2', {});
     this.facts = h('p', { class: 'dim' });
-    this.log = h('ol', { class: 'event-log' });
-    this.detail = h('section', { class: 'card trial-detail' }, this.title, this.facts, this.timeline.root, this.log);
-    this.body = [this.table, h('div', { class: 'trial-body' }, this.list, this.detail)];
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.log = h('ol', { class: 'event-log', 'aria-label': 'Events, newest first' });
+    this.detail = h('section', { class: 'card trial-detail' }, h('div', {}, this.title, this.facts, this.problem), this.replay.root);
+    this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log));
+    this.body = [this.table, this.recorded.root, h('div', { class: 'trial-body' }, this.list, this.detail)];
     this.empty = h('p', { class: 'empty' }, 'No trials yet. They appear as robots run; of what happened before this console was started, the bags tell.');
     this.root = h('div', { class: 'panel trials' }, this.empty);
     app.store.onEvents((message) => this.take(message));
   }
 
-  shown() { this.update(['trials']); }
+  shown() { this.update(['trials', 'bags']); }
 
-  connected() { if (this.chosen) this.watch(this.chosen); }
+  connected() { if (this.chosen && !this.bag) this.watch(this.chosen); }
 
   choose(id) {
     this.follows = false;
-    this.watch(id);
+    const trial = this.find(id);
+    if (trial && trial.number !== undefined) this.watchRecorded(trial);
+    else this.watch(id);
     this.update(['trials']);
+  }
+
+  begin(id, bag) {
+    this.chosen = id;
+    this.bag = bag;
+    this.events = [];
+    this.logged = 0;
+    setText(this.problem, '');
+    replace(this.log);
   }
 
   // Ask for the events of a trial; they come from the first on, and then as they happen.
   watch(id) {
-    this.chosen = id;
-    this.events = [];
-    this.logged = 0;
-    replace(this.log);
+    this.begin(id, null);
     this.app.link.request('watch', { trial: id }).catch(() => {});
   }
 
+  watchRecorded(trial) {
+    this.begin(trial.id, trial);
+    this.recorded.open(trial.number);
+  }
+
+  showRecorded() {
+    const { opened, problem } = this.recorded;
+    setText(this.problem, this.bag ? problem : '');
+    if (!this.bag || !opened || opened.number !== this.bag.number) return;
+    this.events = opened.events;
+    this.showEvents();
+  }
+
   take(message) {
-    if (message.trial !== this.chosen || message.from > this.events.length) return;
+    if (this.bag || message.trial !== this.chosen || message.from > this.events.length) return;
     this.events = this.events.slice(0, message.from).concat(message.events);
     this.showEvents();
   }
 
+  // Those that this console has heard of, then those in bags that it has not, newest first.
+  get all() {
+    const live = (this.app.store.get('trials') || { trials: [] }).trials;
+    const heard = new Set(live.map((trial) => trial.id));
+    return live.concat(this.recorded.trials.filter((trial) => !heard.has(trial.id)));
+  }
+
+  find(id) { return this.all.find((trial) => trial.id === id); }
+
   update(names) {
-    if (!names.includes('trials')) return;
-    const data = this.app.store.get('trials');
-    if (!data || !data.trials.length) {
+    if (names.some((name) => name.startsWith('graph ')) && !this.bag && this.app.current === 'trials') this.replay.redraw();
+    if (!names.includes('trials') && !names.includes('bags')) return;
+    this.recorded.update();
+    const all = this.all;
+    if (!all.length && !this.recorded.says) {
       replace(this.root, this.empty);
       return;
     }
     if (!this.root.contains(this.list)) replace(this.root, this.body);
-    if (this.app.current === 'trials') {
-      const known = data.trials.some((trial) => trial.id === this.chosen);
-      if (!known || (this.follows !== false && data.trials[0].id !== this.chosen)) {
+    if (this.app.current === 'trials' && all.length) {
+      const newest = all[0];
+      if (!all.some((trial) => trial.id === this.chosen) || (this.follows !== false && newest.number === undefined && newest.id !== this.chosen)) {
         this.follows = true;
-        this.watch(data.trials[0].id);
+        if (newest.number === undefined) this.watch(newest.id);
+        else this.watchRecorded(newest);
       }
     }
-    this.showTable(data.table);
-    this.showList(data.trials);
-    this.showFacts(data.trials.find((trial) => trial.id === this.chosen));
+    this.showTable();
+    this.showList(all);
+    this.showFacts(all.find((trial) => trial.id === this.chosen));
   }
 
-  showTable(table) {
-    const key = JSON.stringify(table);
+  showTable() {
+    const live = (this.app.store.get('trials') || {}).table || [];
+    const bags = this.recorded.table;
+    const key = JSON.stringify([live, bags]);
     if (key === this.tableKey) return;
     this.tableKey = key;
-    this.table.hidden = !table.length;
-    const share = (count, runs) => h('td', { class: 'number' }, count.trials, h('span', { class: 'dim' }, ' ' + percent(count.trials / runs)));
-    replace(this.table, h('table', {}, h('caption', {}, 'Trials that ended while this console watched: in how many each happened at least once'),
-      h('thead', {}, h('tr', {}, ['Experiment', 'Arm', 'Runs', 'Failures', 'Oracle recoveries', 'Questions', 'Expert interventions', 'Ended in failure'].map((title) => h('th', { scope: 'col' }, title)))),
-      h('tbody', {}, table.map((row) => h('tr', {}, h('th', { scope: 'row' }, row.experiment), h('td', {}, row.oracle ? 'with oracle' : 'without oracle'), h('td', { class: 'number' }, row.runs),
-        share(row.counts.failures, row.runs), share(row.counts.recoveries, row.runs), share(row.counts.questions, row.runs), share(row.counts.answered, row.runs),
-        share({ trials: row.endings.failure }, row.runs))))));
+    this.table.hidden = !live.length && !bags.length;
+    replace(this.table, live.length > 0 && counted('Trials that ended while this console watched: in how many each happened at least once', live),
+      bags.length > 0 && counted('Trials in the bags: in how many each happened at least once', bags));
   }
 
   showList(all) {
     const key = JSON.stringify([all, this.chosen]);
     if (key === this.listKey) return;
     this.listKey = key;
-    replace(this.list, all.map((trial) => h('button', { class: 'trial', 'aria-current': trial.id === this.chosen, onclick: () => this.choose(trial.id), 'data-trial': trial.id },
-      h('span', { class: 'row' }, h('strong', {}, trial.experiment), h('span', { class: 'spacer' }), chip(trial.outcome || trial.ending || 'running', ENDINGS[trial.ending])),
-      h('span', { class: 'row dim' }, trial.robot, h('span', { class: 'spacer' }), clock(trial.start)),
-      h('span', { class: 'dim' }, summary(trial)))));
+    const focused = document.activeElement && document.activeElement.dataset.trial;
+    const row = (trial) => h('button', { class: 'trial', 'aria-current': trial.id === this.chosen, onclick: () => this.choose(trial.id), 'data-trial': trial.id, 'data-number': trial.number },
+      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, trial.experiment), h('span', { class: 'spacer' }), chip(trial.outcome || trial.ending || 'running', ENDINGS[trial.ending])),
+      h('span', { class: 'row dim' }, h('span', { class: 'ellipsis' }, trial.robot), h('span', { class: 'spacer' }), clock(trial.start)),
+      h('span', { class: 'dim' }, summary(trial)));
+    const old = all.filter((trial) => trial.number !== undefined);
+    const live = all.filter((trial) => trial.number === undefined);
+    let day = '';
+    replace(this.list, live.map(row), old.map((trial) => {
+      const date = new Date(trial.start * 1000).toLocaleDateString();
+      const heading = date !== day && h('h4', { class: 'trial-day' }, 'Bags of ', date);
+      day = date;
+      return [heading, row(trial)];
+    }));
+    const again = focused && [...this.list.children].find((each) => each.dataset.trial === focused);
+    if (again) again.focus();
   }
 
   showFacts(trial) {
     if (!trial) return;
     this.trial = trial;
     setText(this.title, trial.experiment + ' · ' + clock(trial.start));
-    setText(this.facts, summary(trial) + (trial.lost ? ' · ' + trial.lost + ' events missing' : '') + (trial.detailed ? '' : ' · its events are no longer kept'));
+    setText(this.facts, summary(trial) + (trial.lost ? ' · ' + trial.lost + ' events missing' : '') + (trial.detailed ? '' : ' · its events are no longer kept') + (trial.bag ? ' · ' + trial.bag : ''));
     this.showEvents();
   }
 
   showEvents() {
-    if (!this.trial || this.trial.id !== this.chosen || !this.events.length) return;
+    if (!this.trial || this.trial.id !== this.chosen || this.app.current !== 'trials') return;
+    this.replay.root.hidden = !this.events.length;
+    if (!this.events.length) return;
     const last = this.events[this.events.length - 1].t;
-    this.timeline.set(this.events, this.trial.ending || this.trial.outcome ? last : Math.max(last, this.app.store.now()));
+    const running = !this.bag && !this.trial.ending && !this.trial.outcome;
     const begin = this.events[0].t;
     const fresh = this.events.slice(this.logged);
     this.logged = this.events.length;
     for (const event of fresh) {
-      this.log.prepend(h('li', { 'data-seq': event.seq, class: 'event ' + event.kind, onclick: () => this.pick(event.seq) },
+      this.log.prepend(h('li', { 'data-seq': event.seq, class: 'event ' + event.kind, onclick: () => this.replay.pick(event.seq) },
         h('span', { class: 'number dim' }, '+' + (event.t - begin).toFixed(2) + ' s'), h('span', {}, event.words || event.kind,
           event.text && event.text !== event.words ? h('span', { class: 'dim' }, ' ' + event.text.slice(-300)) : null)));
     }
     while (this.log.childElementCount > SHOWN_EVENTS) this.log.lastElementChild.remove();
+    const { robot } = this.trial;
+    this.replay.set(this.chosen, this.events, running ? Math.max(last, this.app.store.now()) : last,
+      this.bag ? (path) => this.recorded.opened.graphs[path] : (path) => this.app.store.get('graph ' + robot + ' ' + path), running);
   }
 
-  pick(seq) {
-    this.timeline.pick(seq);
-    for (const line of this.log.children) {
-      const picked = Number(line.dataset.seq) === seq;
-      line.classList.toggle('picked', picked);
-      if (picked) line.scrollIntoView({ block: 'nearest' });
-    }
+  // The event under the cursor, in the log.
+  mark(seq) {
+    if (this.marked) this.marked.classList.remove('picked');
+    this.marked = this.log.querySelector('[data-seq="' + Number(seq) + '"]');
+    if (!this.marked) return;
+    this.marked.classList.add('picked');
+    const top = this.marked.offsetTop - this.log.offsetTop;
+    if (top < this.log.scrollTop || top + this.marked.offsetHeight > this.log.scrollTop + this.log.clientHeight) this.log.scrollTop = top - this.log.clientHeight / 2;
   }
 
-  tick() { if (this.trial && !this.trial.ending && !this.trial.outcome) this.showEvents(); }
+  tick() { if (this.trial && !this.bag && !this.trial.ending && !this.trial.outcome) this.showEvents(); }
+}
+
+function counted(caption, table) {
+  const share = (count, runs) => h('td', { class: 'number' }, count.trials, h('span', { class: 'dim' }, ' ' + percent(count.trials / runs)));
+  return h('table', {}, h('caption', {}, caption), h('thead', {}, h('tr', {}, COLUMNS.map((title) => h('th', { scope: 'col' }, title)))),
+    h('tbody', {}, table.map((row) => h('tr', {}, h('th', { scope: 'row' }, row.experiment), h('td', {}, row.arm || (row.oracle ? 'with oracle' : 'without oracle')), h('td', { class: 'number' }, row.runs),
+      share(row.counts.failures, row.runs), share(row.counts.recoveries, row.runs), share(row.counts.questions, row.runs), share(row.counts.answered, row.runs),
+      share({ trials: row.endings.failure }, row.runs)))));
 }
 
 function summary(trial) {
