@@ -13,6 +13,7 @@ MOST_BYTES = 100000000  # of a file
 MOST_TRIANGLES = 2000000
 FURTHEST = 1e6  # of a corner from the origin, in the file's unit
 _STL = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
+_FINEST = 2 ** 20  # steps over the whole mesh: closer corners are one
 _DEEPEST = 60  # nodes of a COLLADA scene within each other
 
 
@@ -80,17 +81,19 @@ def reduced(mesh: Mesh, most: int) -> Mesh:
 def _merged(mesh: Mesh, cell: float) -> Mesh:
     """Corners in the same cell (0: at the same place) become one, their mean; triangles that collapse are left out."""
     corners = mesh.corners
-    keys = np.round(corners / cell).astype(np.int64) if cell else corners
-    _, index = np.unique(keys, axis=0, return_inverse=True)
+    low, span = corners.min(axis=0), float(np.ptp(corners, axis=0).max())
+    steps = np.round((corners - low) / max(cell, span / _FINEST, 1e-12)).astype(np.int64)
+    _, index = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_inverse=True)
     index = index.reshape(-1)
     count = np.bincount(index).astype(float)
     merged = np.stack([np.bincount(index, corners[:, axis]) / count for axis in range(3)], axis=1)
     triangles = index[mesh.triangles]
-    a, b, c = triangles.T
-    triangles = triangles[(a != b) & (b != c) & (a != c)]
-    if len(triangles):
-        _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
-        triangles = triangles[np.sort(first)]
+    a, b, c = np.sort(triangles, axis=1).T
+    kept = np.flatnonzero((a != b) & (b != c))
+    if len(merged) < _FINEST:
+        _, first = np.unique((a[kept] << 42) + (b[kept] << 21) + c[kept], return_index=True)
+        kept = kept[np.sort(first)]
+    triangles = triangles[kept]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return Mesh(merged[used], renumbered.reshape(-1, 3))
 
