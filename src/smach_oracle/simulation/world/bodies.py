@@ -3,20 +3,18 @@ import math
 import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from functools import lru_cache
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 import numpy as np
 import pybullet
 
-from ..robot.pr2_model import pr2_files
+from .meshes import drum, egg
 from .scene import Body, Scene
 
 RESERVED = ('robot', 'floor')  # names that no body of a scene may have
-SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER}
+SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH}
 FLOOR_COLOUR = (0.62, 0.60, 0.57, 1.0)
 FLOOR_SIZE = 12.0  # m, of what is seen of it
-SIDES = 36  # of what is seen of a cylinder
 TURNING_FRICTION = 0.002  # m, against spinning and rolling
 
 
@@ -108,39 +106,16 @@ def _create(client: int, body: Body, turn: Sequence[float]) -> int:
     if body.shape == 'box':
         half = [extent / 2 for extent in body.size]
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
+    elif body.shape == 'round':
+        solid = seen = {'fileName': egg(), 'meshScale': list(body.size)}
     else:
         solid = {'radius': body.size[0], 'height': body.size[2]}
-        seen = {'fileName': _drum(), 'meshScale': list(body.size[:1] * 2 + body.size[2:])}
+        seen = {'fileName': drum(), 'meshScale': list(body.size[:1] * 2 + body.size[2:])}
     shape = pybullet.createCollisionShape(SHAPES[body.shape], physicsClientId=client, **solid)
     skin = pybullet.createVisualShape(pybullet.GEOM_BOX if body.shape == 'box' else pybullet.GEOM_MESH,
                                       rgbaColor=[*body.colour, 1.0], physicsClientId=client, **seen)
     index: int = pybullet.createMultiBody(body.mass, shape, skin, list(body.position), turn, physicsClientId=client)
     return index
-
-
-@lru_cache(maxsize=1)
-def _drum() -> str:
-    """A file with a cylinder of radius and height 1 whose edges are edges: PyBullet's own is shaded as if round.
-
-    A file, for PyBullet loses the memory of meshes that it is handed. Two processes may write it at once.
-    """
-    angles = np.arange(SIDES) * 2 * np.pi / SIDES
-    lines = ['v {:.6f} {:.6f} {}'.format(np.cos(angle), np.sin(angle), z) for z in (-0.5, 0.5) for angle in angles]
-    lines += ['vn {:.6f} {:.6f} 0'.format(np.cos(angle), np.sin(angle)) for angle in angles] + ['vn 0 0 -1', 'vn 0 0 1']
-    for k in range(SIDES):
-        low, after = k + 1, (k + 1) % SIDES + 1
-        side = ['{}//{}'.format(point, normal) for point, normal in (
-            (low, low), (after, after), (SIDES + after, after), (SIDES + low, low))]
-        lines += ['f {} {} {}'.format(side[0], side[1], side[2]), 'f {} {} {}'.format(side[0], side[2], side[3])]
-        if 0 < k < SIDES - 1:
-            lines.append('f 1//{0} {2}//{0} {1}//{0}'.format(SIDES + 1, low, after))
-            lines.append('f {3}//{0} {1}//{0} {2}//{0}'.format(SIDES + 2, SIDES + low, SIDES + after, SIDES + 1))
-    path = pr2_files().urdf.parent.parent / 'cylinder.obj'
-    handle, draft = tempfile.mkstemp(dir=str(path.parent))
-    with os.fdopen(handle, 'w', encoding='utf-8') as file:
-        file.write('\n'.join(lines) + '\n')
-    os.replace(draft, str(path))
-    return str(path)
 
 
 def _load(client: int, body: Body, turn: Sequence[float]) -> int:

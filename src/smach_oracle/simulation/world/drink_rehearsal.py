@@ -19,7 +19,7 @@ from ..robot.kitchen import Kitchen
 from ..robot.kitchen_skills import FRIDGE, KitchenSkills
 from ..robot.perception_node import Perception
 from .direct import DirectRobot
-from .kitchen_scene import PALM
+from .person import PALM
 from .physics import World
 
 TORSO_HEIGHT = 0.25  # m

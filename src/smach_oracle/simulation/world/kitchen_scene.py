@@ -1,5 +1,5 @@
 """The kitchen of the second use case: a refrigerator with drinks, and a person who holds out a hand."""
-from typing import Dict, List, Tuple
+from typing import List, Tuple
 
 import numpy as np
 
@@ -8,13 +8,11 @@ from ..robot.kitchen import Kitchen
 from ..robot.travel import TRAVEL
 from .fridge import DOOR_JOINT, fridge_urdf
 from .kitchen_causes import Draft, with_causes
-from .scene import Body, Goal, RobotStart, Scene, Vector
+from .person import PALM, PALM_SIZE, person
+from .scene import Body, Goal, RobotStart, Scene
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
-PALM: Vector = (0.0, 0.62, 0.85)  # the middle of its upper face
-PALM_SIZE: Vector = (0.20, 0.20, 0.03)
-SKIN, SHIRT, TROUSERS = (0.87, 0.68, 0.55), (0.25, 0.42, 0.62), (0.20, 0.22, 0.27)
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
@@ -36,7 +34,7 @@ def draw(seed: int, benign: bool = False) -> Scene:
     if not benign:
         draft = with_causes(draft, seed)
     goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
-    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + _person(), goal,
+    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error), disturbances=draft.disturbances,
                  causes=draft.causes)
 
@@ -59,19 +57,6 @@ def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
     return [Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
                  (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001), mass=DRINK_MASS,
                  colour=COLOURS[index % len(COLOURS)]) for index, (x, y) in enumerate(places)]
-
-
-def _person() -> Tuple[Body, ...]:
-    """Somebody who stands beyond the palm and waits; nothing of it moves."""
-    x, y, top = PALM
-    parts: List[Dict] = [
-        dict(name='palm', shape='box', size=PALM_SIZE, position=(x, y, top - PALM_SIZE[2] / 2), colour=SKIN),
-        dict(name='person_arm', shape='box', size=(0.07, 0.34, 0.07), position=(x, y + 0.24, top - 0.06), colour=SHIRT),
-        dict(name='person_body', shape='cylinder', size=(0.17, 0.17, 0.62), position=(x, y + 0.52, 1.14), colour=SHIRT),
-        dict(name='person_legs', shape='cylinder', size=(0.15, 0.15, 0.83), position=(x, y + 0.52, 0.415),
-             colour=TROUSERS),
-        dict(name='person_head', shape='cylinder', size=(0.10, 0.10, 0.24), position=(x, y + 0.52, 1.60), colour=SKIN)]
-    return tuple(Body(**part) for part in parts)
 
 
 def _posture() -> Tuple[Tuple[str, float], ...]:

@@ -8,8 +8,8 @@ class Body(NamedTuple):
     """A thing in the world. Its frame is the world's: the floor is z = 0, the robot starts near the origin facing x."""
 
     name: str
-    shape: str  # 'box', 'cylinder' or 'urdf'
-    size: Vector  # m; box: full extents; cylinder: radius, radius, height; urdf: unused
+    shape: str  # 'box', 'cylinder', 'round' (between a ball and a cylinder) or 'urdf'
+    size: Vector  # m; box, round: full extents; cylinder: radius, radius, height; urdf: unused
     position: Vector  # m, of its centre (urdf: of its root)
     yaw: float = 0.0
     roll: float = 0.0
