@@ -107,7 +107,7 @@ export class HandPanel {
     if (key === this.armsKey) return;
     this.armsKey = key;
     this.arms.hidden = arms.length < 2;
-    replace(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { class: 'tool', 'data-arm': arm, 'aria-pressed': arm === now, onclick: () => this.chooseArm(arm) }, arm)));
+    replace(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { class: 'tool', 'data-arm': arm, 'aria-pressed': String(arm === now), onclick: () => this.chooseArm(arm) }, arm)));
   }
 
   showScale() {
