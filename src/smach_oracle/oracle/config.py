@@ -57,6 +57,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'deadline_s': values.deadline,
     'on_no_answer': values.on_no_answer,
     'escalate': values.flag,
+    'watch_preconditions': values.flag,
     'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY),
     'rates_file': values.text,
     'oracle_label': values.label,
@@ -76,6 +77,7 @@ class Settings:
     deadline_s: float = 300.0  # 0: waits without end
     on_no_answer: Tuple[str, str] = ('stop', '')
     escalate: bool = True
+    watch_preconditions: bool = True  # whether callables among them may be called while a question is open
     history_length: int = 50  # visits
     rates_file: str = ''
     oracle_label: str = 'ORACLE'

@@ -1,4 +1,4 @@
-"""What the oracle asks an expert and what may come back (paper, section V). Plain data: no ROS, no smach."""
+"""What the oracle asks an expert and what may come back (paper, section V). No ROS, no smach."""
 import threading
 from enum import IntEnum
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
@@ -51,6 +51,23 @@ class OutcomeChoice(NamedTuple):
     target: str
 
 
+class Standing(NamedTuple):
+    """How a precondition stands."""
+
+    holds: Optional[bool]  # None: it cannot be told
+    text: str  # why, for people
+
+
+class Look:
+    """Tells how the preconditions of a question's choices stand now; the oracle implements it."""
+
+    names: Tuple[Tuple[str, str], ...] = ()  # state and precondition of each
+
+    def look(self, number: int) -> Standing:
+        """How the one of that number stands. It may call a user's function, and so take for ever."""
+        raise NotImplementedError
+
+
 START_LIMIT_S = 60.0
 
 
@@ -99,6 +116,7 @@ class Question(NamedTuple):
     input_userdata: Mapping[str, Any]  # the failed state's inputs, by its own key names, where present
     deadline_s: float  # 0: waits without end
     fallback: str  # what happens at the deadline, in words
+    preconditions: Optional[Look] = None  # how those of the choices stand, as long as it is open; None: nobody can tell
 
 
 class Answer(NamedTuple):

@@ -1,6 +1,7 @@
 """Everything an expert is told about a failure (paper, section V)."""
 from typing import Any, Dict, Iterator
 
+from .conditions import PreconditionLook
 from .failure import route_of
 from .question import OutcomeChoice, Question, StateChoice
 from .userdata import constants_of, keys_after_jump, missing_keys
@@ -21,7 +22,7 @@ def make_question(recovery: Any, query_id: str, deadline_s: float) -> Question:
         give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
         interfaces=ledger.settings.offers_for(ledger.relative_path, record.label),
         userdata=dict(machine.userdata._data), input_userdata=_inputs(machine, record.label, state),
-        deadline_s=deadline_s, fallback=recovery.fallback_in_words())
+        deadline_s=deadline_s, fallback=recovery.fallback_in_words(), preconditions=PreconditionLook(machine, ledger))
 
 
 def state_choices(recovery: Any) -> Iterator[StateChoice]:

@@ -16,6 +16,7 @@ from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progre
 from .expert_server import ExpertQueryServer
 from .goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
 from .interface_starting import InterfaceStarter, StartedInterface
+from .precondition_watch import PreconditionWatch
 from .question_messages import to_answer, to_goal, to_interface_goal
 from .userdata_codec import UserdataCodecError, decode_all
 
@@ -43,6 +44,7 @@ class ExpertQueryClient(Expert):
         self._link = GoalLink(rospy.resolve_name(server or OWN_SERVER), ExpertQueryAction)
         self._server_wait_s = server_wait_s
         self._starter = InterfaceStarter()
+        self._watch = PreconditionWatch()
         self._interfaces: Dict[str, GoalLink] = {}
         self._interfaces_lock = threading.Lock()
 
@@ -52,7 +54,8 @@ class ExpertQueryClient(Expert):
         :raises AnswerError: if the answer cannot be used here, such as outputs of a message type that is not
             installed.
         """
-        return _Asking(self._link, to_goal(question, self.robot), progress).run(cancelled)
+        with self._watch.over(question):
+            return _Asking(self._link, to_goal(question, self.robot), progress).run(cancelled)
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:

@@ -129,5 +129,5 @@ def test_every_documented_key_is_known():
     assert set(setting_names()) == {
         'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries', 'failing_outcomes',
         'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys', 'time_limit_s', 'grace_period_s',
-        'deadline_s', 'on_no_answer', 'escalate', 'history_length', 'rates_file', 'oracle_label', 'nested',
-        'interfaces', 'states'}
+        'deadline_s', 'on_no_answer', 'escalate', 'watch_preconditions', 'history_length', 'rates_file', 'oracle_label',
+        'nested', 'interfaces', 'states'}

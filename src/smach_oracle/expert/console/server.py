@@ -19,6 +19,7 @@ from ...ros.master_watch import start_master_watch
 from ..front_end import FrontEnd
 from .audit import Audit
 from .commands import MOST_BYTES
+from .conditions import Conditions
 from .desk import Desk
 from .eye import Eye
 from .frames import FrameHandler, FrameRoom
@@ -80,6 +81,7 @@ class Console:
         self._front_end = FrontEnd('expert_console')
         self._eye = Eye(self._sections, self._front_end)
         self._board = QuestionBoard(self._front_end, self._log)
+        self._conditions = Conditions()
         self._hands = Hands(self._sections, self._front_end, self._audit)
         self._office = Office(self._sections, self._log, Desk(
             self._front_end, self._audit, PerceptionDesk(self._hands.is_interface).commands), self._hands)
@@ -108,6 +110,7 @@ class Console:
             try:
                 self._robots.draw()
                 self._board.draw(self._sections)
+                self._conditions.draw(self._sections, self._front_end.questions())
                 if time.monotonic() - overview_s > OVERVIEW_PERIOD_S:
                     overview_s = time.monotonic()
                     self._audit.prepare(self._front_end.servers)

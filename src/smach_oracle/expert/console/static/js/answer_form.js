@@ -2,6 +2,7 @@
 // i the first interface, g give up.
 import { h } from './dom.js';
 import { CLASSES, chip, percent, rateBar } from './format.js';
+import { Preconditions } from './preconditions.js';
 
 export class AnswerForm {
   // `onAnswer({kind, name, outputs, why})`
@@ -10,6 +11,7 @@ export class AnswerForm {
     this.onAnswer = onAnswer;
     this.buttons = [];
     this.keys = new Map();
+    this.standings = new Map();
     this.why = h('input', { type: 'text', class: 'why', maxlength: 2000, placeholder: 'Reason, for the record (optional)', 'aria-label': 'Reason, for the record' });
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outputs = question.outputs.map((key) => this.output(key));
@@ -19,6 +21,11 @@ export class AnswerForm {
 
   enable(on) {
     for (const button of this.buttons) button.disabled = !on || button.dataset.blocked === 'yes';
+  }
+
+  // How the preconditions stand, by state; `now`: the server's clock.
+  stand(conditions, now) {
+    for (const [state, standing] of this.standings) standing.show((conditions || {})[state], now);
   }
 
   press(key) {
@@ -55,9 +62,13 @@ export class AnswerForm {
         h('span', { class: 'chips' }, CLASSES[choice.class] && chip(CLASSES[choice.class], 'class-' + choice.class),
           choice.blocked && chip('blocked: ' + choice.blocked, 'bad'),
           choice.missing.length > 0 && chip('missing: ' + choice.missing.join(', '), 'warn', 'Userdata that it needs and would not have'),
-          choice.preconditions.length > 0 && chip('first: ' + choice.preconditions.join(', '), '', 'Its preconditions, in this order'),
           choice.visits > 0 && chip(choice.visits + (choice.visits === 1 ? ' visit' : ' visits'), '', 'In this trial'),
           choice.helped[1] > 0 && chip('helped ' + choice.helped[0] + ' of ' + choice.helped[1], choice.helped[0] * 2 > choice.helped[1] ? 'good' : '', 'How often going there helped when ' + state + ' had failed, as far as this console saw')));
+      if (choice.preconditions.length) {
+        const standing = new Preconditions(choice.preconditions);
+        this.standings.set(choice.state, standing);
+        button.lastElementChild.append(standing.root);
+      }
       if (choice.blocked) button.dataset.blocked = 'yes';
       return button;
     }))];

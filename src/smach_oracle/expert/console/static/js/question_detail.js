@@ -157,6 +157,7 @@ export class Detail {
       return;
     }
     const left = now.deadline === null ? 'no time limit' : duration(now.deadline - clock) + ' left';
+    this.form.stand((this.app.store.get('conditions') || {})[this.key], clock);
     setText(this.time, 'asked ' + duration(clock - now.asked) + ' ago · ' + left);
     this.time.classList.toggle('urgent', now.deadline !== null && now.deadline - clock < 20);
   }
@@ -206,6 +207,7 @@ export class Detail {
 
   update(names) {
     if (names.some((name) => ['questions', 'hand', 'output', 'eye'].includes(name))) this.showInterface();
+    if (names.includes('conditions')) this.tick();
     if (names.includes('eye')) {
       this.camera.update();
       this.showWorkbench();

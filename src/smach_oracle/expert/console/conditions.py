@@ -1,0 +1,64 @@
+"""How the preconditions of open questions' choices stand now, as the robots tell it."""
+import threading
+import time
+from collections import OrderedDict
+from typing import Any, Callable, Dict, Iterable, List, Tuple
+
+import rosgraph.names
+import rospy
+
+from smach_oracle.msg import PreconditionCheck, PreconditionChecks
+
+from ..followed_server import Listed
+from .sections import Sections
+
+SECTION = 'conditions'
+MOST_ROBOTS = 64
+MOST_QUESTIONS = 64
+LONGEST_TEXT = 400
+_HOLDS = {PreconditionCheck.HOLDS: True, PreconditionCheck.DOES_NOT_HOLD: False}
+
+
+class Conditions:
+    """Follows `<robot>/oracle/preconditions` of robots that ask; holds the newest word on each question."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._newest: 'OrderedDict[Tuple[str, str], Dict[str, List[Dict[str, Any]]]]' = OrderedDict()
+
+    def draw(self, sections: Sections, questions: Iterable[Listed]) -> None:
+        """Bring the section up to date; robots whose questions are new are listened to from now on."""
+        questions = list(questions)
+        for listed in questions:
+            self._follow(listed.goal.robot)
+        with self._lock:
+            found = {listed.key: self._newest.get((listed.goal.robot, listed.goal.query_id)) for listed in questions}
+        sections.put(SECTION, {key: states for key, states in found.items() if states is not None})
+
+    def _follow(self, robot: str) -> None:
+        if robot and robot not in self._subscribers and rosgraph.names.is_legal_name(robot) \
+                and len(self._subscribers) < MOST_ROBOTS:
+            self._subscribers[robot] = rospy.Subscriber(robot + '/oracle/preconditions', PreconditionChecks,
+                                                        self.taker(robot), queue_size=5)
+
+    def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
+        """What takes in a robot's messages."""
+        def take(message: PreconditionChecks) -> None:
+            view = checks_view(message, time.time())
+            with self._lock:
+                self._newest[(robot, message.query_id)] = view
+                self._newest.move_to_end((robot, message.query_id))
+                while len(self._newest) > MOST_QUESTIONS:
+                    self._newest.popitem(last=False)
+        return take
+
+
+def checks_view(message: PreconditionChecks, now: float) -> Dict[str, List[Dict[str, Any]]]:
+    """By state: name, whether it holds (None: unknown), why, and when that was looked at, in s since the epoch."""
+    found: Dict[str, List[Dict[str, Any]]] = {}
+    for check in message.checks:
+        looked = round(now - check.age, 1) if check.age >= 0 else None
+        found.setdefault(check.state, []).append({'name': check.name, 'holds': _HOLDS.get(check.result),
+                                                  'text': check.text[:LONGEST_TEXT], 'looked': looked})
+    return found

@@ -1,0 +1,37 @@
+// The preconditions of a state, in the order in which they run, and how each stands now.
+import { h, setText } from './dom.js';
+import { duration } from './format.js';
+
+const STALE_S = 8;
+const WORDS = { true: ['✓', 'holds', 'good'], false: ['✗', 'does not hold', 'bad'], null: ['?', 'unknown', ''] };
+
+export class Preconditions {
+  constructor(names) {
+    this.items = names.map((name) => {
+      const sign = h('span', { class: 'sign', 'aria-hidden': 'true' });
+      const word = h('span', { class: 'word' });
+      const root = h('span', { class: 'precondition' }, sign, ' ', h('span', {}, name), ' ', word);
+      return { root, sign, word };
+    });
+    this.age = h('span', { class: 'dim age' });
+    this.root = h('span', { class: 'preconditions' }, 'first: ', this.items.map((item, index) => [index > 0 && ', ', item.root]), ' ', this.age);
+  }
+
+  // `checks`: [{name, holds, text, looked}] in the same order; undefined where the robot tells nothing.
+  show(checks, now) {
+    const oldest = Math.min(...(checks || []).map((check) => (check.looked === null ? Infinity : check.looked)));
+    const age = now - oldest;
+    const stale = checks && age > STALE_S;
+    this.items.forEach((item, index) => {
+      const check = checks && checks[index];
+      const [sign, word, kind] = WORDS[String(check ? check.holds : null)];
+      setText(item.sign, check ? sign : '');
+      setText(item.word, check ? word : '');
+      const shown = 'precondition ' + (check ? kind : '') + (stale ? ' stale' : '');
+      if (item.root.className !== shown) item.root.className = shown;
+      const title = check ? check.text : 'Its robot does not tell how it stands';
+      if (item.root.title !== title) item.root.title = title;
+    });
+    setText(this.age, checks && oldest < Infinity ? (age < 1 ? 'now' : duration(age) + ' ago') : '');
+  }
+}

@@ -1,0 +1,80 @@
+"""How the preconditions of a question's choices stand while it is open: looked at, never brought about."""
+from machines import FakeExpert, Scripted, goto, watched
+
+from smach_oracle.oracle.events import EventKind
+
+
+def asked(preconditions, **settings):
+    """The machine after a question about B, and the question; what its preconditions say is asked while it is open."""
+    found = []
+
+    class Looking(FakeExpert):
+        def ask(self, question, cancelled, progress):
+            look = question.preconditions
+            found.extend((look.names[number],) + tuple(look.look(number)) for number in range(len(look.names)))
+            return super().ask(question, cancelled, progress)
+
+    machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=Looking(goto('C')), preconditions=preconditions,
+                      settings=dict({'max_recoveries': 0}, **settings))
+    machine.machine.userdata.cup = 'mug'
+    assert machine.run() == 'done'
+    return machine, found
+
+
+def test_a_function_tells_and_a_state_is_not_run():
+    def has_cup(userdata):
+        return userdata.cup == 'mug'
+
+    def is_dark(userdata):
+        return []
+
+    machine, found = asked({'B': [has_cup, is_dark, 'A'], 'C': ['B', Scripted()]})
+    assert [each[:2] for each in found] == [(('B', 'has_cup'), True), (('B', 'is_dark'), False), (('B', 'A'), None),
+                                            (('C', 'B'), None), (('C', 'Scripted'), None)]
+    assert found[2][2] == 'only running A would tell; its last visit succeeded'
+    assert found[3][2] == 'only running B would tell; its last visit failed'
+    assert machine.visits() == ['A', 'B', 'C']
+    assert not machine.of(EventKind.PRECONDITION_START)
+
+
+def test_of_a_pair_the_check_alone_is_called():
+    opened = []
+
+    def gripper_is_open(userdata):
+        return False
+
+    def open_it(userdata):
+        opened.append(userdata)
+
+    _, found = asked({'B': [(gripper_is_open, open_it)]})
+    assert found[0][1:] == (False, 'gripper_is_open returned False; open_it would bring it about')
+    assert not opened
+
+
+def test_what_it_writes_is_dropped_and_what_it_raises_is_told():
+    def meddles(userdata):
+        userdata.cup = 'broken'
+        return True
+
+    def breaks(userdata):
+        raise KeyError('nothing there')
+
+    def forgets(userdata):
+        pass
+
+    machine, found = asked({'B': [meddles, breaks, forgets]})
+    assert [each[1] for each in found] == [True, None, None]
+    assert "breaks raised KeyError('nothing there')" == found[1][2]
+    assert 'returned None' in found[2][2]
+    assert machine.machine.userdata.cup == 'mug'
+
+
+def test_it_can_be_switched_off():
+    called = []
+    _, found = asked({'B': [called.append]}, watch_preconditions=False)
+    assert found[0][1:] == (None, 'watch_preconditions is off')
+    assert not called
+
+
+def test_a_question_without_preconditions_has_nothing_to_look_at():
+    assert asked({})[1] == []
