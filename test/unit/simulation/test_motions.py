@@ -10,12 +10,13 @@ from smach_oracle.geometry.transforms import from_rpy, inverse
 from smach_oracle.simulation.robot.interface import ARM_JOINTS, CAMERA_FRAME, RobotError
 from smach_oracle.simulation.world.camera import INTRINSICS
 from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.motions import Torso
+from smach_oracle.simulation.world.motions import Gripper, Torso
 from smach_oracle.simulation.world.physics import World
 from smach_oracle.simulation.world.scene import Body, RobotStart
 from smach_oracle.simulation.world.trajectory import Trajectory
 
 RIGHT = ARM_JOINTS['right']
+AHEAD = RobotStart(tuple((name, 0.0) for name in RIGHT[:6]))  # the arm is stretched out
 WALL = Body('wall', 'box', (0.05, 1.0, 2.0), (0.0, 0.0, 0.0))
 
 
@@ -113,20 +114,31 @@ def test_an_arm_that_meets_a_wall_stops_and_says_so(world):
 
 def test_a_gripper_closes_opens_and_stalls(world):
     between = CAN._replace(position=(0.75, -0.188, 1.0), mass=0.0)
-    start = (('r_shoulder_pan_joint', 0.0), ('r_shoulder_lift_joint', 0.0), ('r_upper_arm_roll_joint', 0.0),
-             ('r_elbow_flex_joint', 0.0), ('r_forearm_roll_joint', 0.0), ('r_wrist_flex_joint', 0.0))
-    world.reset(empty(robot=RobotStart(start)))
+    world.reset(empty(robot=AHEAD))
     tool = world.tool_pose('right')[:3, 3]
     robot = DirectRobot(world)
     closed = robot.gripper('right', 0.0)
     assert closed.reached and not closed.stalled and closed.position == pytest.approx(0.0, abs=1e-3)
     half = robot.gripper('right', 0.05)
     assert half.reached and half.position == pytest.approx(0.05, abs=1e-3)
-    world.reset(scene(between._replace(position=tuple(tool)), robot=RobotStart(start)))
+    world.reset(scene(between._replace(position=tuple(tool)), robot=AHEAD))
     held = DirectRobot(world).gripper('right', 0.0, 15.0)
     assert held.stalled and not held.reached and held.position == pytest.approx(0.062, abs=2e-3)
     assert held.effort == pytest.approx(15.0, abs=1.0) and world.holding('can') == 'right'
     assert world.gap('left') == pytest.approx(0.09, abs=1e-3)
+
+
+def test_a_hand_that_closes_again_does_not_loosen_what_it_holds(world):
+    world.reset(empty(robot=AHEAD))
+    tool = world.tool_pose('right')
+    aside = CAN._replace(position=tuple((tool @ [0.0, 0.002, 0.0, 1.0])[:3]), mass=0.0)
+    world.reset(scene(aside, robot=AHEAD))
+    assert DirectRobot(world).gripper('right', 0.0, 15.0).stalled and world.holding('can') == 'right'
+    again, forces = Gripper('right', 0.0, 15.0), []
+    while again.tick(world) is None:
+        world.step()
+        forces.append(world.robot.finger_force('right'))
+    assert len(forces) > 10 and min(forces) > 14.0
 
 
 def test_a_gripper_that_does_not_come_to_rest_ends_all_the_same(world, robot, monkeypatch):

@@ -38,7 +38,9 @@ class Gripper:
     def tick(self, world: World) -> Optional[Result]:
         gap = world.gap(self._arm)
         if not self._gaps:
-            self._sent = self._start = gap
+            self._start = gap
+            # fingers that press on something go on pressing
+            self._sent = min(gap, world.robot.sent_gap(self._arm)) if self._goal < gap else gap
         self._gaps.append(gap)
         step = CLOSING_SPEED * PERIOD
         self._sent += min(max(self._goal - self._sent, -step), step)

@@ -130,6 +130,10 @@ class Pr2Body:
         """Send a gripper to a gap between the tips (m), each finger with at most `force` N."""
         self._grips[arm] = (gap, force)
 
+    def sent_gap(self, arm: str) -> float:
+        """m, to which a gripper was sent last."""
+        return self._grips[arm][0]
+
     def gap(self, arm: str) -> float:
         """m between the finger tips of an arm."""
         return float(sum(self._jaw_positions(arm)))
