@@ -139,12 +139,13 @@ def test_an_interface_is_found_by_the_types_beside_its_action(monkeypatch):
     watching = eye.Eye(sections, Front())
     published = [[name + '/result', 'smach_oracle/SharedAutonomyActionResult']
                  for name in ('/alpha/perception', '/alpha/fake', '/alpha/drive')]
-    published += [['/alpha/perception/image', 'sensor_msgs/Image'], ['/other/result', 'std_msgs/String']]
+    published += [['/alpha/perception/image', 'sensor_msgs/Image'], ['/other/result', 'std_msgs/String'],
+                  ['/other/cloud', 'sensor_msgs/PointCloud2']]
     watching._follow_interfaces(published, set(types) | {'/other/segment'})
     watching.sensors.follow(published)
     watching.draw()
     image = watching.sensors.on('/alpha/perception/image').number
-    assert sections.get('eye')['perception'] == {'/alpha/expert_query q': image}
+    assert sections.get('eye')['perception'] == {'/alpha/expert_query q': {'image': image, 'cloud': None}}
     watching._follow_interfaces(published, {'/alpha/fake/segment'})
     watching.draw()
     assert sections.get('eye')['perception'] == {}

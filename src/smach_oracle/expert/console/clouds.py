@@ -28,12 +28,16 @@ class Cloud(NamedTuple):
 
 def encode_cloud(message: PointCloud2) -> Encoded:
     """First (n, 3) uint16 positions within `offset` and `offset + scale` (m), then (n, 3) uint8 colours."""
-    cloud = thinned(message)
+    return encode_points(thinned(message), message.width * message.height)
+
+
+def encode_points(cloud: Cloud, of: int) -> Encoded:
+    """The same of points that were thinned out already; `of`: how many there were."""
     low = cloud.points.min(axis=0) if len(cloud.points) else np.zeros(3)
     span = np.maximum(cloud.points.max(axis=0) - low, 1e-6) if len(cloud.points) else np.ones(3)
     packed = np.round((cloud.points - low) / span * 65535).astype('<u2')
     return Encoded('application/octet-stream', packed.tobytes() + cloud.colours.tobytes(), {
-        'kind': 'cloud', 'count': len(cloud.points), 'of': message.width * message.height,
+        'kind': 'cloud', 'count': len(cloud.points), 'of': of,
         'offset': [round(float(each), 6) for each in low], 'scale': [round(float(each), 6) for each in span]})
 
 
@@ -88,7 +92,12 @@ def _colours(records: np.ndarray, points: np.ndarray, fields: Dict[str, PointFie
     if field is not None:
         packed = _values(records, field, message, 'u4').astype(np.uint32)  # declared as a float by custom
         return np.stack([packed >> shift & 255 for shift in (16, 8, 0)], axis=1).astype(np.uint8)
-    share = _ranked(points[:, 2])[:, None]
+    return by_rank(points[:, 2])
+
+
+def by_rank(values: np.ndarray) -> np.ndarray:
+    """(n, 3) uint8 of (n,): blue for the least, yellow for the most."""
+    share = _ranked(values)[:, None]
     return ((1 - share) * np.array([60, 110, 220]) + share * np.array([250, 190, 60])).astype(np.uint8)
 
 

@@ -1,6 +1,7 @@
 """What the console sees with: the closed sets of sensors and of perception interfaces, kept up to date."""
 import threading
 import time
+from functools import partial
 from typing import Any, Dict, Sequence, Set
 
 import rosgraph
@@ -12,9 +13,11 @@ from smach_oracle.srv import SegmentObject
 
 from ...oracle.errors import OracleError
 from ..front_end import FrontEnd
+from .depth_clouds import AS_A_CLOUD, TYPE as DEPTH_TYPE, DepthCloudSensor, depth_cameras
 from .perception_desk import action_of
+from .robot_sensor import DESCRIPTION, RobotSensor, robots_in
 from .sections import Sections
-from .sensors import Sensors
+from .sensors import Derived, Sensors
 
 LOOK_PERIOD_S = 1.0
 TEND_PERIOD_S = 0.1
@@ -44,7 +47,11 @@ class Eye:
         """Ask the master once."""
         master = rosgraph.Master(rospy.get_name())
         published = master.getPublishedTopics('')
-        self.sensors.follow(published)
+        self.sensors.follow(published, [
+            Derived(camera.depth + AS_A_CLOUD, DEPTH_TYPE, partial(DepthCloudSensor, camera=camera))
+            for camera in depth_cameras(published)] + [
+            Derived(name, DESCRIPTION, partial(RobotSensor, parameter=name))
+            for name in robots_in(master.getParamNames())])
         self._follow_interfaces(published, {name for name, _ in master.getSystemState()[2]})
 
     def draw(self) -> None:
@@ -56,13 +63,14 @@ class Eye:
         self.draw()
 
     def _running(self) -> Dict[str, Any]:
-        """By question for which a perception interface runs: the sensor of its frame, None before there is one."""
+        """By question for which a perception interface runs: the sensors of its frame and of the cloud of that, None
+        before there is one."""
         running = {}
         for listed in self._front_end.questions():
             action = action_of(listed)
             if action and self.is_perception(action):
-                sensor = self.sensors.on(action + '/image')
-                running[listed.key] = sensor.number if sensor else None
+                running[listed.key] = {name: sensor.number if sensor else None for name, sensor in (
+                    (name, self.sensors.on('{}/{}'.format(action, name))) for name in ('image', 'cloud'))}
         return running
 
     def _follow_interfaces(self, published: Sequence[Sequence[str]], services: Set[str]) -> None:

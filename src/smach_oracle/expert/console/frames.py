@@ -2,6 +2,8 @@
 link or a slow machine gets fewer frames, never older ones."""
 import asyncio
 import itertools
+import json
+import re
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Optional, Tuple
@@ -11,12 +13,14 @@ import tornado.web
 from .access import Buckets
 from .handlers import Gate, Guarded
 from .images import WIDTHS
+from .robot_sensor import RobotSensor
 from .sensors import Frame, Sensor, Sensors
 
 WAIT_S = 5.0
 POLL_S = 0.02
 MOST_WAITING = 48
 MOST_WAITING_EACH = 8  # of one address
+_NUMBER = re.compile('[0-9]{1,15}')
 RATE, BURST = 60.0, 150.0  # frames a second of one address
 
 
@@ -27,14 +31,11 @@ class FrameRoom:
         self.sensors = sensors
         self.limits = Buckets(rate=RATE, burst=BURST, for_all=3.0)
         self.waiting: 'Counter[str]' = Counter()
-        self.workers = ThreadPoolExecutor(2, 'encode')
+        self.workers = ThreadPoolExecutor(3, 'encode')
 
 
-class FrameHandler(Guarded):
-    """GET /frame/NUMBER?after=SEQUENCE&width=PIXELS: another frame than the one of that sequence number (0: any).
-
-    204 where none came within 5 s, 404 for no such sensor, 422 with a text for a message that cannot be shown.
-    """
+class SensorHandler(Guarded):
+    """What both have in common that are asked about sensors."""
 
     def initialize(self, gate: Gate, room: FrameRoom, **_: Any) -> None:  # type: ignore[override]
         """Called by Tornado."""
@@ -56,12 +57,57 @@ class FrameHandler(Guarded):
         """The page asks for it no longer."""
         self._gone = True
 
+    def tell_why(self, err: ValueError) -> None:
+        """What was asked for cannot be shown."""
+        self.set_status(422)
+        self.set_header('Content-Type', 'text/plain; charset=utf-8')
+        self.finish(str(err)[:500])
+
+    def sensor(self, number: str) -> Sensor:
+        """By its number."""
+        found = self._room.sensors.find(int(number))
+        if found is None:
+            raise tornado.web.HTTPError(404)
+        return found
+
+    def robot(self, number: str) -> RobotSensor:
+        """A sensor that is a robot, by its number."""
+        found = self.sensor(number)
+        if not isinstance(found, RobotSensor):
+            raise tornado.web.HTTPError(404)
+        return found
+
+
+class ModelHandler(SensorHandler):
+    """GET /model/NUMBER: what a robot looks like, as RobotModel.encoded has it; 422 with a text where that fails."""
+
+    async def get(self, number: str) -> None:
+        """Answer when it has been read."""
+        robot = self.robot(number)
+        self.set_header('Cache-Control', 'no-store')
+        try:
+            encoded = await asyncio.get_running_loop().run_in_executor(
+                self._room.workers, lambda: robot.model().encoded())
+        except ValueError as err:
+            self.tell_why(err)
+            return
+        self.set_header('Content-Type', encoded.content_type)
+        self.finish(encoded.body)
+
+
+class FrameHandler(SensorHandler):
+    """GET /frame/NUMBER?after=SEQUENCE&width=PIXELS: another frame than the one of that sequence number (0: any).
+
+    With `robot=NUMBER` its facts tell the `place` of its coordinates at that robot, 12 numbers of (3, 4), or `astray`,
+    why that is not known. 204 where none came within 5 s, 404 for no such sensor, 422 with a text for a message that
+    cannot be shown.
+    """
+
     async def get(self, number: str) -> None:
         """Answer as soon as there is another frame."""
-        after, width = self._arguments()
-        sensor = self._room.sensors.find(int(number))
-        if sensor is None:
-            raise tornado.web.HTTPError(404)
+        after, width, robot = self._arguments()
+        sensor = self.sensor(number)
+        beside = self.robot(robot) if robot else None
         frame = await self._wait(sensor, after)
         self.set_header('Cache-Control', 'no-store')
         if frame is None:
@@ -71,11 +117,11 @@ class FrameHandler(Guarded):
             encoded, facts = await asyncio.get_running_loop().run_in_executor(
                 self._room.workers, sensor.file_of, frame, width)
         except ValueError as err:
-            self.set_status(422)
-            self.set_header('Content-Type', 'text/plain; charset=utf-8')
             self.set_header('X-Sequence', str(frame.sequence))
-            self.finish(str(err)[:500])
+            self.tell_why(err)
             return
+        if beside is not None and facts:
+            facts = _with_place(facts, beside, frame)
         self.set_header('Content-Type', encoded.content_type)
         if facts:
             self.set_header('X-Facts', facts)
@@ -98,10 +144,20 @@ class FrameHandler(Guarded):
             if not waiting[client]:
                 del waiting[client]
 
-    def _arguments(self) -> Tuple[int, int]:
+    def _arguments(self) -> Tuple[int, int, str]:
         given = {name: self.get_query_arguments(name) for name in self.request.query_arguments}
         after, width = given.pop('after', ['0']), given.pop('width', [str(WIDTHS[1])])
-        if given or len(after) != 1 or len(width) != 1 or not (after[0].isascii() and after[0].isdigit()) \
-                or len(after[0]) > 15 or width[0] not in map(str, WIDTHS):
+        robot = given.pop('robot', [''])
+        if given or not len(after) == len(width) == len(robot) == 1 or width[0] not in map(str, WIDTHS) \
+                or not _NUMBER.fullmatch(after[0]) or not _NUMBER.fullmatch(robot[0] or '0'):
             raise tornado.web.HTTPError(400)
-        return int(after[0]), int(width[0])
+        return int(after[0]), int(width[0]), robot[0]
+
+
+def _with_place(facts: str, robot: RobotSensor, frame: Frame) -> str:
+    """Facts, with where it lies at the robot."""
+    header = frame.message.header
+    robot.newer(0)
+    place, astray = robot.place_of(header.frame_id, header.stamp)
+    found = {'astray': astray} if place is None else {'place': [round(float(each), 6) for each in place.ravel()]}
+    return json.dumps(dict(json.loads(facts), **found), allow_nan=False)

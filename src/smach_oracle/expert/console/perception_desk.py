@@ -1,11 +1,13 @@
 """Carries out what people do through a perception interface that runs for a question: mark, choose a frame, hand over,
 give up. The interface is found by the action that the question names, and must be one of the closed set."""
+import base64
 from typing import Any, Callable, Dict, List, Mapping
 
 import cv2
 import numpy as np
 import rosgraph.names
 from geometry_msgs.msg import Point32, Polygon
+from sensor_msgs.msg import PointCloud2
 
 from smach_oracle.msg import SegmentStroke
 from smach_oracle.srv import (FinishInterface, FinishInterfaceRequest, GiveUpInterface, GiveUpInterfaceRequest,
@@ -14,6 +16,7 @@ from smach_oracle.srv import (FinishInterface, FinishInterfaceRequest, GiveUpInt
 from ...ros.images import colour_of
 from ..followed_server import Listed, call_service
 from .audit import Person
+from .clouds import Cloud, CloudError, encode_points, thinned
 from .commands import Command
 from .desk import Reply, Worker
 from .eye_commands import FRESH
@@ -21,6 +24,7 @@ from .eye_commands import FRESH
 FRAME_LIMIT_S = 15.0
 NOT_RUNNING = 'No interface runs for this question any more.'
 _MOST_CORNERS = 6000  # of a mask's outline
+_MOST_POINTS = 4000  # of an object
 
 
 def action_of(listed: Listed) -> str:
@@ -82,8 +86,19 @@ def marked_view(answer: SegmentObjectResponse) -> Dict[str, Any]:
         place, turn = answer.object.pose.position, answer.object.pose.orientation
         data['object'] = {'frame': answer.object.header.frame_id[:200], 'position': _finite(place.x, place.y, place.z),
                           'yaw': _finite(2 * np.arctan2(turn.z, turn.w))[0], 'points': answer.cloud.width,
-                          'size': _finite(answer.size.x, answer.size.y, answer.size.z)}
+                          'size': _finite(answer.size.x, answer.size.y, answer.size.z),
+                          'cloud': _points(answer.cloud)}
     return data
+
+
+def _points(message: PointCloud2) -> Dict[str, Any]:
+    """As a frame of a cloud has it, its bytes in base64; without points where the cloud cannot be shown."""
+    try:
+        cloud = thinned(message, _MOST_POINTS)
+    except CloudError:
+        cloud = Cloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
+    encoded = encode_points(cloud, message.width * message.height)
+    return dict(encoded.facts, data=base64.b64encode(encoded.body).decode())
 
 
 def outlines(mask: np.ndarray) -> List[List[int]]:

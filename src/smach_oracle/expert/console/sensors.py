@@ -23,6 +23,7 @@ _TYPES: Dict[str, Tuple[str, Any, Callable[[Any, int], Encoded]]] = {
     CompressedImage._type: ('image', CompressedImage, encode_image),
     PointCloud2._type: ('cloud', PointCloud2, lambda message, _: encode_cloud(message)),
     JointState._type: ('joints', JointState, lambda message, _: encode_joints(message))}
+_DERIVED = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}  # by type, what they show
 
 
 class Frame(NamedTuple):
@@ -37,11 +38,11 @@ class Sensor:
     """One topic. It holds the newest message only."""
 
     def __init__(self, sensor: int, topic: str, kind: str) -> None:
-        """`kind` is one of the types that can be shown, such as sensor_msgs/Image."""
+        """`kind` is one of the types that can be shown, such as sensor_msgs/Image, or that of a derived one."""
         self.number = sensor
         self.topic = topic
         self.type = kind
-        self.kind, self._message_class, self._encode = _TYPES[kind]
+        self.kind = _DERIVED[kind] if kind in _DERIVED else _TYPES[kind][0]
         self._asked_s = -IDLE_S
         self._sequence = itertools.count(1)
         self._frame: Optional[Frame] = None
@@ -75,25 +76,48 @@ class Sensor:
     def tend(self, may_listen: bool) -> None:
         """Begin to listen where somebody looks, stop where nobody does. One thread calls it; a master may hang it."""
         wanted = time.monotonic() - self._asked_s < IDLE_S
-        if wanted and may_listen and self._subscriber is None:
-            self._subscriber = rospy.Subscriber(self.topic, self._message_class, self.take, queue_size=1,
-                                                buff_size=1 << 24)
-        elif not wanted and self._subscriber is not None:
-            self._subscriber.unregister()
-            self._subscriber, self._frame, self._encoded = None, None, {}
+        if self._subscriber is None:
+            if wanted and may_listen:
+                self._subscriber = self._begin()
+        elif wanted:
+            self._go_on()
+        else:
+            self._end()
 
     def take(self, message: Any) -> None:
         """A message has come."""
         self._frame = Frame(next(self._sequence), message, time.monotonic())
 
+    def _begin(self) -> rospy.Subscriber:
+        return rospy.Subscriber(self.topic, _TYPES[self.type][1], self.take, queue_size=1, buff_size=1 << 24)
+
+    def _go_on(self) -> None:
+        """It is looked at still."""
+
+    def _end(self) -> None:
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+        self._subscriber, self._frame, self._encoded = None, None, {}
+
+    def _encoded_of(self, message: Any, width: int) -> Encoded:
+        return _TYPES[self.type][2](message, width)
+
     def _made(self, frame: Frame, width: int) -> Tuple[Encoded, str]:
-        encoded = self._encode(frame.message, width)
+        encoded = self._encoded_of(frame.message, width)
         header = frame.message.header
         facts = dict(encoded.facts, sequence=frame.sequence, frame=header.frame_id[:200],
                      stamp='{}.{:09d}'.format(header.stamp.secs, header.stamp.nsecs))
         if encoded.content_type == 'application/json':
             return encoded._replace(body=json.dumps(facts, allow_nan=False).encode()), ''
         return encoded, json.dumps(facts, allow_nan=False)
+
+
+class Derived(NamedTuple):
+    """Something to look at that is more than a topic."""
+
+    topic: str  # its name
+    type: str
+    make: Callable[[int], Sensor]  # from its number
 
 
 class Sensors:
@@ -113,9 +137,10 @@ class Sensors:
         """A sensor by its topic, for the server's own use."""
         return next((each for each in self._all() if each.topic == topic), None)
 
-    def follow(self, published: Sequence[Sequence[str]]) -> None:
-        """Take in what the master knows: topics and their types."""
-        seen = {(topic, kind) for topic, kind in published if kind in _TYPES}
+    def follow(self, published: Sequence[Sequence[str]], derived: Sequence[Derived] = ()) -> None:
+        """Take in what the master knows: topics and their types, and what was derived from them."""
+        makers = {(each.topic, each.type): each.make for each in derived}
+        seen = {(topic, kind) for topic, kind in published if kind in _TYPES} | set(makers)
         with self._lock:
             known = {(each.topic, each.type): each.number for each in self._by_number.values()}
             for key, sensor in known.items():
@@ -123,8 +148,9 @@ class Sensors:
                 if self._unseen[sensor] >= _GONE_AFTER and not self._by_number[sensor].listened:
                     del self._by_number[sensor], self._unseen[sensor]
             for topic, kind in sorted(seen - set(known))[:MOST_SENSORS - len(self._by_number)]:
-                found = Sensor(next(self._numbers), topic, kind)
-                self._by_number[found.number] = found
+                number = next(self._numbers)
+                make = makers.get((topic, kind))
+                self._by_number[number] = make(number) if make else Sensor(number, topic, kind)
 
     def tend(self) -> None:
         """Begin and stop to listen; to be called often, by one thread."""

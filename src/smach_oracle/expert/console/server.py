@@ -22,7 +22,7 @@ from .commands import MOST_BYTES
 from .conditions import Conditions
 from .desk import Desk
 from .eye import Eye
-from .frames import FrameHandler, FrameRoom
+from .frames import FrameHandler, FrameRoom, ModelHandler
 from .hands import Hands
 from .handlers import Gate, NotThere, SessionHandler, StaticFile
 from .layout import Layouter
@@ -46,9 +46,11 @@ PONG_LIMIT_S = 15.0
 def make_app(gate: Gate, office: Office, sensors: Sensors) -> tornado.web.Application:
     """The web application; its handlers run in the thread of the loop that serves it."""
     shared = {'gate': gate}
+    room = FrameRoom(sensors)
     return tornado.web.Application(
         [(r'/session', SessionHandler, shared), (r'/socket', Socket, {'gate': gate, 'office': office}),
-         (r'/frame/([0-9]{1,9})', FrameHandler, {'gate': gate, 'room': FrameRoom(sensors)}),
+         (r'/frame/([0-9]{1,9})', FrameHandler, {'gate': gate, 'room': room}),
+         (r'/model/([0-9]{1,9})', ModelHandler, {'gate': gate, 'room': room}),
          (r'/()', StaticFile, dict(shared, path=str(STATIC), default_filename='index.html')),
          (r'/static/(.+)', StaticFile, dict(shared, path=str(STATIC)))],
         default_handler_class=NotThere, default_handler_args=shared, cookie_secret=gate.secret,

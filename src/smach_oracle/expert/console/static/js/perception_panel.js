@@ -29,7 +29,7 @@ export class PerceptionPanel {
     this.root = this.build();
     this.take('rectangle');
     this.listen();
-    this.feed = new FrameFeed(app, () => ((app.store.get('eye') || {}).perception || {})[question.key] || null, this.root,
+    this.feed = new FrameFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: 200, take: (answer, facts) => this.show(answer, facts), say: (text) => this.say(text) });
     this.refresh();
   }
@@ -48,6 +48,9 @@ export class PerceptionPanel {
   button(text, onclick, kind) { return h('button', { class: kind || 'tool', onclick }, text); }
 
   stop() { this.feed.stop(); }
+
+  // Numbers of the sensors of its frame and of the cloud of that, null before there are any.
+  get sensors() { return ((this.app.store.get('eye') || {}).perception || {})[this.question.key] || { image: null, cloud: null }; }
 
   get may() { return this.app.mayAnswer && !this.over; }
 
