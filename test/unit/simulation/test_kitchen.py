@@ -9,6 +9,7 @@ from std_msgs.msg import Header
 
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal
+from smach_oracle.simulation.robot import door
 from smach_oracle.simulation.robot.arm import Means, SkillError
 from smach_oracle.simulation.robot.collision import installed_model
 from smach_oracle.simulation.robot.door_view import DoorNotSeen, find_door
@@ -158,6 +159,30 @@ def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of
     assert world.body_joint('fridge', DOOR_JOINT) > np.radians(85.0)
     assert not [contact for contact in world.contacts('fridge') if contact.other == 'robot']
     world.close()
+
+
+def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monkeypatch):
+    world = World(door_at(60, base=(0.4, -0.1, 0.0)))
+    robot = DirectRobot(world)
+
+    def fail(*_):
+        raise SkillError('caught behind the handle')
+    monkeypatch.setattr(door, '_open', fail)
+    with pytest.raises(SkillError, match='caught behind'):
+        door.open_door(Means(robot, installed_model()), Kitchen(), 'right')
+    assert world.true_base()[0, 3] < 0.4 - 0.3
+    world.close()
+
+
+def test_a_moved_drink_is_moved_to_where_there_is_room():
+    scenes = [scene for scene in map(draw, range(300)) if 'drink_moved' in [cause.kind for cause in scene.causes]]
+    assert len(scenes) > 10
+    for scene in scenes:
+        drinks = [body for body in scene.bodies if body.name.startswith('drink')]
+        values = dict(next(each.values for each in scene.disturbances if each.kind.startswith('nudge')))
+        there = np.add(drinks[0].position[:2], (values['dx'], values['dy']))
+        assert min(np.linalg.norm(there - other.position[:2]) for other in drinks[1:]) > 0.07
+        assert abs(there[1]) < Kitchen().width / 2 - 0.06
 
 
 def test_the_fridge_is_a_model_of_its_map():

@@ -108,6 +108,17 @@ def test_each_drive_errs_anew_and_the_same_way_for_the_same_trial(world):
     assert 0.005 < np.linalg.norm(misses[0]) < 0.25 and np.linalg.norm(misses[1] - misses[0]) > 0.005
 
 
+def test_a_short_drive_keeps_most_of_the_error_that_there_was(world):
+    world.reset(empty(robot=RobotStart(drive_error=(0.05, 0.05, 0.02))))
+    robot = DirectRobot(world)
+    robot.drive(from_rpy((1.0, 0, 0)))
+    before = world.belief_error.copy()
+    robot.drive(from_rpy((0.98, 0, 0)))
+    after = world.belief_error
+    assert 0.0 < np.linalg.norm(after[:2, 3] - before[:2, 3]) < 0.04 * 3 * 0.05 + 0.04 * np.linalg.norm(before[:2, 3])
+    assert np.linalg.norm(before[:2, 3]) > 0.01
+
+
 def test_clients_are_given_back(world):
     numbers = set()
     for _ in range(8):

@@ -19,6 +19,7 @@ _TURNS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad beside the straight heading
 _PITCHES = (0.45, 0.9, 0.15)  # rad downwards
 _LEVEL = (0.1, 0.3)  # the same, inside a shelf
 _OFF_SHELF = 0.03  # m that a thing is lifted inside a shelf
+_SQUEEZE = 90.0  # N: the robot, which grips with less, may have lost it before
 OUT = 0.28  # m straight back out of a shelf
 
 Look = Callable[[], Sight]
@@ -247,7 +248,7 @@ def _reach_in(attempt: Attempt, sight: Sight, thing: Seen) -> None:
     _as_far_as_it_goes(lambda: pilot.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
     pilot.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
     pilot.go(grasp, share=0.4, near=(0.006, 0.05))
-    if not pilot.close().stalled or attempt.look().held_by(pilot.hand.arm) is None:
+    if not pilot.close(_SQUEEZE).stalled or attempt.look().held_by(pilot.hand.arm) is None:
         pilot.open()
         pilot.back(OUT * 0.7)
         raise Failed('the hand closed on nothing')

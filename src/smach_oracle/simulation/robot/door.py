@@ -3,7 +3,8 @@
 Opening does not look at its result: where the arm did not get far enough, the door stands half open and nobody knows
 until somebody looks into the fridge.
 """
-from typing import Callable, Dict, Optional, Tuple
+from contextlib import contextmanager
+from typing import Callable, Dict, Iterator, Optional, Tuple
 
 import numpy as np
 
@@ -26,6 +27,7 @@ WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 AWAY = 0.16  # m that the base takes the hand back from the bar
+AWAY_FOR_GOOD = 0.40  # m, after a failure
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
@@ -50,6 +52,11 @@ def open_door(means: Means, kitchen: Kitchen, arm: str) -> float:
     :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
     _check_arm(arm)
+    with _letting_be(means):
+        return _open(means, kitchen, arm)
+
+
+def _open(means: Means, kitchen: Kitchen, arm: str) -> float:
     view = _stand_before(means, kitchen)
     if view.angle < AJAR:
         angle = _pull(means, kitchen, arm, view)
@@ -69,6 +76,11 @@ def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
     :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
     """
     _check_arm(arm)
+    with _letting_be(means):
+        _close(means, kitchen, arm)
+
+
+def _close(means: Means, kitchen: Kitchen, arm: str) -> None:
     drive(means, odom_from_pose(kitchen, *CLOSING))
     _clear_of_door(means, next(other for other in ARMS if other != arm))
     view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
@@ -82,6 +94,19 @@ def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
             view = look(means.robot, kitchen, np.array([-0.2, 0.10, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
         raise SkillError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
+
+
+@contextmanager
+def _letting_be(means: Means) -> Iterator[None]:
+    """After a failure in here the base takes the hands away from the door: one may be caught behind a part of it."""
+    try:
+        yield
+    except SkillError:
+        try:
+            _step_back(means, AWAY_FOR_GOOD)
+        except SkillError:
+            pass  # the reason of the failure is the one to tell
+        raise
 
 
 def _stand_before(means: Means, kitchen: Kitchen) -> DoorView:

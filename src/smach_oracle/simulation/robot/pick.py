@@ -5,7 +5,7 @@ import numpy as np
 
 from ...geometry.box import UprightBox
 from ...geometry.transforms import inverse
-from .arm import FAST, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
+from .arm import FAST, FEEL_EFFORT, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
 from .grasps import Grasp, grasps
 from .interface import GRIPPER_OPEN
 from .kitchen import MapBox
@@ -18,12 +18,17 @@ EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 TARGET = 'the object'
 
 
+class Slipped(SkillError):
+    """The object did not come along when it was lifted."""
+
+
 class Held(NamedTuple):
     """What a hand holds."""
 
     grasp: np.ndarray  # 4x4, base_footprint from tool, when the gripper closed
     tool_from_object: np.ndarray  # 4x4, of its centre, upright as it stood
     half: np.ndarray  # (3,) m, half extents along its axes
+    effort: float = FEEL_EFFORT  # N, of the grip
 
 
 class _Way(NamedTuple):
@@ -34,12 +39,14 @@ class _Way(NamedTuple):
     approach: np.ndarray  # (k, 7) from there
 
 
-def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox]) -> Held:
+def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
+         effort: float = FEEL_EFFORT) -> Held:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
     :param target: the object.
     :param boxes: obstacles without the object, in base_footprint.
+    :param effort: N, of the grip.
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
     ways = grasps(target, arm) if arm in ('left', 'right') else []
@@ -50,10 +57,10 @@ def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox]
             raise SkillError('the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
                 100 * target.size[0], 100 * target.size[1]))
         hand.open()
-        return _pick(hand, target, ways)
+        return _pick(hand, target, ways, effort)
 
 
-def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp]) -> Held:
+def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp], effort: float) -> Held:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
@@ -62,8 +69,8 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp]) -> Held:
             continue
         hand.follow(way.there, FAST)
         hand.follow(way.approach, SLOW)
-        if hand.close() > 0:
-            return _lift(hand, target)
+        if hand.close(effort) > 0:
+            return _lift(hand, target, effort)
         missed += 1
         hand.open()
         hand.follow(way.approach[::-1], SLOW)
@@ -97,10 +104,10 @@ def _way_to(hand: Arm, grasp: Grasp, reasons: List[str]) -> Optional[_Way]:
     return None
 
 
-def _lift(hand: Arm, target: UprightBox) -> Held:
+def _lift(hand: Arm, target: UprightBox, effort: float) -> Held:
     """Lift what the gripper has closed on, and feel whether it came along."""
     grasp = hand.pose()
-    held = Held(grasp, inverse(grasp) @ target.matrix, target.size / 2)
+    held = Held(grasp, inverse(grasp) @ target.matrix, target.size / 2, effort)
     hand.space.remove(TARGET)
     with hand.space.touchable(hand.space.names()):
         lines = (hand.line(hand.now(), lifted(grasp, height)) for height in LIFTS)
@@ -109,6 +116,6 @@ def _lift(hand: Arm, target: UprightBox) -> Held:
         hand.open(GRIPPER_OPEN)
         raise SkillError('the arm cannot lift the object from where it grasped it')
     hand.follow(way, SLOW)
-    if hand.close() == 0:
-        raise SkillError('the object slipped out of the gripper when it was lifted')
+    if hand.close(effort) == 0:
+        raise Slipped('the object slipped out of the gripper when it was lifted')
     return held

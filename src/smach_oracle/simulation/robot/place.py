@@ -49,13 +49,13 @@ def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping
     with Arm(means, arm, boxes, seed_of(arm, centre, held.grasp, means.robot.joints())) as hand:
         if support not in boxes:
             raise SkillError('there is nothing to stand on: the collision map has no {}'.format(support))
-        if hand.close() == 0:
+        if hand.close(held.effort) == 0:
             raise Lost('the {} hand holds nothing'.format(arm))
         centre = _on_support(centre, held, boxes[support])
         hand.space.attach(held.half - 0.004, held.tool_from_object)
         centre, way = _find_way(hand, centre, held, support)
         hand.follow(way.there, FAST)
-        if hand.close() == 0:
+        if hand.close(held.effort) == 0:
             raise Lost('the object was lost on the way to its place')
         hand.follow(way.down, SLOW)
         hand.open()

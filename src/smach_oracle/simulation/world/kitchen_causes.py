@@ -5,9 +5,10 @@ import numpy as np
 
 from .scene import Body, Cause, Disturbance, Vector
 
-CHANCE = {'base_misplaced': 0.14, 'door_swings_back': 0.14, 'crowded': 0.04, 'glare': 0.15, 'slippery_drink': 0.04,
-          'drink_moved': 0.08, 'drink_at_the_back': 0.02}
+CHANCE = {'base_misplaced': 0.12, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.18, 'slippery_drink': 0.03,
+          'drink_moved': 0.10}
 TARGET = 0  # the drink that stands nearest to the front
+ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 STEADY: Vector = (0.008, 0.008, 0.006)  # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 
 
@@ -16,6 +17,7 @@ class Draft(NamedTuple):
 
     drinks: Tuple[Body, ...]
     front: Tuple[float, float]  # x, y of the middle of the fridge's opening, m
+    half_width: float  # m from there to the inner side of a wall
     drive_error: Vector = STEADY
     disturbances: Tuple[Disturbance, ...] = ()
     causes: Tuple[Cause, ...] = ()
@@ -68,32 +70,32 @@ def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _slippery_drink(draft: Draft, generator: np.random.Generator) -> Draft:
-    friction, mass = float(generator.uniform(0.03, 0.08)), float(generator.uniform(0.6, 0.8))
+    friction, mass = float(generator.uniform(0.045, 0.08)), float(generator.uniform(0.6, 0.75))
     drinks = tuple(drink._replace(friction=friction, mass=mass) for drink in draft.drinks[:1]) + draft.drinks[1:]
     return _caused(draft._replace(drinks=drinks), 'slippery_drink',
                    'the nearest drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
 
 
 def _drink_moved(draft: Draft, generator: np.random.Generator) -> Draft:
-    """Somebody reaches in and moves the nearest drink after it has been detected."""
-    way = float(generator.uniform(0.05, 0.08))
-    side = 1.0 if generator.random() < 0.5 else -1.0
-    values = (('dx', 0.02), ('dy', side * way), ('duration', 0.8))
+    """Somebody reaches in and moves the nearest drink after it has been detected, to where there is room."""
+    ways = [(float(generator.uniform(0.0, 0.06)), side * float(generator.uniform(0.05, 0.09)))
+            for _ in range(30) for side in (1.0, -1.0)]
+    x, y = draft.drinks[TARGET].position[:2]
+    dx, dy = max(ways, key=lambda way: min(ROOM, _room_at(draft, x + way[0], y + way[1])))
+    values = (('dx', dx), ('dy', dy), ('duration', 0.8))
     return _caused(draft, 'drink_moved', 'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
-        100 * way), Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:3', values))
+        100 * float(np.hypot(dx, dy))), Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:3', values))
 
 
-def _drink_at_the_back(draft: Draft, generator: np.random.Generator) -> Draft:
-    """There is one drink, and it stands in a corner at the back."""
-    spot = (draft.front[0] + float(generator.uniform(0.36, 0.42)), draft.front[1] + float(generator.uniform(0.14, 0.2)))
-    target = draft.drinks[TARGET]
-    moved = target._replace(position=(spot[0], spot[1], target.position[2]))
-    return _caused(draft._replace(drinks=(moved,)), 'drink_at_the_back',
-                   'the only drink stands {:.0f} cm deep in the fridge'.format(100 * (spot[0] - draft.front[0])))
+def _room_at(draft: Draft, x: float, y: float) -> float:
+    """m from a place for the nearest drink to the middle of the next drink, or what a wall leaves in its stead."""
+    gaps = [float(np.hypot(other.position[0] - x, other.position[1] - y))
+            for number, other in enumerate(draft.drinks) if number != TARGET]
+    return min(gaps + [draft.half_width - abs(y - draft.front[1])])
 
 
 Maker = Callable[[Draft, np.random.Generator], Draft]
 MAKERS: Dict[str, Maker] = {'base_misplaced': _base_misplaced, 'door_swings_back': _door_swings_back,
                             'crowded': _crowded, 'glare': _glare, 'slippery_drink': _slippery_drink,
-                            'drink_moved': _drink_moved, 'drink_at_the_back': _drink_at_the_back}
+                            'drink_moved': _drink_moved}
 KINDS: List[str] = sorted(CHANCE)

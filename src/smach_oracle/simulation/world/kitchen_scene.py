@@ -30,7 +30,7 @@ def draw(seed: int, benign: bool = False) -> Scene:
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
     generator = np.random.default_rng([seed, 2])
     kitchen = Kitchen()
-    draft = Draft(tuple(_drinks(generator, kitchen)), kitchen.place[:2])
+    draft = Draft(tuple(_drinks(generator, kitchen)), kitchen.place[:2], kitchen.width / 2 - kitchen.wall)
     if not benign:
         draft = with_causes(draft, seed)
     goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)

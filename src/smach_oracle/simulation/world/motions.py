@@ -18,6 +18,7 @@ STALL_S = 0.25
 LONGEST_S = 10.0  # for what trembles between the fingers
 TORSO_SPEED = 0.013  # m/s, a PR2's
 HEAD_SPEED = 1.0  # rad/s, mean of a turn
+LONG_DRIVE = 0.5  # m, or rad, after which a drive's error is all its own; a shorter one keeps some of the last one's
 BASE_SPEED, BASE_TURN = 0.25, 0.4  # m/s, rad/s, means of a drive
 
 
@@ -152,7 +153,8 @@ class Drive:
         return None
 
     def _begin(self, world: World) -> None:
-        error = world.drive_error()
+        way = inverse(world.odom_from_base()) @ self._goal
+        error = world.drive_error(min(1.0, (float(np.hypot(way[0, 3], way[1, 3])) + abs(yaw_of(way))) / LONG_DRIVE))
         true_goal = self._goal @ error
         self._begun = world.periods
         self._start = np.array([world.robot.position(name) for name in BASE_JOINTS])

@@ -9,7 +9,7 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 import numpy as np
 import pybullet
 
-from ...geometry.transforms import from_rpy, inverse
+from ...geometry.transforms import from_rpy, inverse, yaw_of
 from ..robot.interface import ARMS, TOOL_FRAME
 from .bodies import Placed, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
@@ -168,10 +168,15 @@ class World:
         """4x4, where the robot believes to stand: odom_combined, which is the world's frame, from base_footprint."""
         return self._robot.base() @ inverse(self.belief_error)
 
-    def drive_error(self) -> np.ndarray:
-        """4x4, by how much the next drive will miss its goal unknown to the robot; the same for the same trial."""
+    def drive_error(self, share: float = 1.0) -> np.ndarray:
+        """4x4, by how much the next drive will miss its goal unknown to the robot; the same for the same trial.
+
+        :param share: of the error that is drawn anew: a short drive keeps most of what there was.
+        """
         self.drives += 1
-        x, y, yaw = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(0.0, self.scene.robot.drive_error)
+        drawn = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(0.0, self.scene.robot.drive_error)
+        before = np.array([self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)])
+        x, y, yaw = (1.0 - share) * before + share * drawn
         return from_rpy((x, y, 0.0), yaw=yaw)
 
     def link_pose(self, link: str) -> np.ndarray:
