@@ -1,4 +1,4 @@
-"""The scripted operator's hand in the kitchen, without ROS: a drink taken off its shelf, and given to who waits for it."""
+"""The scripted operator's hand in the kitchen, without ROS: a drink taken off its shelf, and handed over."""
 import numpy as np
 import pytest
 from direct_hand import DirectHand, look
