@@ -14,11 +14,13 @@ from typing import Any, Callable, Dict, List, MutableSet, NamedTuple, Optional, 
 import rospy
 import smach
 
-from smach_oracle.msg import ConsoleCommand
+from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput
 from smach_oracle.oracle.errors import ConfigError
 
 from .expert_client import OWN_SERVER, ExpertQueryClient
 from .event_messages import rates_to_msg
+from .failure_frames import TOPIC as FRAMES_TOPIC
+from .interface_starting import OUTPUT_TOPIC
 from .master_watch import start_master_watch
 from .publishers import EventPublisher, RatesPublisher
 from .recorder import TrialRecorder, prepare_folder
@@ -118,7 +120,8 @@ class Attachments:
 
     def _shared_expert(self) -> ExpertQueryClient:
         if self._expert is None:
-            self._expert = ExpertQueryClient(read_private('expert_query_server', ''))
+            self._expert = ExpertQueryClient(read_private('expert_query_server', ''),
+                                             cameras=read_private('failure_cameras', []))
         return self._expert
 
     def _plan_recording(self, node: bool) -> Optional[_RecordingPlan]:
@@ -138,7 +141,10 @@ class Attachments:
             topics += _topic_names(read_private('record_topics', []))
             topics += smach_topics(rospy.get_name()) + action_topics(rospy.resolve_name('~expert_query'))
             audit = audit_topic(rospy.resolve_name(read_private('expert_query_server', '') or OWN_SERVER))
-            return _RecordingPlan(folder, topics + [audit], {audit: ConsoleCommand})
+            types = {audit: ConsoleCommand, rospy.resolve_name(OUTPUT_TOPIC): InterfaceOutput}
+            if read_private('failure_cameras', []):
+                types[rospy.resolve_name(FRAMES_TOPIC)] = FailureFrames
+            return _RecordingPlan(folder, topics + list(types), types)
         return _RecordingPlan(folder, topics, {})
 
     def _record(self, machine: Any, plan: Optional[_RecordingPlan]) -> None:

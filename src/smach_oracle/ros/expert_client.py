@@ -2,7 +2,7 @@
 import math
 import threading
 import time
-from typing import Dict, Optional
+from typing import Dict, Optional, Sequence
 
 import rosgraph
 import rospy
@@ -14,6 +14,7 @@ from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQuer
 from ..oracle.errors import InterfaceError
 from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progress, Question, names
 from .expert_server import ExpertQueryServer
+from .failure_frames import FailureCameras
 from .goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
 from .interface_starting import InterfaceStarter, StartedInterface
 from .precondition_watch import PreconditionWatch
@@ -33,11 +34,12 @@ class ExpertQueryClient(Expert):
     deadline.
     """
 
-    def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S) -> None:
+    def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S,
+                 cameras: Sequence[str] = ()) -> None:
         """`server`: name of a shared server; '' hosts one of this node's own, `~expert_query`, and asks that.
 
         `robot`: who asks, the node's name where ''. `server_wait_s`: how long a shared-autonomy interface that an
-        expert chose is waited for.
+        expert chose is waited for. `cameras`: topics whose newest frames are told with each question.
         """
         self.robot = robot or rospy.get_name()
         self.server: Optional[ExpertQueryServer] = None if server else ExpertQueryServer(OWN_SERVER)
@@ -45,6 +47,7 @@ class ExpertQueryClient(Expert):
         self._server_wait_s = server_wait_s
         self._starter = InterfaceStarter()
         self._watch = PreconditionWatch()
+        self._cameras = FailureCameras(cameras)
         self._interfaces: Dict[str, GoalLink] = {}
         self._interfaces_lock = threading.Lock()
 
@@ -54,6 +57,7 @@ class ExpertQueryClient(Expert):
         :raises AnswerError: if the answer cannot be used here, such as outputs of a message type that is not
             installed.
         """
+        self._cameras.tell(question)
         with self._watch.over(question):
             return _Asking(self._link, to_goal(question, self.robot), progress).run(cancelled)
 
@@ -78,6 +82,7 @@ class ExpertQueryClient(Expert):
     def close(self) -> None:
         """Take down the connections, and the own server where there is one."""
         self._starter.stop()
+        self._cameras.stop()
         for link in [self._link] + list(self._interfaces.values()):
             link.stop()
         if self.server is not None:

@@ -1,0 +1,98 @@
+"""What the robot's cameras saw when a question was put: told on a latched topic, for those, too, who come later.
+
+The cameras are listened to all the time, for the frame must be there when the failure is. Nothing of it is waited for.
+"""
+import threading
+from typing import Any, Dict, List, Sequence
+
+import rosgraph
+import rospy
+from sensor_msgs.msg import CompressedImage, Image
+
+from smach_oracle.msg import FailureFrames
+
+from ..oracle.errors import ConfigError
+from ..oracle.question import Question
+
+TOPIC = '~failure_frames'
+PARAMETER = '~failure_cameras'
+MOST_CAMERAS = 4
+JPEG_QUALITY = 85
+LOOK_AGAIN_S = 1.0  # for the types of topics that nobody has advertised yet
+_TYPES = {Image._type: Image, CompressedImage._type: CompressedImage}
+
+
+class FailureCameras:
+    """Of a node: holds the newest frame of each camera, and tells them when a question is put."""
+
+    def __init__(self, topics: Sequence[str]) -> None:
+        """`topics` of type Image or CompressedImage, four at most, in colour or grey.
+
+        :raises ConfigError: where they are no names of topics, or more.
+        """
+        if not all(isinstance(topic, str) and topic for topic in topics) or len(topics) > MOST_CAMERAS:
+            raise ConfigError('parameter ' + rospy.resolve_name(PARAMETER), topics,
+                              'at most {} names of topics'.format(MOST_CAMERAS))
+        self._topics = [rospy.resolve_name(topic) for topic in topics]
+        self._newest: Dict[str, Any] = {}
+        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._lock = threading.Lock()
+        if self._topics:
+            self._publisher = rospy.Publisher(TOPIC, FailureFrames, latch=True, queue_size=5)
+            threading.Thread(target=self._listen, name='failure cameras', daemon=True).start()
+
+    def tell(self, question: Question) -> None:
+        """Publish what is there now, in a thread of its own; nothing where no camera has been heard."""
+        with self._lock:
+            frames = [(topic, self._newest[topic]) for topic in self._topics if topic in self._newest]
+        if frames:
+            threading.Thread(target=self._publish, args=(question, frames), name='failure frames', daemon=True).start()
+
+    def stop(self) -> None:
+        """Listen no longer."""
+        for subscriber in list(self._subscribers.values()):
+            subscriber.unregister()
+
+    def _listen(self) -> None:
+        """Subscribe to each as soon as its type is known."""
+        while len(self._subscribers) < len(self._topics) and not rospy.is_shutdown():
+            try:
+                types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
+            except (OSError, rosgraph.MasterException):
+                types = {}
+            for topic in self._topics:
+                if topic not in self._subscribers and types.get(topic) in _TYPES:
+                    self._subscribers[topic] = rospy.Subscriber(topic, _TYPES[types[topic]], self._keep,
+                                                                callback_args=topic, queue_size=1, buff_size=1 << 24)
+            rospy.rostime.wallsleep(LOOK_AGAIN_S)
+
+    def _keep(self, image: Any, topic: str) -> None:
+        with self._lock:
+            self._newest[topic] = image
+
+    def _publish(self, question: Question, frames: List[Any]) -> None:
+        message = FailureFrames(trial_id=question.trial_id, query_id=question.query_id)
+        for topic, image in frames:
+            try:
+                message.images.append(compressed(image))
+                message.topics.append(topic)
+            except ValueError as err:
+                rospy.logwarn('What %s saw at the failure cannot be told: %s', topic, err)
+        message.header.stamp = rospy.get_rostime()
+        if message.images and not rospy.is_shutdown():
+            self._publisher.publish(message)
+
+
+def compressed(image: Any) -> CompressedImage:
+    """A JPEG of an Image; a CompressedImage as it is.
+
+    :raises ValueError: where the image is none in colour or grey.
+    """
+    if not isinstance(image, Image):
+        return image
+    import cv2  # takes a moment, and is wanted only where there are cameras
+    from .images import colour_of
+    done, data = cv2.imencode('.jpg', colour_of(image)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not done:
+        raise ValueError('it cannot be encoded')
+    return CompressedImage(image.header, 'jpeg', bytes(data))
