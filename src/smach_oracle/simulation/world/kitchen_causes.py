@@ -5,9 +5,10 @@ import numpy as np
 
 from .scene import Body, Cause, Disturbance, Vector
 
-CHANCE = {'base_misplaced': 0.12, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.18, 'slippery_drink': 0.03,
+CHANCE = {'base_misplaced': 0.12, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.16, 'slippery_drink': 0.04,
           'drink_moved': 0.10}
 TARGET = 0  # the drink that stands nearest to the front
+LONG_GLARE = 0.1  # share of glares that last for two frames
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 STEADY: Vector = (0.008, 0.008, 0.006)  # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 
@@ -63,10 +64,11 @@ def _crowded(draft: Draft, generator: np.random.Generator) -> Draft:
 
 
 def _glare(draft: Draft, generator: np.random.Generator) -> Draft:
+    """The camera is dazzled for a moment when it turns to the drinks: it has looked at the door twice before."""
     dropout = float(generator.uniform(0.93, 0.99))
-    frames = int(generator.integers(1, 4))
+    frames = 2 if generator.random() < LONG_GLARE else 1
     return _caused(draft, 'glare', 'the sun shines into the camera for {} frames: {:.0f}% of the depth is lost'.format(
-        frames, 100 * dropout), Disturbance('glare', 'see:2', (('dropout', dropout), ('frames', frames))))
+        frames, 100 * dropout), Disturbance('glare', 'look_at:3', (('dropout', dropout), ('frames', frames))))
 
 
 def _slippery_drink(draft: Draft, generator: np.random.Generator) -> Draft:
