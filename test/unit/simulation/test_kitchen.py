@@ -4,17 +4,18 @@ import itertools
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 
 from smach_oracle.geometry.transforms import apply, from_rpy
-from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal
-from smach_oracle.simulation.robot import door
+from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal, PickGoal
+from smach_oracle.simulation.robot import door, kitchen_skills
 from smach_oracle.simulation.robot.arm import Means, SkillError
 from smach_oracle.simulation.robot.collision import installed_model
 from smach_oracle.simulation.robot.door_view import DoorNotSeen, find_door
 from smach_oracle.simulation.robot.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
 from smach_oracle.simulation.robot.kitchen_skills import KitchenSkills
+from smach_oracle.simulation.robot.pick import Slipped
 from smach_oracle.simulation.world import drink_rehearsal
 from smach_oracle.simulation.world.direct import DirectRobot
 from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
@@ -171,6 +172,27 @@ def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monke
     with pytest.raises(SkillError, match='caught behind'):
         door.open_door(Means(robot, installed_model()), Kitchen(), 'right')
     assert world.true_base()[0, 3] < 0.4 - 0.3
+    world.close()
+
+
+def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeypatch):
+    world = World(draw(1, benign=True))
+    skills = KitchenSkills(Means(DirectRobot(world), installed_model()), Kitchen())
+    efforts = []
+
+    def slip(*given):
+        efforts.append(given[-1])
+        raise Slipped('it slipped')
+    monkeypatch.setattr(kitchen_skills, 'pick_from_fridge', slip)
+    monkeypatch.setattr(kitchen_skills, 'open_door', lambda *_: 1.6)
+    drink = PoseStamped(Header(frame_id='base_link'), Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    for _ in range(2):
+        with pytest.raises(Slipped):
+            skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'), lambda status: None)
+    skills.open_door(OpenDoorGoal('right'), lambda status: None)
+    with pytest.raises(Slipped):
+        skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'), lambda status: None)
+    assert efforts[0] < efforts[1] and efforts[2] == efforts[0]
     world.close()
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from .scene import Body, Cause, Disturbance, Vector
 
-CHANCE = {'base_misplaced': 0.12, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.16, 'slippery_drink': 0.04,
+CHANCE = {'base_misplaced': 0.14, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.16, 'slippery_drink': 0.04,
           'drink_moved': 0.10}
 TARGET = 0  # the drink that stands nearest to the front
 LONG_GLARE = 0.1  # share of glares that last for two frames
@@ -39,7 +39,7 @@ def _caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> D
 
 def _base_misplaced(draft: Draft, generator: np.random.Generator) -> Draft:
     """Every drive ends some centimetres beside its goal: too near, and the base itself is in the door's way."""
-    sigma = float(generator.uniform(0.04, 0.06))
+    sigma = float(generator.uniform(0.045, 0.065))
     return _caused(draft._replace(drive_error=(1.2 * sigma, 0.8 * sigma, 0.4 * sigma)), 'base_misplaced',
                    'drives end {:.1f} cm beside their goals (sigma)'.format(100 * sigma))
 
