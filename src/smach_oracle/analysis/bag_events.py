@@ -1,5 +1,6 @@
 """Finds bags and reads the executive's events and the worlds' causes out of them, with rosbags: it needs no ROS."""
 import json
+import math
 import os
 import sys
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
@@ -17,6 +18,7 @@ from ..oracle.events import Event, EventKind
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
+_EVENTS = '/oracle/events'
 _KINDS = {int(kind): kind for kind in EventKind}
 
 
@@ -45,7 +47,7 @@ class BagContent(NamedTuple):
 
     events: List[Event]  # in the order of their recording
     causes: Dict[str, Cause]  # by trial id
-
+    nodes: Dict[str, str]  # by trial id: whose events they are, as their topic tells
 
 
 
@@ -75,11 +77,30 @@ def _walk(folder: str) -> Iterator[str]:
                 yield os.path.join(parent, name)
 
 
-class EventReader:
-    """Reads bags; remembers the message definitions it has met, so that many bags are quick."""
+class MessageStores:
+    """Reads messages; remembers the definitions it has met, so that many bags are quick."""
 
     def __init__(self) -> None:
         self._stores: Dict[str, Any] = {}  # by message definition: another release's events may have other fields
+
+    def read(self, connection: Any, data: bytes) -> Any:
+        """One message of a connection. Raises whatever a damaged one makes rosbags raise."""
+        definition = connection.msgdef
+        text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
+        if text not in self._stores:
+            store = get_typestore(Stores.EMPTY)
+            store.register(get_types_from_msg(text, connection.msgtype))
+            self._stores[text] = store
+        return self._stores[text].deserialize_ros1(data, connection.msgtype)
+
+
+class EventReader:
+    """Reads bags."""
+
+    def __init__(self, most_events: float = math.inf) -> None:
+        """`most_events`: a bag with more is refused."""
+        self._stores = MessageStores()
+        self._most_events = most_events
 
     def read(self, path: str) -> BagContent:
         """All events in a bag, and the cause of each trial; the topics' names do not matter.
@@ -101,30 +122,25 @@ class EventReader:
         events: List[Event] = []
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
         causes: List[Tuple[int, Cause]] = []
+        nodes: Dict[str, str] = {}
         with Reader(path) as reader:
             connections = [item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)]
             if not any(item.msgtype == EVENT_TYPE for item in connections):
                 raise BagError('no events of the executive in it')
-            stores = {item.id: self._store(item.msgdef, item.msgtype) for item in connections}
             for item, stamp, data in reader.messages(connections):
-                message = stores[item.id].deserialize_ros1(data, item.msgtype)
+                message = self._stores.read(item, data)
                 if item.msgtype == CAUSE_TYPE:
                     causes.append((stamp, _cause(message)))
                 else:
                     events.append(_event(message))
                     ends[message.trial_id] = stamp
+                    nodes[message.trial_id] = item.topic[:-len(_EVENTS)] if item.topic.endswith(_EVENTS) else ''
+                if len(events) > self._most_events:
+                    raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own
             ends[max(ends, key=lambda trial_id: ends[trial_id])] = max([stamp for stamp, _ in causes], default=0)
         found = {trial_id: _latest(causes, end) for trial_id, end in ends.items()}
-        return BagContent(events, {trial_id: cause for trial_id, cause in found.items() if cause is not None})
-
-    def _store(self, definition: Any, kind: str) -> Any:
-        text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
-        if text not in self._stores:
-            store = get_typestore(Stores.EMPTY)
-            store.register(get_types_from_msg(text, kind))
-            self._stores[text] = store
-        return self._stores[text]
+        return BagContent(events, {trial_id: cause for trial_id, cause in found.items() if cause is not None}, nodes)
 
 
 def _latest(causes: Sequence[Tuple[int, Cause]], end: int) -> Optional[Cause]:

@@ -8,13 +8,18 @@ import tornado.testing
 import tornado.websocket
 
 from smach_oracle.expert.console.access import Hosts, TokenBook
+from smach_oracle.expert.console.bags import BagShelf
 from smach_oracle.expert.console.desk import Reply
 from smach_oracle.expert.console.handlers import Gate
+from smach_oracle.expert.console.history_handlers import HistoryRoom
+from smach_oracle.expert.console.layout import Layouter
 from smach_oracle.expert.console.page_socket import Office
+from smach_oracle.expert.console.recorded import RecordedTrials
 from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.console.sensors import Sensors
 from smach_oracle.expert.console.server import make_app
 from smach_oracle.expert.console.settings import ConsoleSettings
+from smach_oracle.expert.console.stills import StillFiles
 from smach_oracle.expert.console.trial_log import TrialLog
 
 os.environ.setdefault('ASYNC_TEST_TIMEOUT', '30')  # s; the machine may be loaded
@@ -84,7 +89,14 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
         self.office = Office(self.sections, self.log, self.desk, self.hands)
         self.sensors = Sensors()
-        return make_app(self.gate, self.office, self.sensors)
+        self.files = StillFiles()
+        self.shelf = BagShelf(self.folders(), self.sections)
+        recorded = RecordedTrials(self.shelf, Layouter(), self.files)
+        return make_app(self.gate, self.office, self.sensors, HistoryRoom(recorded, self.files))
+
+    def folders(self):
+        """Of bags."""
+        return []
 
     @property
     def origin(self):

@@ -13,7 +13,7 @@ INTERFACES = {'msg', 'srv'}
 ARROWS = {
     'oracle': set(),
     'ros': {'oracle'},
-    'expert': {'oracle', 'ros', 'geometry'},
+    'expert': {'oracle', 'ros', 'geometry', 'analysis'},
     'simulation': {'oracle', 'ros', 'analysis', 'geometry', 'expert'},
     'geometry': set(),
     'tasks': set(),

@@ -4,7 +4,7 @@ import shutil
 import subprocess
 import threading
 from collections import OrderedDict
-from typing import Callable, Optional
+from typing import Callable, Dict, List, Optional
 
 import rospy
 
@@ -24,7 +24,9 @@ class Layouter:
         self._command = shutil.which(command)
         self._limit_s = limit_s
         self._layouts: 'OrderedDict[str, Optional[Layout]]' = OrderedDict()
-        self._waiting: 'queue.Queue[tuple]' = queue.Queue()
+        self._waiting: 'queue.Queue[str]' = queue.Queue()
+        self._asked: Dict[str, List[Done]] = {}  # who waits for it
+        self._lock = threading.Lock()
         if self._command is None:
             rospy.logwarn('Graphviz is not installed (no %s in PATH): state graphs are shown as lists.', command)
         else:
@@ -32,21 +34,38 @@ class Layouter:
 
     def find(self, text: str, done: Done) -> Optional[Layout]:
         """The layout of a graph, or None where it cannot be had, or not yet: `done` is called when it is there."""
-        if text in self._layouts:
-            self._layouts.move_to_end(text)
-            return self._layouts[text]
-        if self._command is not None:
-            self._layouts[text] = None
-            self._waiting.put((text, done))
+        with self._lock:
+            if text in self._layouts:
+                self._layouts.move_to_end(text)
+                if text in self._asked:
+                    self._asked[text].append(done)
+                return self._layouts[text]
+            if self._command is not None:
+                self._layouts[text] = None
+                self._asked[text] = [done]
+                self._waiting.put(text)
         return None
+
+    def wait(self, text: str, limit_s: float) -> Optional[Layout]:
+        """The layout of a graph, waiting for it so long at most; None where it cannot be had, or not in time."""
+        there = threading.Event()
+        found = self.find(text, there.set)
+        if found is None and text in self._asked:
+            there.wait(limit_s)
+            found = self._layouts.get(text)
+        return found
 
     def _run(self) -> None:
         while not rospy.is_shutdown():
-            text, done = self._waiting.get()
-            self._layouts[text] = self._lay_out(text)
-            while len(self._layouts) > _REMEMBERED:
-                self._layouts.popitem(last=False)
-            done()
+            text = self._waiting.get()
+            layout = self._lay_out(text)
+            with self._lock:
+                self._layouts[text] = layout
+                waiting = self._asked.pop(text)
+                for old in [each for each in self._layouts if each not in self._asked][:-_REMEMBERED]:
+                    del self._layouts[old]
+            for done in waiting:
+                done()
 
     def _lay_out(self, text: str) -> Optional[Layout]:
         try:

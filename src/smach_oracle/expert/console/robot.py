@@ -120,11 +120,12 @@ class Robot:
         found = dict(self._structures)
         for path, rates in self._rates.items():
             if path not in found:
-                found[path] = _guess(path, list(rates), self._counts.get(path, []))
+                found[path] = guess(path, list(rates), self._counts.get(path, []))
         return found
 
 
-def _guess(path: str, labels: List[str], counts: List[List[Any]]) -> Structure:
+def guess(path: str, labels: List[str], counts: List[List[Any]]) -> Structure:
+    """A container of which only its labels and the transitions taken are known; `counts`: as `graph.shares`."""
     targets = {str(target) for _, _, target, _, _ in counts}
     oracle: Optional[str] = next((str(source) for source, outcome, target, _, _ in counts
                                   if outcome == target and source not in labels), None)

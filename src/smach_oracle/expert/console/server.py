@@ -18,6 +18,7 @@ from ...ros.command_line import parameters_only
 from ...ros.master_watch import start_master_watch
 from ..front_end import FrontEnd
 from .audit import Audit
+from .bags import BagShelf
 from .commands import MOST_BYTES
 from .conditions import Conditions
 from .desk import Desk
@@ -25,12 +26,15 @@ from .eye import Eye
 from .frames import FrameHandler, FrameRoom, ModelHandler
 from .hands import Hands
 from .handlers import Gate, NotThere, SessionHandler, StaticFile
+from .history_handlers import HistoryRoom, RecordedHandler, StillHandler
 from .layout import Layouter
 from .questions import QuestionBoard
+from .recorded import RecordedTrials
 from .robots import Robots
 from .sections import Sections
 from .sensors import Sensors
 from .settings import ConsoleSettings, read_settings
+from .stills import StillFiles, Stills
 from .page_socket import Office, Socket
 from .perception_desk import PerceptionDesk
 from .trial_log import TrialLog
@@ -43,7 +47,7 @@ PING_S = 5.0
 PONG_LIMIT_S = 15.0
 
 
-def make_app(gate: Gate, office: Office, sensors: Sensors) -> tornado.web.Application:
+def make_app(gate: Gate, office: Office, sensors: Sensors, history: HistoryRoom) -> tornado.web.Application:
     """The web application; its handlers run in the thread of the loop that serves it."""
     shared = {'gate': gate}
     room = FrameRoom(sensors)
@@ -51,6 +55,8 @@ def make_app(gate: Gate, office: Office, sensors: Sensors) -> tornado.web.Applic
         [(r'/session', SessionHandler, shared), (r'/socket', Socket, {'gate': gate, 'office': office}),
          (r'/frame/([0-9]{1,9})', FrameHandler, {'gate': gate, 'room': room}),
          (r'/model/([0-9]{1,9})', ModelHandler, {'gate': gate, 'room': room}),
+         (r'/recorded/([0-9]{1,9})', RecordedHandler, {'gate': gate, 'room': history}),
+         (r'/still/([0-9]{1,9})', StillHandler, {'gate': gate, 'room': history}),
          (r'/()', StaticFile, dict(shared, path=str(STATIC), default_filename='index.html')),
          (r'/static/(.+)', StaticFile, dict(shared, path=str(STATIC)))],
         default_handler_class=NotThere, default_handler_args=shared, cookie_secret=gate.secret,
@@ -79,16 +85,21 @@ class Console:
         self._sections = Sections()
         self._log = TrialLog()
         self._audit = Audit()
-        self._robots = Robots(self._sections, self._log, Layouter())
+        layouter = Layouter()
+        self._robots = Robots(self._sections, self._log, layouter)
         self._front_end = FrontEnd('expert_console')
         self._eye = Eye(self._sections, self._front_end)
         self._board = QuestionBoard(self._front_end, self._log)
         self._conditions = Conditions()
+        files = StillFiles()
+        self._stills = Stills(files, self._eye.sensors)
+        self._shelf = BagShelf(settings.bags, self._sections)
         self._hands = Hands(self._sections, self._front_end, self._audit)
         self._office = Office(self._sections, self._log, Desk(
             self._front_end, self._audit, PerceptionDesk(self._hands.is_interface).commands), self._hands)
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
-        app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office, self._eye.sensors)
+        app = make_app(Gate(settings._replace(port=port), secret, self._audit), self._office, self._eye.sensors,
+                       HistoryRoom(RecordedTrials(self._shelf, layouter, files), files))
         server = tornado.httpserver.HTTPServer(
             app, ssl_options=tls, max_body_size=MOST_BYTES, max_header_size=16384, body_timeout=10.0,
             idle_connection_timeout=60.0, max_buffer_size=4 * MOST_BYTES)
@@ -98,7 +109,7 @@ class Console:
         """Serve until the node goes down."""
         self._eye.start()
         self._hands.start()
-        for target in (self._robots.run, self._draw):
+        for target in (self._robots.run, self._draw, self._shelf.run):
             threading.Thread(target=target, name=target.__name__, daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()
         rospy.on_shutdown(lambda: loop.add_callback(loop.stop))
@@ -112,7 +123,9 @@ class Console:
             try:
                 self._robots.draw()
                 self._board.draw(self._sections)
-                self._conditions.draw(self._sections, self._front_end.questions())
+                questions = self._front_end.questions()
+                self._conditions.draw(self._sections, questions)
+                self._stills.draw(self._sections, questions)
                 if time.monotonic() - overview_s > OVERVIEW_PERIOD_S:
                     overview_s = time.monotonic()
                     self._audit.prepare(self._front_end.servers)
@@ -149,7 +162,7 @@ def _parameter(name: str, default: Any) -> Any:
 def main() -> None:
     """Entry point of the node `expert_console`."""
     parameters_only('Node: a web page from which people watch robots and answer their questions. Parameters: ~address, '
-                    '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key; see doc/console.md.')
+                    '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags; see doc/console.md.')
     rospy.init_node('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()

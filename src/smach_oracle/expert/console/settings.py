@@ -1,7 +1,7 @@
 """Settings of the console, from the node's private parameters."""
 import os
 import socket
-from typing import Any, Callable, List, NamedTuple, Optional
+from typing import Any, Callable, List, NamedTuple, Optional, Tuple
 
 from ...oracle.errors import ConfigError
 from .access import Hosts, TokenBook, is_loopback, load_tokens
@@ -19,6 +19,7 @@ class ConsoleSettings(NamedTuple):
     hosts: Hosts
     certificate: str  # '' without TLS
     private_key: str
+    bags: Tuple[str, ...] = ()  # folders
 
     @property
     def scheme(self) -> str:
@@ -44,7 +45,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> ConsoleSettings:
     if bool(certificate) != bool(key):
         raise ConfigError('~certificate', certificate or NONE, 'together with ~private_key')
     return ConsoleSettings(address, _port(get('port', DEFAULT_PORT)), load_tokens(token_file) if token_file else None,
-                           Hosts(_hosts(get, remote), addresses=remote), certificate, key)
+                           Hosts(_hosts(get, remote), addresses=remote), certificate, key, _folders(get('bags', [])))
 
 
 def _hosts(get: Callable[[str, Any], Any], remote: bool) -> List[str]:
@@ -55,6 +56,13 @@ def _hosts(get: Callable[[str, Any], Any], remote: bool) -> List[str]:
     names = [name for name in names if name != NONE]
     own = socket.gethostname()
     return names + ([own, own.split('.')[0], own.split('.')[0] + '.local'] if remote else [])
+
+
+def _folders(value: Any) -> Tuple[str, ...]:
+    folders = value.split(os.pathsep) if isinstance(value, str) else value
+    if not isinstance(folders, list) or not all(isinstance(folder, str) for folder in folders):
+        raise ConfigError('~bags', value, 'folders separated by {}, or a list of folders'.format(os.pathsep))
+    return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in folders if folder not in ('', NONE))
 
 
 def _port(value: Any) -> int:

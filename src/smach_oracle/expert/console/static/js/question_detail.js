@@ -208,6 +208,7 @@ export class Detail {
   update(names) {
     if (names.some((name) => ['questions', 'hand', 'output', 'eye'].includes(name))) this.showInterface();
     if (names.includes('conditions')) this.tick();
+    if (names.includes('stills')) this.camera.update();
     if (names.includes('eye')) {
       this.camera.update();
       this.showWorkbench();

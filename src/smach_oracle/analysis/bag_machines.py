@@ -1,0 +1,61 @@
+"""Machines as bags show them: their containers' structures, and what the cameras saw at failures. It needs no ROS."""
+from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
+
+from rosbags.rosbag1 import Reader
+
+from .bag_events import MessageStores
+
+STRUCTURE_TYPE = 'smach_msgs/msg/SmachContainerStructure'
+FRAMES_TYPE = 'smach_oracle/msg/FailureFrames'
+MOST_CONTAINERS = 200
+MOST_FRAMES = 40
+
+
+class Container(NamedTuple):
+    """One container's structure, by labels."""
+
+    children: Tuple[str, ...]
+    edges: Tuple[Tuple[str, str, str], ...]  # source, outcome, target
+    outcomes: Tuple[str, ...]
+
+
+class SeenFrame(NamedTuple):
+    """What one camera saw when a question was put."""
+
+    query_id: str
+    topic: str
+    format: str  # of CompressedImage
+    data: bytes
+
+
+class Machines(NamedTuple):
+    """What a bag tells of machines."""
+
+    containers: Dict[str, Container]  # by path, as in events; the latest word on each
+    frames: List[SeenFrame]
+
+
+def read_machines(path: str) -> Machines:
+    """Read a bag that has events in it. A damaged one may raise anything."""
+    containers: Dict[str, Container] = {}
+    frames: List[SeenFrame] = []
+    stores = MessageStores()
+    with Reader(path) as reader:
+        connections = [item for item in reader.connections if item.msgtype in (STRUCTURE_TYPE, FRAMES_TYPE)]
+        for item, _, data in reader.messages(connections) if connections else ():
+            message = stores.read(item, data)
+            if item.msgtype == FRAMES_TYPE:
+                frames += list(_frames(message))[:MOST_FRAMES - len(frames)]
+            elif len(containers) < MOST_CONTAINERS:
+                containers[message.path.lstrip('/')] = _container(message)
+    return Machines(containers, frames)
+
+
+def _container(message: Any) -> Container:
+    edges = zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)
+    return Container(tuple(message.children), tuple(edges), tuple(message.container_outcomes))
+
+
+def _frames(message: Any) -> Iterator[SeenFrame]:
+    for topic, image in zip(message.topics, message.images):
+        yield SeenFrame(message.query_id, topic, image.format, bytes(image.data))

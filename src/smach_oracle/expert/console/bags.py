@@ -1,0 +1,231 @@
+"""Trials of bags in some folders: found, counted, and read again when somebody opens one. In a thread of its own.
+
+Bags are files that may come from anywhere: what they hold is read as messages by their own definitions, bounded, and
+never as code. A browser knows a trial by the number that it was given here.
+"""
+import itertools
+import os
+import threading
+import time
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+
+import rospy
+
+from ...oracle.events import Event
+from ...oracle.errors import OracleError
+from .sections import Sections
+
+SECTION = 'bags'
+LOOK_PERIOD_S = 5.0
+MOST_BAGS = 500  # the newest
+MOST_BYTES = 2 ** 30  # of a bag
+MOST_EVENTS = 200000  # in a bag
+SHOWN_TRIALS = 300
+SHOWN_BROKEN = 50
+BEING_WRITTEN_S = 60.0
+_COUNTS = {'failures': 'failures of states', 'recoveries': 'oracle recoveries', 'questions': 'questions to the expert',
+           'answered': 'answered'}
+_ENDINGS = {'success': 'ended in success', 'failure': 'ended in failure', 'preempted': 'preempted',
+            'unfinished': 'unfinished'}
+
+
+class NotRead(OracleError):
+    """A trial of a bag cannot be had; the text says why."""
+
+
+class FoundTrial(NamedTuple):
+    """A trial and the bags that it is in."""
+
+    number: int
+    node: str  # whose it is
+    summary: Any  # analysis.trials.TrialSummary
+
+
+class BagShelf:
+    """`run` in a thread of its own; the rest from any thread."""
+
+    def __init__(self, folders: Sequence[str], sections: Sections) -> None:
+        """`folders`: with bags in them or below."""
+        self._folders = list(folders)
+        self._sections = sections
+        self._lock = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._trials: Dict[str, FoundTrial] = {}
+        self._read: Dict[str, Tuple[int, int]] = {}  # path -> size and ns of the last change
+        self._broken: Dict[str, str] = {}
+        self._notes: List[str] = []
+        self._reader: Any = None
+
+    def run(self) -> None:
+        """Look and look again until the node goes down; returns at once where there is nowhere to look."""
+        if not self._folders:
+            return
+        try:
+            from ...analysis.bag_events import EventReader  # it needs rosbags, which not every robot has
+        except ImportError as err:
+            self._notes = [str(err)]
+            self.draw(0)
+            return
+        self._reader = EventReader(MOST_EVENTS)
+        while not rospy.is_shutdown():
+            try:
+                self.look()
+            except Exception as err:  # what lies in a folder must not end the looking
+                rospy.logerr_throttle(60, 'The bags could not be looked through: {!r}'.format(err))
+            time.sleep(LOOK_PERIOD_S)
+
+    def look(self) -> None:
+        """Read what is new or has changed."""
+        waiting = self._fresh(self._found())
+        drawn_s = -LOOK_PERIOD_S
+        for position, (path, state) in enumerate(waiting):
+            began_s = time.monotonic()
+            self._take(path, state)
+            if rospy.is_shutdown():
+                return
+            if time.monotonic() - drawn_s > LOOK_PERIOD_S / 2:
+                self.draw(len(waiting) - position - 1)
+                drawn_s = time.monotonic()
+            time.sleep(min(0.5, time.monotonic() - began_s))  # the pages come first
+        self.draw(0)
+
+    def draw(self, waiting: int) -> None:
+        """Bring the section up to date; `waiting`: so many bags are still to be read."""
+        with self._lock:
+            trials = sorted(self._trials.values(), key=lambda each: -each.summary.start_time)
+            broken = sorted(self._broken.items())
+        self._sections.put(SECTION, {
+            'waiting': waiting, 'note': ' '.join(self._notes), 'table': _table([each.summary for each in trials]),
+            'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
+            'broken': [{'name': self._short(path), 'reason': reason[:300]} for path, reason in broken[:SHOWN_BROKEN]]})
+
+    def events(self, number: int) -> Tuple[FoundTrial, List[Event]]:
+        """A trial with all its events, in order; read now.
+
+        :raises NotRead: for no such trial, or bags that cannot be read any more.
+        """
+        with self._lock:
+            trial = next((each for each in self._trials.values() if each.number == number), None)
+        if trial is None:
+            raise NotRead('There is no trial {} any more; choose it again.'.format(number))
+        by_number: Dict[int, Event] = {}
+        for path in trial.summary.bags:
+            for event in self._content(path).events:
+                if event.trial_id == trial.summary.trial_id:
+                    by_number[event.seq] = event
+        return trial, [by_number[seq] for seq in sorted(by_number)]
+
+    def _content(self, path: str) -> Any:
+        from ...analysis.bag_events import BagError
+        try:
+            return self._reader.read(path)
+        except BagError as err:
+            raise NotRead('{}: {}'.format(self._short(path), err)) from err
+
+    def _found(self) -> List[str]:
+        from ...analysis.bag_events import BagError, find_bags
+        self._notes, paths = [], []
+        for folder in self._folders:
+            try:
+                paths += find_bags([folder])
+            except BagError as err:
+                self._notes.append('{}.'.format(err))
+        return list(dict.fromkeys(paths))
+
+    def _fresh(self, paths: Iterable[str]) -> List[Tuple[str, Tuple[int, int]]]:
+        """Those that are to be read, newest first; forgets those that are gone."""
+        states: Dict[str, Tuple[int, int]] = {}
+        for path in paths:
+            try:
+                found = os.stat(path)
+            except OSError:
+                continue
+            states[path] = (found.st_size, found.st_mtime_ns)
+        kept = sorted(states, key=lambda path: -states[path][1])
+        if len(kept) > MOST_BAGS:
+            self._notes.append('Of {} bags the newest {} are read.'.format(len(kept), MOST_BAGS))
+        kept = kept[:MOST_BAGS]
+        self._forget(set(self._read) - set(kept))
+        return [(path, states[path]) for path in kept if self._read.get(path) != states[path]]
+
+    def _forget(self, gone: Iterable[str]) -> None:
+        for path in gone:
+            del self._read[path]
+            with self._lock:
+                self._broken.pop(path, None)
+                for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
+                    del self._trials[trial_id]
+
+    def _take(self, path: str, state: Tuple[int, int]) -> None:
+        """Read one bag."""
+        self._read[path] = state
+        reason = ''
+        try:
+            if path.endswith('.active') and time.time() - state[1] / 1e9 < BEING_WRITTEN_S:
+                return  # its trial runs; it is shown live
+            if state[0] > MOST_BYTES:
+                raise NotRead('it has {:.1f} GiB; at most {:.0f} are read'.format(state[0] / 2 ** 30,
+                                                                               MOST_BYTES / 2 ** 30))
+            self._count(path)
+        except (NotRead, OracleError) as err:
+            reason = str(err)
+        with self._lock:
+            self._broken.pop(path, None)
+            if reason:
+                self._broken[path] = reason
+
+    def _count(self, path: str) -> None:
+        from ...analysis.trials import summarise
+        content = self._reader.read(path)
+        by_trial: Dict[str, Dict[int, Event]] = {}
+        for event in content.events:
+            by_trial.setdefault(event.trial_id, {})[event.seq] = event
+        for trial_id, events in by_trial.items():
+            known = self._trials.get(trial_id)
+            others = [each for each in known.summary.bags if each != path] if known else []
+            for other in others:  # its record is in several bags, as after a full disk
+                events.update((event.seq, event) for event in self._content(other).events
+                              if event.trial_id == trial_id)
+            summary = summarise(list(events.values()), tuple(others + [path]))
+            with self._lock:
+                self._trials[trial_id] = FoundTrial(known.number if known else next(self._numbers),
+                                                    content.nodes.get(trial_id, ''), summary)
+
+    def _short(self, path: str) -> str:
+        """A bag's name below its folder."""
+        return short_name(path, self._folders)
+
+
+def short_name(path: str, folders: Sequence[str]) -> str:
+    """A bag's path below the folder that it was found in."""
+    for folder in map(os.path.realpath, folders):
+        if path.startswith(folder + os.sep):
+            return path[len(folder) + 1:]
+    return os.path.basename(path)
+
+
+def _row(trial: FoundTrial) -> Dict[str, Any]:
+    """As the list of trials has those that were heard."""
+    told = trial.summary
+    return {'number': trial.number, 'id': told.trial_id, 'robot': trial.node, 'experiment': told.experiment,
+            'start': told.start_time, 'end': told.start_time + told.duration_s, 'ending': told.ending.value,
+            'outcome': told.outcome, 'oracle': told.recovers, 'failures': told.failures,
+            'recoveries': told.recoveries, 'questions': told.questions, 'answered': told.answered,
+            'lost': told.lost_events, 'detailed': True, 'bag': os.path.basename(told.bags[-1])}
+
+
+def _table(summaries: Sequence[Any]) -> List[Dict[str, Any]]:
+    """The counts of Table I, by the analysis of bags."""
+    if not summaries:
+        return []
+    from ...analysis.groups import make_groups
+    rows = []
+    for group in make_groups(list(summaries)):
+        rows.append({'experiment': group.experiment, 'arm': group.arm, 'runs': group.runs,
+                     'endings': {key: group.of(name).trials for key, name in _ENDINGS.items()},
+                     'counts': {key: _count(group.of(name)) for key, name in _COUNTS.items()}})
+    return rows
+
+
+def _count(count: Any) -> Dict[str, Optional[int]]:
+    return {'trials': count.trials, 'events': count.events}

@@ -1,0 +1,73 @@
+"""What the web server answers of the past: a trial of a bag, and what a camera saw."""
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import tornado.web
+
+from .access import Buckets
+from .bags import NotRead
+from .handlers import Gate, Guarded
+from .recorded import RecordedTrials
+from .stills import StillFiles
+
+
+class HistoryRoom:
+    """What all requests for the past share."""
+
+    def __init__(self, recorded: RecordedTrials, files: StillFiles) -> None:
+        self.recorded = recorded
+        self.files = files
+        self.limits = Buckets(rate=10.0, burst=60.0, for_all=5.0)
+        self.workers = ThreadPoolExecutor(1, 'bags')
+
+
+class _HistoryHandler(Guarded):
+    """For pages of ours, of people who are signed in."""
+
+    def initialize(self, gate: Gate, room: HistoryRoom, **_: Any) -> None:  # type: ignore[override]
+        """Called by Tornado."""
+        super().initialize(gate)
+        self._room = room
+
+    def prepare(self) -> None:
+        """The gate, with limits of its own; then who it is, and that a page of ours asks."""
+        status = self.gate.refusal(self, self._room.limits)
+        if status:
+            raise tornado.web.HTTPError(status)
+        session = self.gate.session(self)
+        if self.gate.identity(session) is None:
+            raise tornado.web.HTTPError(401)
+        self.demand_xsrf(session)
+        if self.request.query_arguments:
+            raise tornado.web.HTTPError(400)
+        self.set_header('Cache-Control', 'no-store')
+
+
+class RecordedHandler(_HistoryHandler):
+    """GET /recorded/NUMBER: a trial of a bag, as RecordedTrials tells it; 422 with a text where it cannot be read."""
+
+    async def get(self, number: str) -> None:
+        """Answer when it has been read."""
+        try:
+            text = await asyncio.get_running_loop().run_in_executor(
+                self._room.workers, self._room.recorded.text, int(number))
+        except NotRead as err:
+            self.set_status(422)
+            self.set_header('Content-Type', 'text/plain; charset=utf-8')
+            self.finish(str(err)[:500])
+            return
+        self.set_header('Content-Type', 'application/json')
+        self.finish(text)
+
+
+class StillHandler(_HistoryHandler):
+    """GET /still/NUMBER: what a camera saw when a question was put; 404 where it is not kept any more."""
+
+    def get(self, number: str) -> None:
+        """Answer."""
+        found = self._room.files.find(int(number))
+        if found is None:
+            raise tornado.web.HTTPError(404)
+        self.set_header('Content-Type', found.content_type)
+        self.finish(found.body)
