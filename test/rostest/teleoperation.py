@@ -165,6 +165,13 @@ class Teleoperation(unittest.TestCase):
                                  and (0.08, True) in ROBOT.grips))
         self.assertEqual(ROBOT.grips[1], (0.0, False))
 
+    def test_a_gripper_that_is_told_the_same_again_and_again_moves_once(self):
+        with self.ann.pressing(move_gripper=True, gripper=0.0):
+            self.assertTrue(wait_for(lambda: self.ann.states[-1].gripper_stalled))
+            seen = len(self.ann.states)
+            self.assertTrue(wait_for(lambda: len(self.ann.states) > seen + 60))
+        self.assertLess(len(ROBOT.grips), 5)  # a loaded machine lets go, and presses anew
+
     def close(self):
         return self.ann.send(move_gripper=True, gripper=0.0)
 

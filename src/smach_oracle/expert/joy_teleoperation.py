@@ -94,7 +94,6 @@ class JoyTeleoperation:
         self._wish, self._came_s = STILL, -math.inf
         self._arm = settings.arm
         self._seq = 0
-        self._gripper: Optional[float] = None
         self._lock = threading.Lock()
         self._publisher = rospy.Publisher('command', TeleopCommand, queue_size=2, tcp_nodelay=True)
         self._subscribers = [rospy.Subscriber('state', TeleopState, self._on_state, queue_size=2),
@@ -114,12 +113,10 @@ class JoyTeleoperation:
 
     def _send(self, wish: Wish) -> None:
         self._seq += 1
-        moves_gripper = wish.gripper is not None and wish.gripper != self._gripper  # once for each press
-        self._gripper = wish.gripper
         self._publisher.publish(TeleopCommand(
             header=Header(frame_id=self._settings.frame, stamp=rospy.Time.now()), operator=self._settings.operator,
             seq=self._seq, arm=self._arm, dead_man=wish.held,
-            twist=Twist(Vector3(*wish.linear), Vector3(*wish.angular)), move_gripper=moves_gripper,
+            twist=Twist(Vector3(*wish.linear), Vector3(*wish.angular)), move_gripper=wish.gripper is not None,
             gripper=wish.gripper or 0.0))
 
     def _on_joy(self, message: Joy) -> None:

@@ -49,6 +49,7 @@ class TeleoperationServer:
         self._dead_man = (DeadMan(float('inf'), settings.lease_s) if settings.lock_step
                           else DeadMan(settings.watchdog_s))
         self._held: Optional[TeleopCommand] = None
+        self._gripped: Optional[Tuple[float, float]] = None  # m and N, told to the gripper since it is held
         self._commands = CommandInbox()
         self._told_s, self._told_query = 0.0, ''
         self._unsure = True  # whether others may have moved the robot since our last command
@@ -179,7 +180,7 @@ class TeleoperationServer:
 
     def _stand(self) -> None:
         """Nobody moves anything any more."""
-        self._held, self._step = None, standing()
+        self._held, self._gripped, self._step = None, None, standing()
         for hand in self._hands.values():
             hand.gripper.stop()
         if self._goal.goal is not None and not self._settings.lock_step:  # after it, the arm is others' to move
@@ -188,8 +189,11 @@ class TeleoperationServer:
     def _hold(self, command: TeleopCommand) -> None:
         self._arm = command.arm
         hand = self._hands[command.arm]
-        if command.move_gripper:
-            hand.gripper.move(command.gripper, command.gripper_effort or self._settings.gripper_effort)
+        wish = (command.gripper, command.gripper_effort or self._settings.gripper_effort)
+        # a front end may repeat it for as long as it is held, so that none is lost; what has been done is not done again
+        if command.move_gripper and (self._settings.lock_step or wish != self._gripped):
+            hand.gripper.move(*wish)
+        self._gripped = wish if command.move_gripper else None
         if self._settings.lock_step:
             self._in_lock_step(command, hand)
         else:

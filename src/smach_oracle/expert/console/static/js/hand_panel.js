@@ -117,7 +117,6 @@ export class HandPanel {
 
   // Not with the next beat: a key that is let go stops now.
   changed(held) {
-    this.gripperSent = '';
     if (!this.mine) return;
     if (held) this.beat();
     else this.send({ held: false, linear: [0, 0, 0], angular: [0, 0, 0], gripper: '' });
@@ -130,9 +129,7 @@ export class HandPanel {
     this.showHeld(wish);
     if (!wish.held && performance.now() - this.sentMs < IDLE_MS) return;
     const share = Number(this.scale.value) / 100;
-    const gripper = wish.gripper === this.gripperSent ? '' : wish.gripper;
-    this.gripperSent = wish.gripper;
-    this.send({ held: wish.held, linear: wish.linear.map((value) => value * share), angular: wish.angular.map((value) => value * share), gripper });
+    this.send({ held: wish.held, linear: wish.linear.map((value) => value * share), angular: wish.angular.map((value) => value * share), gripper: wish.gripper });
   }
 
   send(wish) {
