@@ -232,7 +232,7 @@ def _faces(element: ElementTree.Element, kind: str) -> np.ndarray:
     if kind == 'polylist':
         counts = element.find('vcount')
         sides = np.array((counts.text or '').split() if counts is not None else [], np.int64)
-        lists = [part for each in lists for part in np.split(each, np.cumsum(np.clip(sides, 0, 10000)))]
+        lists = [part for each in lists for part in np.split(each, np.cumsum(np.clip(sides, 0, 10000)))[:-1]]
     fans = [(each[0], one, other) for each in lists if len(each) > 2 for one, other in zip(each[1:], each[2:])]
     return np.array(fans, np.int64).reshape(-1, 3)
 

@@ -1,10 +1,12 @@
 """What people do through a perception interface: which interface it reaches, and what the page is told."""
+import base64
 import json
 
 import cv2
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from smach_oracle.expert.console import eye
@@ -15,7 +17,7 @@ from smach_oracle.expert.console.perception_desk import NOT_RUNNING, PerceptionD
 from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.followed_server import Listed
 from smach_oracle.msg import ExpertQueryGoal, InterfaceOffer
-from smach_oracle.ros.images import mask_image
+from smach_oracle.ros.images import cloud_message, mask_image
 from smach_oracle.srv import (FinishInterfaceResponse, GiveUpInterfaceResponse, SegmentObjectResponse,
                               UseFrameRequest, UseFrameResponse)
 
@@ -89,13 +91,19 @@ def test_the_page_is_told_of_the_mask_the_place_and_the_size():
     turned = Quaternion(0, 0, np.sin(0.25), np.cos(0.25))
     answer = SegmentObjectResponse(
         ok=True, mask=mask_image(mask, Header()), size=Vector3(0.1, 0.2, float('nan')), elapsed=0.05,
-        object=PoseStamped(Header(frame_id='base'), Pose(Point(1, 2, 3), turned)))
+        object=PoseStamped(Header(frame_id='base'), Pose(Point(1, 2, 3), turned)),
+        cloud=cloud_message(np.array([[1.0, 2.0, 3.0], [2.0, 2.0, 3.0]]), Header(), np.full((2, 3), 7, np.uint8)))
     said = marked_view(answer)
-    assert said['object'] == {'frame': 'base', 'position': [1, 2, 3], 'yaw': 0.5, 'points': 0, 'size': [0.1, 0.2, 0.0]}
+    cloud = said['object'].pop('cloud')
+    assert (cloud['count'], cloud['offset'], cloud['scale'][0]) == (2, [1, 2, 3], 1)
+    assert base64.b64decode(cloud['data'])[12:] == b'\7' * 6
+    assert said['object'] == {'frame': 'base', 'position': [1, 2, 3], 'yaw': 0.5, 'points': 2, 'size': [0.1, 0.2, 0.0]}
     drawn = np.zeros(mask.shape, np.uint8)
     cv2.drawContours(drawn, [np.array(line).reshape(-1, 1, 2) for line in said['outlines']], -1, 1, -1)
     assert (drawn.astype(bool) == mask).all()
     json.dumps(said, allow_nan=False)
+    answer.cloud = PointCloud2(width=1000000)
+    assert marked_view(answer)['object']['cloud']['count'] == 0, 'a cloud that contradicts itself is not drawn'
 
 
 def test_an_outline_keeps_its_holes_and_is_never_long():

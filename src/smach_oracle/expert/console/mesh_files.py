@@ -47,7 +47,7 @@ class MeshFiles:
 
     def _in_package(self, name: str) -> str:
         package, _, path = name.partition('/')
-        if not package or not path or '\0' in path or '..' in path.split('/') or os.path.isabs(path):
+        if not package or not path or '\0' in path or '..' in name.split('/') or os.path.isabs(path):
             raise MeshError('it does not stay within a package')
         if self._packages is None:
             self._packages = rospkg.RosPack()

@@ -11,7 +11,7 @@ from ...geometry.robot_shapes import RobotShapes, Shape, read_shapes
 from .images import Encoded
 from .mesh_files import MeshFiles
 
-MOST_TRIANGLES = 20000  # that a browser draws, over all links
+MOST_TRIANGLES = 28000  # that a browser draws, over all links
 LEAST_TRIANGLES = 40  # of a mesh that has more
 MOST_CORNERS = 65536  # of a geometry
 MOST_TOLD = 20  # meshes that are missing

@@ -1,161 +1,147 @@
-// A point cloud, live, to be turned round: one finger or the left button turns, two or the right one move, the wheel
-// or a pinch zooms. Points are drawn one by one with a depth of their own; that needs nothing of the graphics card.
-import { h, setText } from './dom.js';
+// A point cloud and a robot in one picture, live: either of them may be chosen first, the other joins it.
+import { h, replace, setText } from './dom.js';
 import { FrameFeed, numberOf } from './frame_feed.js';
+import { ROBOT, RobotFeed, robotOf, robotsOf } from './robot_feed.js';
+import { CloudLayer, GridLayer, unpacked } from './scene_layers.js';
+import { SceneView } from './scene_view.js';
 
-const FOCAL = 1.1; // of the height
-const NEAREST = 0.02;
-
-export class CloudView {
-  constructor(app, topic, type) {
-    this.canvas = h('canvas', { class: 'cloud', tabindex: 0, role: 'img', 'aria-label': 'Point cloud of ' + topic + '; drag to turn, arrow keys too' });
-    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the first cloud…');
+class LiveScene {
+  constructor(app, label) {
+    this.app = app;
+    this.scene = new SceneView(label, () => this.home());
+    this.choice = h('select', { class: 'beside' });
+    this.choice.addEventListener('change', () => this.choose(this.choice.value));
     this.count = h('span', { class: 'dim number' });
-    this.root = h('figure', { class: 'view cloud-view', 'data-topic': topic },
-      h('div', { class: 'screen' }, this.canvas, this.note, h('button', { class: 'tool view-home', onclick: () => this.home() }, 'Reset view')),
-      h('figcaption', { class: 'row' }, h('span', { class: 'ellipsis' }, topic), h('span', { class: 'spacer' }), this.count));
-    this.pointers = new Map();
-    for (const [name, handler] of [['pointerdown', 'down'], ['pointermove', 'move'], ['pointerup', 'up'], ['pointercancel', 'up'], ['wheel', 'wheel'], ['keydown', 'key']]) {
-      this.canvas.addEventListener(name, (event) => this[handler](event), { passive: false });
-    }
-    this.canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    this.resized = new ResizeObserver(() => this.draw());
-    this.resized.observe(this.canvas);
-    this.feed = new FrameFeed(app, () => numberOf(app, topic, type), this.root, { every: 150, take: (answer, facts) => this.take(answer, facts), say: (text) => this.say(text) });
+    this.lack = h('p', { class: 'view-lack dim', hidden: true });
+    this.root = h('figure', { class: 'view cloud-view', 'data-topic': label }, this.scene.root,
+      h('figcaption', {}, h('div', { class: 'row' }, h('span', { class: 'ellipsis' }, label), h('span', { class: 'spacer' }), this.count, this.choice), this.lack));
+    this.clouds = null;
+    this.robot = null;
+  }
+
+  begin() {
+    this.offer();
+    this.offering = setInterval(() => this.offer(), 1000);
   }
 
   stop() {
-    this.feed.stop();
-    this.resized.disconnect();
+    clearInterval(this.offering);
+    this.scene.stop();
+    for (const feed of [this.clouds, this.robot]) if (feed) feed.stop();
   }
 
-  say(text) {
-    setText(this.note, text);
-    this.note.hidden = !text;
+  // What else may be shown; `none` says so where nothing is.
+  offerOf(names, chosen, none) {
+    const shape = names.join('\n');
+    if (shape === this.offered) return;
+    this.offered = shape;
+    replace(this.choice, h('option', { value: '' }, none), names.map((name) => h('option', { value: name, selected: name === chosen }, this.nameOf(name))));
+    this.choice.hidden = !names.length;
+    this.choose(this.choice.value);
   }
 
-  async take(answer, facts) {
-    const data = await answer.arrayBuffer();
-    const raw = new Uint16Array(data, 0, 3 * facts.count);
-    const points = new Float32Array(raw.length);
-    for (let i = 0; i < raw.length; i += 1) points[i] = facts.offset[i % 3] + facts.scale[i % 3] * raw[i] / 65535;
-    const first = !this.points;
-    this.points = points;
-    this.colours = new Uint8Array(data, raw.byteLength, 3 * facts.count);
+  startRobot(topic) {
+    if (this.robot) this.robot.stop();
+    this.robot = topic ? new RobotFeed(this.app, topic, this.root, { moved: () => this.changed(), say: (text) => this.sayOf('robot', text) }) : null;
+    this.sayOf('robot', '');
+    this.changed();
+  }
+
+  startClouds(topic, type) {
+    if (this.clouds) this.clouds.stop();
+    this.cloud = null;
+    this.clouds = topic ? new FrameFeed(this.app, () => numberOf(this.app, topic, type), this.root, { every: 150, beside: () => (this.robot ? this.robot.number : undefined),
+      take: (answer, facts) => this.takeCloud(answer, facts), say: (text) => this.sayOf('cloud', text) }) : null;
+    this.sayOf('cloud', topic ? 'Waiting for the first cloud…' : '');
+    this.changed();
+  }
+
+  async takeCloud(answer, facts) {
+    const data = unpacked(await answer.arrayBuffer(), facts);
     this.facts = facts;
+    this.cloud = new CloudLayer(data, facts.place);
     setText(this.count, facts.count < facts.of ? facts.count + ' of ' + facts.of + ' points' : facts.count + ' points');
-    if (first) this.home();
-    else this.draw();
+    this.changed();
   }
 
-  // As the sensor sees it: optical frames look along z with y down, others along x with z up.
+  get robotLayer() {
+    const layer = this.robot && this.robot.layer;
+    return layer && (!this.cloud || this.facts.place) ? layer : null; // both only where they have a place at each other
+  }
+
+  changed() {
+    const robot = this.robotLayer;
+    this.scene.show([robot && new GridLayer(), this.cloud, robot]);
+    const shape = [Boolean(robot), Boolean(this.cloud), this.cloud && Boolean(this.facts.place)].join();
+    if (shape !== this.shape && (robot || this.cloud)) this.home();
+    this.shape = shape;
+    this.tellLack();
+  }
+
+  // As the sensor sees it where there is no robot: optical frames look along z with y down, others along x with z up.
   home() {
-    const { offset, scale, frame } = this.facts || { offset: [0, 0, 0], scale: [1, 1, 1], frame: '' };
-    this.optical = /optical|^$/.test(frame);
-    this.centre = offset.map((low, axis) => low + scale[axis] / 2);
-    this.distance = Math.max(0.3, 1.1 * Math.hypot(...scale));
-    [this.azimuth, this.elevation] = [-0.5, 0.45];
-    this.draw();
+    const robot = this.robotLayer;
+    const near = this.cloud && robot ? around(this.cloud.bounds(), robot.bounds()) : null;
+    const optical = Boolean(this.cloud && !this.facts.place && /optical|^$/.test(this.facts.frame));
+    this.scene.frame(near ? [{ bounds: () => near }] : [this.cloud, robot], { optical, azimuth: robot ? -1.15 : -0.5, elevation: robot ? 0.35 : 0.45 });
   }
 
-  // Rows: right, down and ahead on the screen, in the cloud's frame.
-  axes() {
-    const [ca, sa, ce, se] = [Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation)];
-    const level = [[sa, -ca, 0], [ca * -se, sa * -se, -ce], [ca * ce, sa * ce, -se]]; // z up, looking along x
-    return this.optical ? level.map(([x, y, z]) => [-y, -z, x]) : level;
+  // In the middle of the picture as long as there is none, below it from then on.
+  sayOf(what, text) {
+    this.said = Object.assign({}, this.said, { [what]: text });
+    this.tellLack();
   }
 
-  schedule() {
-    if (this.scheduled) return;
-    this.scheduled = requestAnimationFrame(() => { this.scheduled = 0; this.draw(); });
+  tellLack() {
+    const { cloud = '', robot = '' } = this.said || {};
+    const something = this.cloud || this.robotLayer;
+    this.scene.say(something ? '' : cloud || robot);
+    const text = something ? [this.cloud && this.robot && this.facts.astray, cloud, robot, this.robot && this.robot.lacks].filter(Boolean).join(' ') : '';
+    setText(this.lack, text);
+    this.lack.hidden = !text;
+  }
+}
+
+export class CloudView extends LiveScene {
+  constructor(app, topic, type) {
+    super(app, topic);
+    this.topic = topic;
+    this.choice.setAttribute('aria-label', 'Robot in the picture');
+    this.startClouds(topic, type);
+    this.begin();
   }
 
-  draw() {
-    const width = Math.round(this.canvas.clientWidth);
-    const height = Math.round(this.canvas.clientHeight);
-    if (!this.points || !width || !height) return;
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    const context = this.canvas.getContext('2d');
-    const image = context.createImageData(width, height);
-    this.plot(new Uint32Array(image.data.buffer), new Float32Array(width * height).fill(Infinity), width, height);
-    context.putImageData(image, 0, 0);
+  offer() { this.offerOf(robotsOf(this.app), robotOf(this.app, this.topic), 'no robot'); }
+
+  nameOf(topic) { return ['with robot', topic.slice(1, -ROBOT.length - 1)].filter(Boolean).join(' '); }
+
+  choose(topic) { this.startRobot(topic); }
+}
+
+export class RobotView extends LiveScene {
+  constructor(app, topic) {
+    super(app, topic);
+    this.choice.setAttribute('aria-label', 'Point cloud in the picture');
+    this.startRobot(topic);
+    this.begin();
   }
 
-  plot(pixels, depths, width, height) {
-    const [right, down, ahead] = this.axes();
-    const { points, colours, centre, distance } = this;
-    const focal = FOCAL * height;
-    const size = this.facts.scale.reduce((most, each) => Math.max(most, each), 0) / 110;
-    for (let i = 0; i < points.length; i += 3) {
-      const [x, y, z] = [points[i] - centre[0], points[i + 1] - centre[1], points[i + 2] - centre[2]];
-      const depth = x * ahead[0] + y * ahead[1] + z * ahead[2] + distance;
-      if (depth < NEAREST) continue;
-      const u = Math.round(width / 2 + focal * (x * right[0] + y * right[1] + z * right[2]) / depth);
-      const v = Math.round(height / 2 + focal * (x * down[0] + y * down[1] + z * down[2]) / depth);
-      const side = Math.min(6, Math.max(1, Math.round(focal * size / depth)));
-      const colour = 0xff000000 | colours[i + 2] << 16 | colours[i + 1] << 8 | colours[i];
-      for (let row = Math.max(0, v); row < Math.min(height, v + side); row += 1) {
-        for (let column = Math.max(0, u); column < Math.min(width, u + side); column += 1) {
-          const at = row * width + column;
-          if (depth < depths[at]) {
-            depths[at] = depth;
-            pixels[at] = colour;
-          }
-        }
-      }
-    }
-  }
+  get found() { return ((this.app.store.get('eye') || {}).sensors || []).filter((each) => each.kind === 'cloud'); }
 
-  turn(dx, dy) {
-    this.azimuth -= dx * 0.008;
-    this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation + dy * 0.008));
-    this.schedule();
-  }
+  offer() { this.offerOf(this.found.map((each) => each.topic), this.choice.value, 'no point cloud'); }
 
-  shift(dx, dy) {
-    const [right, down] = this.axes();
-    const step = this.distance / (FOCAL * this.canvas.clientHeight);
-    this.centre = this.centre.map((each, axis) => each - step * (dx * right[axis] + dy * down[axis]));
-    this.schedule();
-  }
+  nameOf(topic) { return 'with ' + topic.replace(/^\//, ''); }
 
-  zoom(factor) {
-    this.distance = Math.min(200, Math.max(0.05, this.distance * factor));
-    this.schedule();
+  choose(topic) {
+    const cloud = this.found.find((each) => each.topic === topic);
+    this.startClouds(topic, cloud && cloud.type);
+    if (!topic) setText(this.count, '');
   }
+}
 
-  down(event) {
-    this.canvas.setPointerCapture(event.pointerId);
-    this.pointers.set(event.pointerId, event);
-  }
-
-  move(event) {
-    const before = this.pointers.get(event.pointerId);
-    if (!before || !this.points) return;
-    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    const other = [...this.pointers.values()].find((each) => each.pointerId !== event.pointerId);
-    this.pointers.set(event.pointerId, event);
-    if (other) {
-      const span = (each) => Math.hypot(each.clientX - other.clientX, each.clientY - other.clientY) || 1;
-      this.zoom(span(before) / span(event));
-      this.shift(dx / 2, dy / 2);
-    } else if (event.buttons & 6 || event.shiftKey) this.shift(dx, dy);
-    else this.turn(dx, dy);
-  }
-
-  up(event) { this.pointers.delete(event.pointerId); }
-
-  wheel(event) {
-    event.preventDefault();
-    if (this.points) this.zoom(Math.exp(event.deltaY * 0.0012));
-  }
-
-  key(event) {
-    const step = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] }[event.key];
-    if (!this.points || !(step || '+-'.includes(event.key))) return;
-    event.preventDefault();
-    event.stopPropagation();
-    if (step) this.turn(...step);
-    else this.zoom(event.key === '+' ? 0.85 : 1.18);
-  }
+// The robot, and what the cloud has within 3 m of it.
+function around(cloud, robot) {
+  if (!cloud || !robot) return cloud || robot;
+  const near = (value, axis) => Math.min(robot[1][axis] + 3, Math.max(robot[0][axis] - 3, value));
+  return [Math.min, Math.max].map((most, end) => [0, 1, 2].map((axis) => most(near(cloud[end][axis], axis), robot[end][axis])));
 }

@@ -11,9 +11,10 @@ export function numberOf(app, topic, type) {
 
 export class FrameFeed {
   // `which()`: the sensor's number; `root`: an element, nothing is asked for while it is not on the page;
-  // `take(answer, facts)`: shows a frame; `say(text)`: '' where all is well
-  constructor(app, which, root, { width = 640, take, say, every = LEAST_PAUSE_MS }) {
-    Object.assign(this, { app, which, root, width, take, say, every });
+  // `take(answer, facts)`: shows a frame; `say(text)`: '' where all is well; `beside()`: the number of a robot at which
+  // the facts shall tell its place, undefined for none
+  constructor(app, which, root, { width = 640, take, say, every = LEAST_PAUSE_MS, beside = () => undefined }) {
+    Object.assign(this, { app, which, root, width, take, say, every, beside });
     this.times = [];
     this.running = true;
     this.loop();
@@ -35,8 +36,9 @@ export class FrameFeed {
     let last;
     while (this.running) {
       const id = this.which();
-      if (id !== last) after = 0;
-      last = id;
+      const beside = this.beside();
+      if (id + ' ' + beside !== last) after = 0;
+      last = id + ' ' + beside;
       if (document.hidden || !this.root.isConnected || !this.app.link.connected || id === undefined || id === null) {
         if (id === undefined && this.app.link.connected && this.root.isConnected) this.say('It is gone.');
         await pause(250);
@@ -45,7 +47,7 @@ export class FrameFeed {
       const begun = performance.now();
       let rest = 0;
       try {
-        after = await this.once(id, after);
+        after = await this.once(id, after, beside);
       } catch (err) {
         if (!this.running) return;
         rest = TROUBLE_PAUSE_MS;
@@ -56,9 +58,9 @@ export class FrameFeed {
     }
   }
 
-  async once(id, after) {
+  async once(id, after, beside) {
     this.controller = new AbortController();
-    const answer = await fetch('frame/' + id + '?after=' + after + '&width=' + this.width,
+    const answer = await fetch('frame/' + id + '?after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : ''),
       { headers: { 'X-Xsrf': this.app.session.xsrf }, cache: 'no-store', signal: this.controller.signal });
     if (answer.status === 204) {
       this.say(after ? 'Nothing new comes.' : 'Nothing comes.');

@@ -71,7 +71,12 @@ export class Orbit {
     else this.turn(dx, dy);
   }
 
-  up(event) { this.pointers.delete(event.pointerId); }
+  up(event) {
+    this.pointers.delete(event.pointerId);
+    this.changed();
+  }
+
+  get moving() { return this.pointers.size > 0; }
 
   wheel(event) {
     event.preventDefault();

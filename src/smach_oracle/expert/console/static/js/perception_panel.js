@@ -4,6 +4,7 @@ import { h, replace, setText } from './dom.js';
 import { FrameFeed } from './frame_feed.js';
 import { Lost } from './link.js';
 import { Marking } from './marking.js';
+import { ObjectView } from './object_view.js';
 
 const TOOLS = [['rectangle', '▭ Rectangle', 'Drag from corner to corner around the object'], ['free', '✎ Free region', 'Draw a line around the object'],
   ['object', '+ Object', 'Paint what belongs to it'], ['background', '− Background', 'Paint what does not belong to it']];
@@ -26,6 +27,7 @@ export class PerceptionPanel {
     this.outcome = h('select', { 'aria-label': 'Outcome' }, question.supersede.map((choice) => h('option', { value: choice.outcome, selected: choice.outcome === 'succeeded' }, choice.outcome + ' → ' + choice.target)));
     this.buttons = { undo: this.button('Undo', () => this.undo()), clear: this.button('Clear', () => this.clear()), failed: this.button('Frame of the failure', () => this.useFrame('at_goal')),
       fresh: this.button('New frame', () => this.useFrame('fresh')), accept: this.button('Accept the object', () => this.accept(), 'primary accept'), quit: this.button('Give up', () => this.giveUp(), 'quit') };
+    this.object = new ObjectView(app, () => this.sensors);
     this.root = this.build();
     this.take('rectangle');
     this.listen();
@@ -39,7 +41,7 @@ export class PerceptionPanel {
     return h('section', { class: 'card perception', 'aria-label': 'Mark the object' },
       h('div', { class: 'perception-head' }, h('h3', {}, 'Mark the object for ', this.question.state), h('span', { class: 'spacer' }), failed, fresh),
       h('div', { class: 'perception-body' },
-        h('div', { class: 'screen' }, this.picture, this.overlay, this.note),
+        h('div', { class: 'screen' }, this.picture, this.overlay, this.note), this.object.root,
         h('div', { class: 'perception-side' }, h('div', { class: 'tool-row', role: 'toolbar' }, [...this.tools.values()]), h('div', { class: 'tool-row' }, undo, clear),
           this.result, this.problem, h('span', { class: 'spacer' }),
           h('div', { class: 'perception-end' }, this.question.supersede.length > 1 && h('label', { class: 'outcome-row' }, h('span', { class: 'dim' }, 'The state ends with'), this.outcome), accept, quit))));
@@ -47,7 +49,10 @@ export class PerceptionPanel {
 
   button(text, onclick, kind) { return h('button', { class: kind || 'tool', onclick }, text); }
 
-  stop() { this.feed.stop(); }
+  stop() {
+    this.feed.stop();
+    this.object.stop();
+  }
 
   // Numbers of the sensors of its frame and of the cloud of that, null before there are any.
   get sensors() { return ((this.app.store.get('eye') || {}).perception || {})[this.question.key] || { image: null, cloud: null }; }
@@ -80,6 +85,7 @@ export class PerceptionPanel {
   forget() {
     this.outlines = [];
     this.found = null;
+    this.object.show(null);
     this.generation = (this.generation || 0) + 1; // an answer that is still on its way is about something else
     setText(this.problem, '');
   }
@@ -132,6 +138,7 @@ export class PerceptionPanel {
 
   // One cut at a time; what was drawn meanwhile is cut out next.
   async cut() {
+    this.asked = performance.now();
     this.generation = (this.generation || 0) + 1;
     if (this.cutting) return;
     this.cutting = true;
@@ -148,6 +155,8 @@ export class PerceptionPanel {
   takeIn(reply) {
     this.outlines = (reply.data && reply.data.outlines) || [];
     this.found = reply.ok && reply.data ? reply.data : null;
+    this.object.show(this.found && this.found.object);
+    this.root.dataset.shownAfter = Math.round(performance.now() - this.asked);
     setText(this.problem, reply.ok ? '' : reply.message);
     this.warning = reply.ok ? reply.message : '';
     this.refresh();

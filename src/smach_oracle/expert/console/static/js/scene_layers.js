@@ -41,7 +41,8 @@ export class CloudLayer {
   bounds() {
     if (!this.points.length) return null;
     if (this.box) return this.box;
-    const axes = [0, 1, 2].map((axis) => this.points.filter((_, i) => i % 3 === axis).sort());
+    const step = 3 * Math.ceil(this.points.length / 6000);
+    const axes = [0, 1, 2].map((axis) => Float32Array.from({ length: Math.ceil(this.points.length / step) }, (_, i) => this.points[i * step + axis]).sort());
     const at = (share) => axes.map((values) => values[Math.round(share * (values.length - 1))]);
     this.box = [at(0.02), at(0.98)];
     return this.box;

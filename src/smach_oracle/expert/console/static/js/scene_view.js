@@ -3,8 +3,8 @@ import { h, setText } from './dom.js';
 import { Orbit } from './orbit.js';
 import { Raster } from './raster.js';
 
-const QUICK_MS = 22; // a picture that is drawn so quickly is drawn with twice the pixels, to be smooth
-const SLOW_MS = 70;
+const QUICK_MS = 30; // a picture that is drawn so quickly is drawn with twice the pixels, to be smooth
+const SLOW_MS = 110;
 
 export class SceneView {
   constructor(label, onHome) {
@@ -48,19 +48,20 @@ export class SceneView {
   }
 
   draw() {
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((each) => Math.round(each * this.fine));
+    const fine = this.orbit.moving ? 1 : this.fine;
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((each) => Math.round(each * fine));
     if (!width || !height) return;
     const begun = performance.now();
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
     const context = this.canvas.getContext('2d');
     const image = context.createImageData(width, height);
     const view = this.orbit.view(width, height);
-    const paper = { ratio: this.fine, ground: groundOf(this.canvas) };
+    const paper = { ratio: fine, ground: groundOf(this.canvas) };
     this.raster.begin(image);
     for (const layer of this.layers) layer.draw(this.raster, view, paper);
     context.putImageData(image, 0, 0);
     this.tell();
-    this.measure(performance.now() - begun);
+    if (fine === this.fine) this.measure(performance.now() - begun);
   }
 
   // What is on the screen, for whoever wants to know.

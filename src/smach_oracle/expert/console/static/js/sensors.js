@@ -1,15 +1,15 @@
-// The sensors: whatever cameras, point clouds and joint states the console has found; up to four at a time.
+// The sensors: whatever cameras, point clouds, robots and joint states the console has found; up to four at a time.
 import { remember, remembered } from './alerts.js';
 import { CameraView } from './camera_view.js';
-import { CloudView } from './cloud_view.js';
+import { CloudView, RobotView } from './cloud_view.js';
 import { h, replace } from './dom.js';
 import { JointsView } from './joints_view.js';
 
 export const sensors = { id: 'sensors', title: 'Sensors', create: (app) => new Sensors(app) };
 
 const MOST_VIEWS = 4;
-const TITLES = { image: 'Cameras', cloud: 'Point clouds', joints: 'Joints' };
-const VIEWS = { image: CameraView, cloud: CloudView, joints: JointsView };
+const TITLES = { image: 'Cameras', cloud: 'Point clouds', robot: 'Robots in 3D', joints: 'Joints' };
+const VIEWS = { image: CameraView, cloud: CloudView, robot: RobotView, joints: JointsView };
 
 class Sensors {
   constructor(app) {
@@ -75,7 +75,7 @@ class Sensors {
     if (!roots.length) {
       replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, this.known.length ? 'Nothing is looked at' : 'No sensors'),
         h('p', {}, this.known.length ? 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to a sensor only while somebody looks at it.'
-          : 'Cameras (Image, CompressedImage), point clouds (PointCloud2) and joint states appear here as soon as somebody publishes them.')));
+          : 'Cameras (Image, CompressedImage), point clouds (PointCloud2, or depth with its camera_info), robots (robot_description) and joint states appear here as soon as somebody publishes them.')));
     } else if (roots.length !== this.stage.children.length || roots.some((root, index) => this.stage.children[index] !== root)) {
       replace(this.stage, roots);
     }
