@@ -1,28 +1,46 @@
-"""A picture and a video of the robot at work, for people: a trial of pick and place in one process, without ROS."""
+"""A picture and a video of the robot at work, for people: a trial of a task in one process, without ROS."""
 import argparse
 import sys
 from pathlib import Path
-from typing import List, Optional, Tuple
+from typing import Callable, List, NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
 
+from . import kitchen_scene, tabletop_scene
+from .drink_rehearsal import DrinkTrial
 from .physics import World
 from .portrait import portrait
-from .rehearsal import rehearse
-from .tabletop_scene import draw
+from .rehearsal import Steps, Trial, rehearse
+from .scene import Scene
 
 FRAME = (480, 320)  # pixels, of the video
 PICTURE = (960, 640)
 PERIODS_S = 60  # control periods in a simulated second
-CARRIED = 2 * PERIODS_S  # by when what was picked is well above the table
+
+
+class Filmed(NamedTuple):
+    """A task and when it is worth a picture."""
+
+    draw: Callable[[int, bool], Scene]
+    steps: Callable[[World], Steps]
+    carried_s: float  # of simulated time, for which something has been in the hand
+    seed: int  # of a scene that looks well
+
+
+TASKS = {'pick_and_place': Filmed(tabletop_scene.draw, Trial, 2.0, 3),
+         'drink_retrieval': Filmed(kitchen_scene.draw, DrinkTrial, 3.2, 600)}
 
 
 class FilmedWorld(World):
     """A world with somebody beside it who takes pictures of it while its time goes on."""
 
-    def __init__(self, frames_s: float) -> None:
-        """`frames_s`: frames of the video per simulated s; 0: no video."""
+    def __init__(self, frames_s: float, carried_s: float) -> None:
+        """
+        :param frames_s: frames of the video per simulated s; 0: no video.
+        :param carried_s: simulated s for which something must have been carried when the picture is taken.
+        """
+        self._carried = int(round(carried_s * PERIODS_S))
         self._every = int(round(PERIODS_S / frames_s)) if frames_s else 0
         self._held = 0  # control periods for which something has been in a hand
         self._count = 0
@@ -44,15 +62,15 @@ class FilmedWorld(World):
         if self._count % 10 or self.picture is not None:
             return
         self._held = self._held + 10 if any(map(self.holding, self.movable())) else 0
-        if self._held >= CARRIED:
+        if self._held >= self._carried:
             self.picture = portrait(self, PICTURE)
 
 
-def film(seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
+def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
     """The picture and the frames of one trial. Raises RuntimeError where nothing was carried in it."""
-    world = FilmedWorld(frames_s)
+    world = FilmedWorld(frames_s, task.carried_s)
     try:
-        done = rehearse(draw(seed, benign=True), world)
+        done = rehearse(task.draw(seed, True), world, task.steps)
         if world.picture is None:
             raise RuntimeError('seed {}: {} failed: {}'.format(seed, done.failed or 'nothing', done.reason))
         return world.picture, world.shots
@@ -78,12 +96,15 @@ def main(argv: Optional[List[str]] = None) -> int:
     parser.add_argument('picture', help='file of the picture (.png or .jpg)')
     parser.add_argument('--video', metavar='FILE', help='also write a video (.mp4), at simulated time')
     parser.add_argument('--fps', type=float, default=5.0, help='frames of the video per simulated s (default: 5)')
-    parser.add_argument('--seed', type=int, default=3, help='of the scene (default: %(default)s)')
+    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)')
+    parser.add_argument('--seed', type=int, help='of the scene (default: one that looks well)')
     args = parser.parse_args(argv)
-    if not 0.5 <= args.fps <= 60 or args.seed < 0:
+    task = TASKS[args.task]
+    seed = task.seed if args.seed is None else args.seed
+    if not 0.5 <= args.fps <= 60 or seed < 0:
         parser.error('--fps must be from 0.5 to 60, --seed 0 or more')
     try:
-        picture, frames = film(args.seed, args.fps if args.video else 0.0)
+        picture, frames = film(task, seed, args.fps if args.video else 0.0)
     except RuntimeError as err:
         print('pr2_film: {}'.format(err), file=sys.stderr)
         return 1

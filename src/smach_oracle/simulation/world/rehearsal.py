@@ -3,7 +3,7 @@
 The steps are those of tasks/pick_and_place.py, done by the same code as behind the actions.
 """
 import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
@@ -44,6 +44,14 @@ class Rehearsed(NamedTuple):
     sim_s: float
 
 
+class Steps(Protocol):
+    """A task over one world."""
+
+    @property
+    def states(self) -> List[Tuple[str, Callable[[], None]]]:
+        """Names, in order, and what is done in them."""
+
+
 class Trial:
     """The states of the task over one world."""
 
@@ -77,17 +85,17 @@ class Trial:
         self.data['grasp'] = self._do('pick', goal).grasp
 
 
-def rehearse(scene: Scene, world: Optional[World] = None) -> Rehearsed:
+def rehearse(scene: Scene, world: Optional[World] = None, task: Callable[[World], Steps] = Trial) -> Rehearsed:
     """One trial up to its first failure; in a world of its own, where none is given."""
     if world is None:
         world = World()
         try:
-            return rehearse(scene, world)
+            return rehearse(scene, world, task)
         finally:
             world.close()
     begun = time.perf_counter()
     world.reset(scene)
-    trial = Trial(world)
+    trial = task(world)
     wall = {'reset': time.perf_counter() - begun}
     start = world.time
     failed = reason = ''
