@@ -92,7 +92,7 @@ export class Course {
 
   ask(event) {
     const { now } = this;
-    if (event.kind === 'query_opened') now.question = { path: event.path, state: event.state, reason: event.text, holder: '', steps: [], answer: null };
+    if (event.kind === 'query_opened') now.question = { query: event.query, path: event.path, state: event.state, reason: event.text, holder: '', steps: [], answer: null };
     const { question } = now;
     if (!question) return;
     if (event.kind === 'query_claimed') question.holder = event.by;

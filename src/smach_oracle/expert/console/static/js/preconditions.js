@@ -10,14 +10,15 @@ export class Preconditions {
     this.items = names.map((name) => {
       const sign = h('span', { class: 'sign', 'aria-hidden': 'true' });
       const word = h('span', { class: 'word' });
-      const root = h('span', { class: 'precondition' }, sign, ' ', h('span', {}, name), ' ', word);
-      return { root, sign, word };
+      const why = h('span', { class: 'why' });
+      const root = h('span', { class: 'precondition' }, sign, h('span', {}, name), ' ', word, ' ', why);
+      return { root, sign, word, why };
     });
     this.age = h('span', { class: 'dim age' });
-    this.root = h('span', { class: 'preconditions' }, 'first: ', this.items.map((item, index) => [index > 0 && ', ', item.root]), ' ', this.age);
+    this.root = h('span', { class: 'preconditions' }, 'first: ', this.names = h('span', {}, names.join(', ')), this.age, this.items.map((item) => item.root));
   }
 
-  // `checks`: [{name, holds, text, looked}] in the same order; undefined where the robot tells nothing.
+  // Nothing but their names where the robot tells nothing. `checks`: [{name, holds, text, looked}] in the same order.
   show(checks, now) {
     const oldest = Math.min(...(checks || []).map((check) => (check.looked === null ? Infinity : check.looked)));
     const age = now - oldest;
@@ -29,9 +30,10 @@ export class Preconditions {
       setText(item.word, check ? word : '');
       const shown = 'precondition ' + (check ? kind : '') + (stale ? ' stale' : '');
       if (item.root.className !== shown) item.root.className = shown;
-      const title = check ? check.text : 'Its robot does not tell how it stands';
-      if (item.root.title !== title) item.root.title = title;
+      setText(item.why, check && check.holds !== true ? check.text.replace(check.name + ' ', '') : '');
+      item.root.hidden = !check;
     });
-    setText(this.age, checks && oldest < Infinity ? (age < 1 ? 'now' : duration(age) + ' ago') : '');
+    this.names.hidden = Boolean(checks);
+    setText(this.age, checks && oldest < Infinity ? (age < 1 ? 'as of now' : 'as of ' + duration(age) + ' ago') : '');
   }
 }

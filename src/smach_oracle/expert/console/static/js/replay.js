@@ -3,15 +3,16 @@ import { Course, activePath, liveAt } from './course.js';
 import { h, replace, setText, typing } from './dom.js';
 import { chip } from './format.js';
 import { MachineView } from './machines.js';
+import { StillView } from './situation_camera.js';
 import { Timeline } from './timeline.js';
 
-const SPEEDS = [0.25, 1, 4, 16, 64];
+const SPEEDS = [0.25, 1, 4, 16, 64, 256];
 const ROBOT = 'replayed';
 
 export class Replay {
   // `onCursor(event)`: the event under the cursor is another one now
-  constructor(onCursor) {
-    this.onCursor = onCursor;
+  constructor(app, onCursor) {
+    Object.assign(this, { app, onCursor });
     this.course = new Course();
     this.graphs = () => null;
     this.following = true;
@@ -39,12 +40,14 @@ export class Replay {
   }
 
   // `events` of a trial, so far; `end`: of the axis, in s since the epoch; `graphs(path)`: a container's drawing;
-  // `running`: whether more is to come; `trial`: its id, so that another one begins anew
-  set(trial, events, end, graphs, running) {
+  // `running`: whether more is to come; `trial`: its id, so that another one begins anew; `stills`: by question, what
+  // cameras saw
+  set(trial, events, end, graphs, running, stills) {
     const another = trial !== this.trial;
     this.trial = trial;
     this.graphs = graphs;
     this.running = running;
+    this.stills = stills || {};
     this.course.set(events);
     this.end = Math.max(end, this.course.end);
     if (another) {
@@ -163,7 +166,18 @@ export class Replay {
       question.holder && !answer && [' ', chip(question.holder + ' works on it', 'warn')]),
     question.steps.map((step) => h('p', { class: 'dim' }, step)),
     answer ? h('p', { class: 'replay-answer' }, h('strong', {}, 'Answer'), answer.by && ' of ' + answer.by, ': ', answer.kind.replace('_', ' '), answer.target && ' ' + answer.target, answer.why && h('span', { class: 'dim' }, ' – ' + answer.why))
-      : h('p', { class: 'dim' }, question.closed ? 'No answer: ' + question.closed + '.' : 'Not answered yet.'));
+      : h('p', { class: 'dim' }, question.closed ? 'No answer: ' + question.closed + '.' : 'Not answered yet.'), this.pictures(question.query));
+  }
+
+  // What cameras saw at the failure; asked for once.
+  pictures(query) {
+    const stills = this.stills[query] || [];
+    if (!stills.length) return null;
+    if (this.picturesOf !== stills) {
+      this.picturesOf = stills;
+      this.picturesRoot = h('div', { class: 'replay-stills' }, stills.map((still) => new StillView(this.app, still).root));
+    }
+    return this.picturesRoot;
   }
 
   open(path) {

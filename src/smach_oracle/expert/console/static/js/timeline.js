@@ -89,7 +89,7 @@ export class Timeline {
     const y = (lane) => TOP + lanes.indexOf(lane) * LANE;
     replace(this.canvas, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
       ticks(whole).map((tick) => [s('line', { class: 'tick', x1: x(begin + tick), x2: x(begin + tick), y1: TOP - 6, y2: height }),
-        s('text', { class: 'tick-text', x: x(begin + tick), y: 14 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))]),
+        s('text', { class: 'tick-text', x: Math.min(x(begin + tick), width - 26), y: 14 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))]),
       lanes.map((lane) => s('text', { class: 'lane', x: 0, y: y(lane) + 16 }, short(lane, name), s('title', {}, lane))),
       bars.map((bar) => s('rect', { class: 'bar ' + bar.kind, x: x(bar.from), y: y(bar.lane) + 4, rx: 3, height: LANE - 8,
         width: Math.max(2, x(bar.to) - x(bar.from)) }, s('title', {}, bar.words))),

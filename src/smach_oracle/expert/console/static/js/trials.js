@@ -17,7 +17,7 @@ class Trials {
     this.events = [];
     this.table = h('div', { class: 'table-frame card' });
     this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
-    this.replay = new Replay((event) => this.mark(event.seq));
+    this.replay = new Replay(app, (event) => this.mark(event.seq));
     this.recorded = new Recorded(app, () => this.showRecorded());
     this.title = h('h2', {});
     this.facts = h('p', { class: 'dim' });
@@ -167,7 +167,7 @@ class Trials {
     while (this.log.childElementCount > SHOWN_EVENTS) this.log.lastElementChild.remove();
     const { robot } = this.trial;
     this.replay.set(this.chosen, this.events, running ? Math.max(last, this.app.store.now()) : last,
-      this.bag ? (path) => this.recorded.opened.graphs[path] : (path) => this.app.store.get('graph ' + robot + ' ' + path), running);
+      this.bag ? (path) => this.recorded.opened.graphs[path] : (path) => this.app.store.get('graph ' + robot + ' ' + path), running, this.bag && this.recorded.opened.stills);
   }
 
   // The event under the cursor, in the log.
