@@ -14,8 +14,8 @@ from .marked_scene import MarkedScene, SceneError, scene_of
 from .output_templates import OF_THE_SCENE, StateTemplate
 from .segmentation import Cutting, SegmentationError, Stroke, segment
 
-NO_MARK = ('no object is marked, so {} cannot be told: mark it (call segment) first, give them with the outcome, choose '
-           'another outcome, or give up')
+NO_MARK = ('no object is marked, so {} cannot be told: mark it (call segment) first, give them with the outcome, '
+           'choose another outcome, or give up')
 
 
 class Marked(NamedTuple):

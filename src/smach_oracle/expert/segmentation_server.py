@@ -1,7 +1,7 @@
 """The perception interface: a person marks the object in a camera frame, and the failed detection is superseded by it.
 
-A SharedAutonomy action beside `~image` and `~cloud` (the frame in use), `~segment`, `~use_frame`, `~finish` and `~give_up`; for any
-robot with a camera that gives colour and registered depth, and a tf tree from it to the base.
+A SharedAutonomy action beside `~image` and `~cloud` (the frame in use), `~segment`, `~use_frame`, `~finish` and
+`~give_up`; for any robot with a camera that gives colour and registered depth, and a tf tree from it to the base.
 """
 import time
 from typing import Any, Collection, List, Mapping, Optional

@@ -218,6 +218,7 @@ def _mimics(root: ElementTree.Element) -> Dict[str, Mimic]:
         mimic = joint.find('mimic')
         if mimic is not None:
             where = 'robot description: joint {!r}'.format(joint.get('name', '')[:100])
-            found[joint.get('name', '')] = Mimic(mimic.get('joint', ''), *(
-                _numbers(where, mimic, name, default, 1)[0] for name, default in (('multiplier', '1'), ('offset', '0'))))
+            multiplier, offset = (_numbers(where, mimic, name, default, 1)[0]
+                                  for name, default in (('multiplier', '1'), ('offset', '0')))
+            found[joint.get('name', '')] = Mimic(mimic.get('joint', ''), multiplier, offset)
     return found
