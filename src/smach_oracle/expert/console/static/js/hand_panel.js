@@ -42,7 +42,7 @@ export class HandPanel {
       h('div', { class: 'hand-head' }, h('h3', {}, 'Drive the hand for ', this.question.state), this.driver, h('span', { class: 'spacer' }), this.wheelButton),
       this.problem,
       h('div', { class: 'hand-body' }, h('div', { class: 'hand-see' }, this.light, this.camera, this.facts),
-        h('div', { class: 'hand-controls' }, this.arms, h('div', { class: 'row wrap' }, h('span', { class: 'dim' }, 'Along the axes of the'), [...this.frames.values()]),
+        h('div', { class: 'hand-controls' }, h('div', { class: 'hand-choices' }, this.arms, h('div', { class: 'row wrap' }, h('span', { class: 'dim frame-words' }, 'Along the axes of the'), [...this.frames.values()])),
           h('label', { class: 'row' }, h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
           h('h4', {}, TITLES.linear), group('linear'), h('h4', {}, TITLES.angular), group('angular'),
           h('h4', {}, 'Gripper'), h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' }, this.pads.get('open'), this.pads.get('close')),
@@ -89,6 +89,7 @@ export class HandPanel {
     this.frame = frame;
     remember('drive frame', frame);
     for (const [name, button] of this.frames) button.setAttribute('aria-pressed', name === frame);
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur(); // keys drive, they press no buttons
   }
 
   chooseArm(arm) {
@@ -165,7 +166,7 @@ export class HandPanel {
     setText(this.light, told || 'Nothing is heard of the hand yet.');
     this.light.dataset.kind = !state ? '' : state.refused ? 'bad' : state.limit ? 'warn' : state.moving ? 'good' : '';
     const facts = state ? [['Speed', (state.speed === null ? '–' : Math.round(1000 * state.speed) + ' mm/s') + (state.moving && state.share !== null ? ', ' + Math.round(100 * state.share) + ' % of what is asked' : '')],
-      ['Clearance', state.clearance === null ? 'nothing near' : (100 * state.clearance).toFixed(1) + ' cm'],
+      ['Clearance', state.clearance === null ? 'nothing known is near' : (100 * state.clearance).toFixed(1) + ' cm'],
       ['Gripper', state.gripper === null ? 'not moved yet' : (1000 * state.gripper).toFixed(0) + ' mm' + (state.stalled ? ', holds something' : '')],
       ['Tool at', (this.view.arms.length > 1 ? state.arm + ': ' : '') + state.at.map((value, axis) => 'xyz'[axis] + ' ' + (value === null ? '–' : value.toFixed(3))).join('  ')]] : [];
     const key = JSON.stringify(facts);
