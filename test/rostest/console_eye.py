@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The console's eye in a real browser: an object marked with the mouse in a real interface, and sensors looked at."""
+"""The console's eye in a real browser: an object marked with the mouse in a real interface, sensors looked at, and a
+robot with its cloud in 3D."""
 import os
 import shutil
 import sys
@@ -20,18 +21,28 @@ from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand  # noqa: E402
 from smach_oracle.ros.images import cloud_message  # noqa: E402
+from smach_oracle.simulation.world.node.state_publisher import publish_description  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
     from browser import Browser  # noqa: E402
     from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+    from selenium.webdriver.common.keys import Keys  # noqa: E402
 TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22))
 CAN = Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.80, 0.10, 0.78), colour=(0.1, 0.3, 0.9))
 BOX = Body('box', 'box', (0.05, 0.05, 0.14), (0.68, -0.15, 0.79), colour=(0.2, 0.8, 0.2))
 CAN_INDEX = 1
 QUESTION = '.question-row[data-key^="/alpha/"]'
 CAMERA = '/head_camera/rgb/image_raw'
+DEPTH = '/head_camera/depth_registered/image_raw'
+DRAWN = ('const [view, name] = [document.querySelector(arguments[0]), arguments[1]];'
+         'return view ? Number(view.dataset[name] || 0) : 0')
+PICTURE = ('const view = document.querySelector(arguments[0]);'
+           'const image = view.getContext("2d").getImageData(0, 0, view.width, view.height);'
+           'const data = new Uint32Array(image.data.buffer);'
+           'return [data.reduce((sum, each) => (sum * 31 + each) >>> 0, view.width),'
+           ' data.reduce((sum, each) => sum + (each ? 1 : 0), 0)]')
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -39,6 +50,7 @@ class TheEye(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        publish_description()
         cls.camera = PublishedCamera('head_camera', [TABLE, CAN, BOX], streams=True)
         cls.joints = rospy.Publisher('joint_states', JointState, queue_size=1, latch=True)
         cls.cloud = rospy.Publisher('points', PointCloud2, queue_size=1, latch=True)
@@ -86,6 +98,18 @@ class TheEye(unittest.TestCase):
     def told(self, name):
         return [told for told in self.audited if told.command == name]
 
+    def drawn(self, canvas, what):
+        return self.browser.run(DRAWN, canvas, what)
+
+    def assert_the_object_is_drawn_in_3d(self, canvas):
+        own = int(self.browser.text('[data-fact=points]'))
+        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'points') > own + 5000), 'it, and what is around it')
+        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') > 10000), 'the robot beside it')
+        before, pixels = self.browser.run(PICTURE, canvas)
+        self.assertGreater(pixels, 5000)
+        self.browser.find(canvas).send_keys(Keys.ARROW_LEFT)
+        self.assertTrue(wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before), 'a key turns it')
+
     def test_1_an_object_is_marked_in_the_frame_and_the_machine_goes_on_with_it(self):
         browser = self.browser
         browser.click(QUESTION)
@@ -98,6 +122,9 @@ class TheEye(unittest.TestCase):
         self.assertTrue(wait_for(lambda: browser.run(
             'return document.querySelector(".drawing").getContext("2d").getImageData(arguments[0], arguments[1], 1, 1)'
             '.data[3]', *(int(each) for each in middle))), 'the mask lies over the object')
+        print('from the end of the drawing to the mask on the screen: {} ms'.format(
+            browser.run('return document.querySelector(".perception").dataset.shownAfter')))
+        self.assert_the_object_is_drawn_in_3d('.object-view .cloud')
         browser.click('[data-tool=background]')
         left_top, right_bottom = self.around_the_can()
         self.drag(left_top, (right_bottom[0], left_top[1]))
@@ -143,9 +170,29 @@ class TheEye(unittest.TestCase):
         self.assertTrue(browser.says('1.250', '.joints-view'))
         browser.click('[data-topic="/points"]')
         self.assertTrue(browser.says('20000 of 50000 points', '.cloud-view'))
-        shown = ('const view = document.querySelector(".cloud"); return Array.from(view.getContext("2d").getImageData('
-                 '0, 0, view.width, view.height).data).filter((each, i) => i % 4 === 3 && each).length')
-        self.assertGreater(browser.run(shown), 1000)
+        self.assertGreater(browser.run(PICTURE, '.cloud-view .cloud')[1], 1000)
+        self.assertEqual(browser.errors(), [])
+
+    def test_5_the_robot_stands_in_its_cloud_and_moves_as_its_joints_say(self):
+        browser, canvas = self.browser, '.cloud-view .cloud'
+        self.assertTrue(wait_for(
+            lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(canvas, 'points') == 20000))
+        before = browser.run(PICTURE, canvas)[0]
+        self.joints.publish(JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))
+        self.assertTrue(wait_for(lambda: browser.run(PICTURE, canvas)[0] != before))
+        self.assertNotIn('No transform', browser.text('.cloud-view'))
+        browser.run('const choice = document.querySelector(".cloud-view .beside"); choice.value = "";'
+                    'choice.dispatchEvent(new Event("change"))')
+        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') == 0), 'the cloud alone')
+        self.assertEqual(browser.errors(), [])
+
+    def test_6_where_there_is_depth_alone_the_console_makes_the_cloud(self):
+        browser = self.browser
+        for topic in ('/points', '/joint_states'):
+            browser.click('.sensor-list [data-topic="{}"]'.format(topic))
+        browser.click('.sensor-list [data-topic="{} as a cloud"]'.format(DEPTH))
+        self.assertTrue(browser.says('of 307200 points', '.cloud-view'))
+        self.assertTrue(wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000), 'with the robot')
         self.assertEqual(browser.errors(), [])
 
 
