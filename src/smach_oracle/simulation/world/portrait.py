@@ -25,7 +25,7 @@ class Viewpoint(NamedTuple):
 
 
 AT_TABLE = Viewpoint((2.6, -2.2, 1.9), (0.45, -0.05, 0.78), 34.0)
-AT_FRIDGE = Viewpoint((0.75, -2.75, 1.95), (1.05, 0.0, 0.8), 38.0)
+AT_FRIDGE = Viewpoint((-0.15, -2.6, 1.85), (0.95, 0.1, 0.74), 40.0)
 AT_HOME = Viewpoint((2.5, -2.9, 2.0), (0.45, -0.15, 0.8), 42.0)  # with the person and the fridge
 USUAL = {'drink_retrieval': AT_FRIDGE}  # by task; others: AT_TABLE
 
