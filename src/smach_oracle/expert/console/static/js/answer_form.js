@@ -2,6 +2,7 @@
 // i the first interface, g give up.
 import { h } from './dom.js';
 import { CLASSES, chip, percent, rateBar } from './format.js';
+import { OutputField } from './output_field.js';
 import { Preconditions } from './preconditions.js';
 
 export class AnswerForm {
@@ -14,7 +15,7 @@ export class AnswerForm {
     this.standings = new Map();
     this.why = h('input', { type: 'text', class: 'why', maxlength: 2000, placeholder: 'Reason, for the record (optional)', 'aria-label': 'Reason, for the record' });
     this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.outputs = question.outputs.map((key) => this.output(key));
+    this.outputs = question.outputs.map((key) => new OutputField(key, question.userdata.find((item) => item.key === key), () => { this.problem.textContent = ''; }));
     this.root = h('div', { class: 'answer-form' }, this.states(), this.interfaces(), this.supersede(), this.giveUp(), this.problem, this.why);
     this.enable(false);
   }
@@ -93,25 +94,5 @@ export class AnswerForm {
     const { give_up: outcomes, path } = this.question;
     return [h('h4', {}, 'Give up'), h('div', { class: 'choices short' }, this.choice('give_up', '', 'g', h('strong', {}, 'as the failure would have ended ', path)),
       outcomes.map((outcome) => this.choice('give_up', outcome, '', h('strong', {}, 'with ', outcome))))];
-  }
-
-  // One output key: JSON, or nothing; a message of a type that the question knows is written as its fields.
-  output(key) {
-    const known = this.question.userdata.find((item) => item.key === key);
-    const type = known && known.type && known.type.includes('/') ? known.type : '';
-    const text = h('textarea', { rows: 1, spellcheck: 'false', 'data-output': key, 'aria-label': 'Value of ' + key, placeholder: type ? 'JSON fields of ' + type + '; empty: not set' : 'JSON; empty: not set' });
-    text.addEventListener('input', () => { this.problem.textContent = ''; });
-    const root = h('label', { class: 'output' }, h('span', {}, key), text);
-    const read = () => {
-      const typed = text.value.trim();
-      if (!typed) return null;
-      try {
-        return { key, value: JSON.parse(typed), type };
-      } catch (err) {
-        text.focus();
-        throw new Error(key + ' is not JSON: text needs "quotes".');
-      }
-    };
-    return { root, read };
   }
 }

@@ -10,10 +10,10 @@ export function clean(text) {
 
 function fill(element, properties, children) {
   for (const [name, value] of Object.entries(properties || {})) {
-    if (value === null || value === undefined || value === false) continue;
+    if (value === null || value === undefined || (value === false && !name.startsWith('aria-'))) continue;
     if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
     else if (name.startsWith('--')) element.style.setProperty(name, value);
-    else element.setAttribute(name, value === true ? '' : clean(value));
+    else element.setAttribute(name, value === true && !name.startsWith('aria-') ? '' : clean(value)); // aria says true and false
   }
   append(element, children);
   return element;

@@ -30,7 +30,7 @@ export class Preconditions {
       setText(item.word, check ? word : '');
       const shown = 'precondition ' + (check ? kind : '') + (stale ? ' stale' : '');
       if (item.root.className !== shown) item.root.className = shown;
-      setText(item.why, check && check.holds !== true ? check.text.replace(check.name + ' ', '') : '');
+      setText(item.why, check && check.holds !== true ? (check.text.startsWith(check.name + ' ') ? check.text.slice(check.name.length + 1) : check.text) : '');
       item.root.hidden = !check;
     });
     this.names.hidden = Boolean(checks);

@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""The situation now and the past, in a real browser: preconditions, the camera at the failure, replay, and old bags."""
+import os
+import shutil
+import sys
+import tempfile
+import unittest
+
+import rospy
+import rostest
+from roslib.packages import find_node
+from sensor_msgs.msg import CompressedImage
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_browser import YOURS, ConsoleInABrowser, Node  # noqa: E402
+from ports import free_port  # noqa: E402
+from published_camera import PublishedCamera  # noqa: E402
+from waiting import wait_for  # noqa: E402
+
+from smach_oracle.msg import ExpertQueryGoal, FailureFrames, OpenQueries, PreconditionChecks  # noqa: E402
+from smach_oracle.simulation.world.scene import Body  # noqa: E402
+
+WITH_BROWSER = bool(shutil.which('chromedriver'))
+if WITH_BROWSER:
+    from browser import Browser  # noqa: E402
+    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+    from selenium.webdriver.common.keys import Keys  # noqa: E402
+TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.9, 0.1, 0.1))
+CAMERA = '/head_camera/rgb/image_raw'
+QUESTION = '.question-row[data-key^="/alpha/"]'
+PICK = '.choice.goto[data-name=PICK]'
+MIDDLE = ('const c = document.querySelector(arguments[0]); if (!c) return null; const p = c.getContext("2d")'
+          '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]')
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class SituationAndHistory(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.port = free_port()
+        cls.bags = tempfile.mkdtemp()
+        with open(os.path.join(cls.bags, 'torn.bag'), 'wb') as file:
+            file.write(b'#ROSBAG V2.0\n' + b'\xff' * 200)
+        rospy.set_param('/alpha/record', cls.bags)
+        rospy.set_param('/alpha/failure_cameras', [CAMERA])
+        cls.camera = PublishedCamera('head_camera', [TABLE], streams=True)
+        cls.open = []
+        rospy.Subscriber('/alpha/expert_query/open', OpenQueries, cls.open.append)
+        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
+                                                      'console_history_robot.py'), '__name:=alpha')
+        cls.console = cls.start_console()
+        cls.browser = Browser(1360, 1000)
+        wait_for(cls.page_is_served, 40.0)
+        cls.browser.driver.get('http://localhost:{}/'.format(cls.port))
+
+    tearDownClass = classmethod(ConsoleInABrowser.tearDownClass.__func__)
+    page_is_served = classmethod(ConsoleInABrowser.page_is_served.__func__)
+
+    @classmethod
+    def start_console(cls, *more):
+        return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
+                    '__name:=expert_console', '_bags:=' + cls.bags, *more)
+
+    def question(self) -> ExpertQueryGoal:
+        self.assertTrue(wait_for(lambda: self.open and self.open[-1].queries, 30.0))
+        return self.open[-1].queries[0].query
+
+    def test_1_preconditions_are_told_as_they_stand_now(self):
+        browser = self.browser
+        browser.click(QUESTION, 40.0)
+        self.assertTrue(browser.says(YOURS))
+        self.assertTrue(browser.says('hand_is_free does not hold', PICK))
+        told = browser.text(PICK)
+        self.assertIn("camera_answers unknown raised RuntimeError('no <b>camera</b>')", told)
+        self.assertIn('DETECT unknown only running DETECT would tell; its last visit succeeded', told)
+        self.assertTrue(browser.says('has not come back for', '.choice.goto[data-name=PLACE]'), 'and holds nobody up')
+        rospy.set_param('/alpha/hand_is_free', True)
+        self.assertTrue(browser.says('hand_is_free holds', PICK), 'what changes is told while the question is open')
+        self.assertIn('as of', browser.text(PICK))
+        self.assertEqual(rospy.get_param('/alpha/looked_at_the_door'), 1, 'what hangs is not called again')
+
+    def test_2_the_frame_of_the_failure_is_there_and_a_live_one_beside_it(self):
+        browser = self.browser
+        frames = rospy.wait_for_message('/alpha/failure_frames', FailureFrames, 20.0)
+        self.assertEqual((frames.query_id, frames.topics), (self.question().query_id, [CAMERA]))
+        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.still-view.shown canvas')))
+        self.assertEqual(browser.text('.still-view figcaption .dim'), 'at the failure')
+        red = browser.run(MIDDLE, '.still-view canvas')
+        self.assertGreater(red[0], red[2] + 40)
+        self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
+        browser.click('[data-action=live-camera]')
+        self.assertTrue(wait_for(lambda: (lambda now: now and now[2] > now[0] + 40)(
+            browser.run(MIDDLE, '.pane.now .camera-view.shown canvas'))), 'the live one has changed')
+        self.assertEqual(browser.run(MIDDLE, '.still-view canvas'), red, 'the other has not')
+
+    def test_3_outputs_are_written_as_what_they_are(self):
+        browser = self.browser
+        browser.click('.outputs summary')
+        fits = browser.find('[data-output=fits]')
+        self.assertEqual(fits.tag_name, 'select', 'yes or no')
+        self.assertEqual(fits.get_attribute('aria-label'), 'Value of fits: true or false')
+        grasp = browser.find('[data-output=grasp]')
+        self.assertEqual(grasp.get_attribute('aria-label'), 'Value of grasp: a JSON list')
+        grasp.send_keys('{"a": 1}')
+        browser.click('.choice.supersede[data-name=succeeded]')
+        self.assertTrue(browser.says('grasp is a list', '.answer-form .problem'))
+        grasp.clear()
+        grasp.send_keys('[3, 4]')
+        fits.send_keys('t')
+        browser.click('.choice.supersede[data-name=succeeded]')
+        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'))
+        self.assertEqual(browser.errors(), [])
+
+    def test_4_a_trial_is_replayed_from_its_bag_after_a_restart(self):
+        browser = self.browser
+        self.assertTrue(wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:]))
+        type(self).console.stop()
+        type(self).console = self.start_console()
+        self.assertTrue(browser.says('live', '#status', 40.0))
+        browser.click('#tab-trials')
+        browser.click('.trial[data-number]', 40.0)
+        browser.click('.broken-bags summary')
+        self.assertTrue(browser.says('torn.bag: damaged, or no bag', '.broken-bags li'))
+        self.assertIn('Trials in the bags', browser.text('.panel.trials .table-frame'))
+        slider = browser.find('.replay [role=slider]')
+        self.assertEqual(slider.get_attribute('aria-label'), 'Time in the trial')
+        slider.send_keys(Keys.HOME)
+        self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'))
+        slider.send_keys(Keys.PAGE_UP)
+        self.assertTrue(browser.says('PICK failed', '.replay-words'))
+        self.assertIn('PICK failed', slider.get_attribute('aria-valuetext'))
+        self.assertTrue(wait_for(lambda: self.classes('PICK') >= {'failed'}), 'in the graph of that trial')
+        self.assertLess(float(slider.get_attribute('aria-valuenow')), float(slider.get_attribute('aria-valuemax')))
+        slider.send_keys(Keys.PAGE_UP)
+        self.assertTrue(browser.says('Question about PICK', '.replay-question'))
+        self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
+        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-stills .shown canvas')), 'what the camera saw then')
+        slider.send_keys(Keys.PAGE_UP)
+        self.assertTrue(browser.says('Answer of operator: supersede succeeded', '.replay-question'))
+        slider.send_keys(Keys.ARROW_LEFT)
+        self.assertTrue(browser.says('Not answered yet.', '.replay-question'), 'one event back')
+
+    def classes(self, label):
+        return set((self.browser.run('const e = document.getElementById(arguments[0]); return e && '
+                                     'e.getAttribute("class")', 'replayed/FETCH/' + label) or '').split())
+
+    def test_5_it_plays_by_itself_and_follows_a_finger(self):
+        browser = self.browser
+        slider = browser.find('.replay [role=slider]')
+        slider.send_keys(Keys.HOME)
+        browser.run('document.querySelector(".replay-speed").value = "0.25"')
+        browser.click('[data-replay=play]')
+        self.assertTrue(wait_for(lambda: 'active' in self.classes('DETECT')), 'it has come to the first state')
+        browser.click('[data-replay=play]')
+        stopped = slider.get_attribute('aria-valuenow')
+        self.assertGreater(float(stopped), 0.0)
+        box = slider.rect
+        ActionChains(browser.driver).move_to_element_with_offset(slider, int(box['width'] / 2) - 20, 5).click().perform()
+        self.assertTrue(wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped)))
+        browser.click('.event-log .event:last-child')
+        self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'), 'a line of the log leads there')
+        self.assertEqual(browser.errors(), [])
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_history')
+    rostest.rosrun('smach_oracle', 'console_history', SituationAndHistory)
