@@ -9,6 +9,7 @@ import tornado.websocket
 
 from smach_oracle.expert.console.access import Hosts, TokenBook
 from smach_oracle.expert.console.bags import BagShelf
+from smach_oracle.expert.console.commands import MOST_BYTES
 from smach_oracle.expert.console.desk import Reply
 from smach_oracle.expert.console.handlers import Gate
 from smach_oracle.expert.console.history_handlers import HistoryRoom
@@ -17,7 +18,7 @@ from smach_oracle.expert.console.page_socket import Office
 from smach_oracle.expert.console.recorded import RecordedTrials
 from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.console.sensors import Sensors
-from smach_oracle.expert.console.server import make_app
+from smach_oracle.expert.console.server import make_app, tls_context
 from smach_oracle.expert.console.settings import ConsoleSettings
 from smach_oracle.expert.console.stills import StillFiles
 from smach_oracle.expert.console.trial_log import TrialLog
@@ -79,12 +80,13 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
     """One console on a free port of the loopback."""
 
     tokens = True
+    certificate, private_key = '', ''
 
     def get_app(self):
         text = '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items())
         book = TokenBook(text, 'tokens') if self.tokens else None
         self.audit, self.desk, self.sections, self.log = FakeAudit(), FakeDesk(), Sections(), TrialLog()
-        settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), '', '')
+        settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), self.certificate, self.private_key)
         self.hands = FakeHands()
         self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
         self.office = Office(self.sections, self.log, self.desk, self.hands)
@@ -98,14 +100,20 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         """Of bags."""
         return []
 
+    def get_protocol(self):
+        return 'https' if self.certificate else 'http'
+
+    def get_httpserver_options(self):
+        return {'ssl_options': tls_context(self.gate.settings), 'max_body_size': MOST_BYTES, 'max_header_size': 16384}
+
     @property
     def origin(self):
-        return 'http://127.0.0.1:{}'.format(self.get_http_port())
+        return '{}://127.0.0.1:{}'.format(self.get_protocol(), self.get_http_port())
 
     def ask(self, path, method='GET', body=None, **headers):
         given = {name.replace('_', '-'): value for name, value in headers.items() if value is not None}
         return self.fetch(path, method=method, body=body, headers=given, follow_redirects=False,
-                          allow_nonstandard_methods=True)
+                          allow_nonstandard_methods=True, ca_certs=self.certificate or None)
 
     def begin(self, **headers):
         """A fresh session: its cookie and what the server says of it."""
@@ -123,17 +131,17 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
     async def signed(self, role):
         """Sign in without leaving the loop."""
         client = self.http_client
-        answer = await client.fetch(self.get_url('/session'))
+        answer = await client.fetch(self.get_url('/session'), ca_certs=self.certificate or None)
         cookie = answer.headers['Set-Cookie'].split(';')[0]
         headers = {'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']}
         answer = await client.fetch(self.get_url('/session'), method='POST', headers=headers,
-                                    body=json.dumps({'token': TOKENS[role]}))
+                                    ca_certs=self.certificate or None, body=json.dumps({'token': TOKENS[role]}))
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
     def connect(self, cookie='', **headers):
         given = dict({'Origin': self.origin, 'Cookie': cookie}, **headers)
         request = tornado.httpclient.HTTPRequest(
-            'ws://127.0.0.1:{}/socket'.format(self.get_http_port()),
+            self.origin.replace('http', 'ws', 1) + '/socket', ca_certs=self.certificate or None,
             headers={name: value for name, value in given.items() if value is not None})
         return tornado.websocket.websocket_connect(request)
 

@@ -22,6 +22,8 @@ from .sections import Sections
 from .trial_log import TrialLog
 
 MOST_SOCKETS = 64
+MOST_OF_A_SESSION = 16  # tabs of one browser
+HELLO_LIMIT_S = 10.0
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
@@ -38,7 +40,8 @@ class Office:
         self.log = log
         self.desk = desk
         self.hands = hands
-        self.sockets: Set['Socket'] = set()
+        self.open: Set['Socket'] = set()
+        self.sockets: Set['Socket'] = set()  # those that have said hello
         self.numbers = itertools.count(1)
         self.workers = ThreadPoolExecutor(8, 'command')
 
@@ -82,10 +85,15 @@ class Socket(tornado.websocket.WebSocketHandler):
         self._session = self._gate.session(self)
         if not status and self._gate.identity(self._session) is None:
             status = 401
-        if not status and len(self._office.sockets) >= MOST_SOCKETS:
+        if not status and not self._has_room():
             status = 503
         if status:
             raise tornado.web.HTTPError(status)
+
+    def _has_room(self) -> bool:
+        session = self._session
+        own = [each for each in self._office.open if session and each._session and each._session.id == session.id]
+        return len(self._office.open) < MOST_SOCKETS and len(own) < MOST_OF_A_SESSION
 
     def check_origin(self, origin: str) -> bool:
         """Checked in `prepare` already."""
@@ -94,9 +102,16 @@ class Socket(tornado.websocket.WebSocketHandler):
     def open(self, *_: str, **__: str) -> None:
         """Nothing is told before the page has said hello."""
         self.set_nodelay(True)
+        self._office.open.add(self)
+        asyncio.get_running_loop().call_later(HELLO_LIMIT_S, self._demand_hello)
+
+    def _demand_hello(self) -> None:
+        if self._person is None:
+            self.close(FORGED, 'no hello')
 
     def on_close(self) -> None:
         """Claims run out unless the page comes back."""
+        self._office.open.discard(self)
         self._office.sockets.discard(self)
         self._office.desk.leave(self._number)
         self._office.hands.leave(self._number)

@@ -74,11 +74,8 @@ class Console:
     """Everything behind the page."""
 
     def __init__(self, settings: ConsoleSettings) -> None:
-        """:raises ConfigError: where the address cannot be listened on.
-
-        :raises OSError: where the certificate cannot be read.
-        """
-        tls = _tls(settings)
+        """:raises ConfigError: where the address cannot be listened on, or the certificate not be used."""
+        tls = tls_context(settings)
         sockets = _listen(settings)
         port = sockets[0].getsockname()[1]
         self.url = '{}://{}:{}/'.format(settings.scheme, _shown(settings.address), port)
@@ -143,12 +140,33 @@ def _listen(settings: ConsoleSettings) -> List[socket.socket]:
                           'an address of this machine and a port that is free ({})'.format(err)) from err
 
 
-def _tls(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
+def tls_context(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
+    """What https needs; None where no certificate is set.
+
+    :raises ConfigError: naming the file that cannot be read, or why the two do not belong together.
+    """
     if not settings.certificate:
         return None
+    files = (('~certificate', settings.certificate), ('~private_key', settings.private_key))
+    for name, path in files:
+        try:
+            with open(path, 'rb'):
+                pass
+        except OSError as err:
+            raise ConfigError(name, path, 'a PEM file that can be read ({})'.format(err.strerror)) from err
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-    context.load_cert_chain(settings.certificate, settings.private_key)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(*(path for _, path in files), password=_ask_nobody)
+    except ssl.SSLError as err:
+        raise ConfigError('~certificate, ~private_key', ', '.join(path for _, path in files),
+                          'a certificate and the key that it was made with, both PEM ({})'.format(
+                              err.reason or err)) from err
     return context
+
+
+def _ask_nobody() -> str:
+    raise ConfigError('~private_key', 'a key with a passphrase', 'one without, in a file that its owner alone may read')
 
 
 def _shown(address: str) -> str:
@@ -168,7 +186,7 @@ def main() -> None:
     tornado.ioloop.IOLoop.current()
     try:
         console = Console(read_settings(_parameter))
-    except (ConfigError, OSError) as err:
+    except ConfigError as err:
         rospy.logfatal('%s', err)
         raise SystemExit(2) from err
     rospy.loginfo('The operator console is at %s', console.url)
