@@ -28,7 +28,7 @@ class Filmed(NamedTuple):
     seed: int  # of a scene that looks well
 
 
-TASKS = {'pick_and_place': Filmed(tabletop_scene.draw, Trial, 2.0, 3),
+TASKS = {'pick_and_place': Filmed(tabletop_scene.draw, Trial, 2.0, 23),
          'drink_retrieval': Filmed(kitchen_scene.draw, DrinkTrial, 3.2, 600)}
 
 
