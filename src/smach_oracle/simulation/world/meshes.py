@@ -1,4 +1,4 @@
-"""What is seen of round things, as files of meshes: PyBullet's own are shaded badly, and it loses the memory of others."""
+"""What is seen of round things, as files of meshes: PyBullet shades its own badly, and loses the memory of others."""
 import os
 import tempfile
 from functools import lru_cache
