@@ -153,8 +153,12 @@ class BagShelf:
             del self._read[path]
             with self._lock:
                 self._broken.pop(path, None)
-                for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
-                    del self._trials[trial_id]
+                self._drop(path)
+
+    def _drop(self, path: str) -> None:
+        """Forget the trials of a bag; with the lock held."""
+        for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
+            del self._trials[trial_id]
 
     def _take(self, path: str, state: Tuple[int, int]) -> None:
         """Read one bag."""
@@ -168,11 +172,12 @@ class BagShelf:
                                                                                MOST_BYTES / 2 ** 30))
             self._count(path)
         except (NotRead, OracleError) as err:
-            reason = str(err)
+            reason = str(err).replace(path, self._short(path))
         with self._lock:
             self._broken.pop(path, None)
             if reason:
                 self._broken[path] = reason
+                self._drop(path)
 
     def _count(self, path: str) -> None:
         from ...analysis.trials import summarise
