@@ -38,10 +38,10 @@ def _caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> D
 
 
 def _base_misplaced(draft: Draft, generator: np.random.Generator) -> Draft:
-    """Every drive ends some centimetres beside its goal: too near, and the base itself is in the door's way."""
-    sigma = float(generator.uniform(0.045, 0.065))
-    return _caused(draft._replace(drive_error=(1.2 * sigma, 0.8 * sigma, 0.4 * sigma)), 'base_misplaced',
-                   'drives end {:.1f} cm beside their goals (sigma)'.format(100 * sigma))
+    """Every drive ends centimetres too near, and the base itself is in the door's way, or too far for the arm."""
+    sigma = float(generator.uniform(0.05, 0.075))
+    return _caused(draft._replace(drive_error=(sigma, 0.3 * sigma, 0.25 * sigma)), 'base_misplaced',
+                   'drives end {:.1f} cm too near or too far (sigma)'.format(100 * sigma))
 
 
 def _door_swings_back(draft: Draft, generator: np.random.Generator) -> Draft:
