@@ -23,6 +23,7 @@ class Browser:
         options = Options()
         for flag in FLAGS + ['--user-data-dir=' + self._profile, '--window-size={},{}'.format(width, height)]:
             options.add_argument(flag)
+        options.accept_insecure_certs = True  # such as tests make themselves
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
         self.driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')), options=options)
         self.driver.set_page_load_timeout(30)

@@ -89,9 +89,10 @@ class ConsoleInABrowser(unittest.TestCase):
         self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')), 'the title tells of it')
         browser.click(QUESTION)
         self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
-        for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'first: DETECT', 'missing: grasp',
+        for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'missing: grasp',
                      'assist', '"mug"'):
             self.assertIn(told, browser.text())
+        self.assertTrue(browser.says('DETECT unknown'), 'the preconditions are looked at')
         self.assertIsNone(browser.run('return window.hacked || document.querySelector(".failure b") || null'),
                           'what a robot says is text')
         self.assertTrue(wait_for(lambda: browser.run(
@@ -112,13 +113,13 @@ class ConsoleInABrowser(unittest.TestCase):
         browser.run('document.activeElement.blur()')
         browser.find('body').send_keys('n')
         self.assertTrue(browser.says(YOURS), 'by keyboard, too')
-        browser.find('.why').send_keys('typed before')
+        browser.find('input.why').send_keys('typed before')
         type(self).console.stop()
         self.assertTrue(browser.says('connection lost', '#status'))
         type(self).console = self.start_console()
         self.assertTrue(browser.says('live', '#status', 40.0))
         self.assertTrue(browser.says(YOURS, limit_s=40.0), 'the claim is kept')
-        self.assertEqual(browser.find('.why').get_attribute('value'), 'typed before', 'no work is lost')
+        self.assertEqual(browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost')
 
     def test_3_a_second_console_takes_over_and_answers(self):
         browser = self.browser
@@ -185,6 +186,42 @@ class ConsoleInABrowser(unittest.TestCase):
         browser.click(QUESTION)
         self.assertTrue(browser.says('You are signed in as a viewer'))
         self.assertFalse(browser.find('.choice.goto').is_enabled())
+
+    def test_7_encrypted_the_page_and_its_socket_work_and_the_cookie_is_for_nothing_else(self):
+        browser, tokens = self.browser, os.path.join(self.bags, 'tokens')
+        certificate, key = (os.path.join(self.bags, name) for name in ('own.pem', 'own.key'))
+        subprocess.run(['openssl', 'req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
+                        '/CN=localhost', '-keyout', key, '-out', certificate], check=True, stderr=subprocess.PIPE)
+        type(self).console.stop()
+        browser.driver.delete_all_cookies()
+        type(self).console = self.start_console('_token_file:=' + tokens, '_certificate:=' + certificate,
+                                                '_private_key:=' + key)
+        self.assertTrue(wait_for(self.page_is_served, 40.0))
+        browser.driver.get(self.page.replace('http', 'https'))
+        browser.find('#token', 40.0).send_keys(self.token_of('operator', tokens))
+        browser.click('#sign-in')
+        self.assertTrue(browser.says('live', '#status'), 'its socket is encrypted as well')
+        self.assertEqual(browser.run('return fetch("session").then((answer) => answer.json()).then((it) => it.role)'),
+                         'operator')
+        cookie, = [each for each in browser.driver.get_cookies() if each['name'].startswith('console_')]
+        self.assertEqual((cookie['secure'], cookie['httpOnly'], cookie['sameSite']), (True, True, 'Strict'))
+        self.assertEqual(browser.run('return document.cookie'), '', 'no script can read it')
+
+    def test_8_the_page_runs_nothing_that_is_not_its_own(self):
+        browser = self.browser
+        image = "'<img src=x onerror=\"window.hacked = 1\">'"
+        for attack in ('document.body.insertAdjacentHTML("beforeend", {})'.format(image),
+                       'document.body.innerHTML = ' + image, 'eval("window.hacked = 1")',
+                       'new Function("window.hacked = 1")()', 'setTimeout("window.hacked = 1")',
+                       'const it = document.createElement("script"); it.append("window.hacked = 1");'
+                       'document.body.append(it)', 'location.href = "javascript:window.hacked = 1"',
+                       'const it = document.createElement("b"); it.setAttribute("onclick", "window.hacked = 1");'
+                       'document.body.append(it); it.click()'):
+            browser.run(  # not at once: the policy does not bind what a test runs itself
+                'return new Promise((done) => setTimeout(() => {{ setTimeout(done, 100); {} }}))'.format(attack))
+            self.assertIsNone(browser.run('return window.hacked'), attack)
+        browser.run('return fetch("https://127.0.0.1:{}/session").catch(() => null)'.format(self.port))
+        self.assertTrue(any('connect-src' in error for error in browser.errors()), 'and it speaks to nobody else')
 
 
 if __name__ == '__main__':

@@ -90,4 +90,5 @@ def test_viewers_may_only_look():
 def test_no_command_names_a_topic_a_service_or_a_type():
     fields = {field for spec in COMMANDS.values() for field in spec.checks}
     assert fields == {'xsrf', 'expert', 'trial', 'question', 'kind', 'name', 'outputs', 'why',
-                      'stamp', 'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent'}
+                      'stamp', 'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent',
+                      'arm'}

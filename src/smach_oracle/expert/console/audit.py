@@ -2,7 +2,8 @@
 import json
 import threading
 import time
-from typing import Any, Dict, Mapping, NamedTuple, Optional, Sequence
+from collections import deque
+from typing import Any, Callable, Deque, Dict, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
@@ -13,6 +14,8 @@ from ...ros.recorder_topics import audit_topic
 from ..followed_server import Listed
 
 LONGEST_ARGUMENTS = 4000
+MOST_WAITING = 100
+LONGEST_WAIT_S = 10.0
 
 
 class Person(NamedTuple):
@@ -24,13 +27,42 @@ class Person(NamedTuple):
     expert: str
 
 
+class Told(rospy.SubscribeListener):
+    """A topic whose first listener hears also what was said in the last seconds before it came; any thread.
+
+    A recorder takes its time to connect; a person who is quick must not go unrecorded.
+    """
+
+    def __init__(self, topic: str) -> None:
+        super().__init__()
+        self._lock = threading.Lock()
+        self._waiting: Deque[Tuple[float, ConsoleCommand]] = deque(maxlen=MOST_WAITING)
+        self._publisher = rospy.Publisher(topic, ConsoleCommand, subscriber_listener=self, queue_size=1000)
+
+    def tell(self, record: ConsoleCommand) -> None:
+        """Publish it, or keep it for who comes first."""
+        with self._lock:
+            if self._publisher.get_num_connections():
+                self._publisher.publish(record)
+            else:
+                self._waiting.append((time.monotonic(), record))
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Callable, peer_publish: Callable) -> None:
+        """Called by rospy for each listener that has come."""
+        with self._lock:
+            for said_s, record in self._waiting:
+                if time.monotonic() - said_s < LONGEST_WAIT_S:
+                    peer_publish(record)
+            self._waiting.clear()
+
+
 class Audit:
     """The publishers; any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._own = rospy.Publisher('~audit', ConsoleCommand, queue_size=1000)
-        self._by_server: Dict[str, rospy.Publisher] = {}
+        self._by_server: Dict[str, Told] = {}
 
     def prepare(self, servers: Sequence[str]) -> None:
         """Advertise beside servers as soon as they are known, so that recorders are connected before the first
@@ -38,7 +70,7 @@ class Audit:
         for server in servers:
             with self._lock:
                 if server not in self._by_server:
-                    self._by_server[server] = rospy.Publisher(audit_topic(server), ConsoleCommand, queue_size=1000)
+                    self._by_server[server] = Told(audit_topic(server))
 
     def tell(self, person: Person, command: str, ok: bool, message: str, arguments: Optional[Mapping[str, Any]] = None,
              listed: Optional[Listed] = None) -> None:
@@ -58,4 +90,4 @@ class Audit:
         self._own.publish(record)
         if listed is not None:
             self.prepare([listed.server])
-            self._by_server[listed.server].publish(record)
+            self._by_server[listed.server].tell(record)
