@@ -18,10 +18,10 @@ from .sensors import Frame, Sensor, Sensors
 
 WAIT_S = 5.0
 POLL_S = 0.02
-MOST_WAITING = 48
-MOST_WAITING_EACH = 8  # of one address
+MOST_WAITING = 64
+MOST_WAITING_EACH = 16  # of one address
 _NUMBER = re.compile('[0-9]{1,15}')
-RATE, BURST = 60.0, 150.0  # frames a second of one address
+RATE, BURST = 100.0, 200.0  # frames a second of one address
 
 
 class FrameRoom:

@@ -83,20 +83,22 @@ class LiveScene {
     const robot = this.robotLayer;
     const near = this.cloud && robot ? around(this.cloud.bounds(), robot.bounds()) : null;
     const optical = Boolean(this.cloud && !this.facts.place && /optical|^$/.test(this.facts.frame));
-    this.scene.frame(near ? [{ bounds: () => near }] : [this.cloud, robot], { optical, azimuth: robot ? -1.15 : -0.5, elevation: robot ? 0.35 : 0.45 });
+    this.scene.frame(near ? [{ bounds: () => near }] : [this.cloud, robot], robot ? { optical, azimuth: -1.15, elevation: 0.35, reach: 0.85 } : { optical });
   }
 
   // In the middle of the picture as long as there is none, below it from then on.
   sayOf(what, text) {
-    this.said = Object.assign({}, this.said, { [what]: text });
+    const told = what === 'robot' && /^Nothing/.test(text) ? 'No joint states come.' : text;
+    this.said = Object.assign({}, this.said, { [what]: told });
     this.tellLack();
   }
 
   tellLack() {
     const { cloud = '', robot = '' } = this.said || {};
+    const lacks = this.robot ? this.robot.lacks : '';
     const something = this.cloud || this.robotLayer;
     this.scene.say(something ? '' : cloud || robot);
-    const text = something ? [this.cloud && this.robot && this.facts.astray, cloud, robot, this.robot && this.robot.lacks].filter(Boolean).join(' ') : '';
+    const text = something ? [this.cloud && this.robot && this.facts.astray, cloud, lacks ? '' : robot, lacks].filter(Boolean).join(' ') : '';
     setText(this.lack, text);
     this.lack.hidden = !text;
   }
@@ -139,9 +141,9 @@ export class RobotView extends LiveScene {
   }
 }
 
-// The robot, and what the cloud has within 3 m of it.
+// The robot, and what the cloud has within 1.2 m of it.
 function around(cloud, robot) {
   if (!cloud || !robot) return cloud || robot;
-  const near = (value, axis) => Math.min(robot[1][axis] + 3, Math.max(robot[0][axis] - 3, value));
+  const near = (value, axis) => Math.min(robot[1][axis] + 1.2, Math.max(robot[0][axis] - 1.2, value));
   return [Math.min, Math.max].map((most, end) => [0, 1, 2].map((axis) => most(near(cloud[end][axis], axis), robot[end][axis])));
 }

@@ -33,13 +33,13 @@ export class SceneView {
     this.schedule();
   }
 
-  // Look at all of the layers given, from a usual side.
-  frame(layers, looks) {
+  // Look at all of the layers given, from a usual side; `reach`: distance in units of their size.
+  frame(layers, { reach = 1.1, ...looks } = {}) {
     const boxes = layers.filter(Boolean).map((layer) => layer.bounds()).filter(Boolean);
     if (!boxes.length) return;
     const [low, high] = [0, 1].map((end) => [0, 1, 2].map((axis) => Math[end ? 'max' : 'min'](...boxes.map((box) => box[end][axis]))));
     const size = Math.hypot(...high.map((each, axis) => each - low[axis]));
-    this.orbit.look(low.map((each, axis) => (each + high[axis]) / 2), Math.max(0.3, 1.1 * size), looks);
+    this.orbit.look(low.map((each, axis) => (each + high[axis]) / 2), Math.max(0.3, reach * size), looks);
   }
 
   schedule() {
