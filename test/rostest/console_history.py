@@ -9,7 +9,6 @@ import unittest
 import rospy
 import rostest
 from roslib.packages import find_node
-from sensor_msgs.msg import CompressedImage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_browser import YOURS, ConsoleInABrowser, Node  # noqa: E402
@@ -17,7 +16,7 @@ from ports import free_port  # noqa: E402
 from published_camera import PublishedCamera  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.msg import ExpertQueryGoal, FailureFrames, OpenQueries, PreconditionChecks  # noqa: E402
+from smach_oracle.msg import ExpertQueryGoal, FailureFrames, OpenQueries  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
@@ -135,7 +134,7 @@ class SituationAndHistory(unittest.TestCase):
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Question about PICK', '.replay-question'))
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
-        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-stills .shown canvas')), 'what the camera saw then')
+        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-stills .shown canvas')), 'what was seen then')
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Answer of operator: supersede succeeded', '.replay-question'))
         slider.send_keys(Keys.ARROW_LEFT)
@@ -155,8 +154,8 @@ class SituationAndHistory(unittest.TestCase):
         browser.click('[data-replay=play]')
         stopped = slider.get_attribute('aria-valuenow')
         self.assertGreater(float(stopped), 0.0)
-        box = slider.rect
-        ActionChains(browser.driver).move_to_element_with_offset(slider, int(box['width'] / 2) - 20, 5).click().perform()
+        right = int(slider.rect['width'] / 2) - 20
+        ActionChains(browser.driver).move_to_element_with_offset(slider, right, 5).click().perform()
         self.assertTrue(wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped)))
         browser.click('.event-log .event:last-child')
         self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'), 'a line of the log leads there')

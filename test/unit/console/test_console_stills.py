@@ -1,4 +1,4 @@
-"""What cameras saw when questions were put, and how preconditions stand: kept, bounded, believed no further than needed."""
+"""What cameras saw when questions were put, and how preconditions stand: kept, bounded, of whom they are."""
 import numpy as np
 import pytest
 from expert_fixtures import make_question

@@ -14,8 +14,8 @@ def asked(preconditions, **settings):
             found.extend((look.names[number],) + tuple(look.look(number)) for number in range(len(look.names)))
             return super().ask(question, cancelled, progress)
 
-    machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=Looking(goto('C')), preconditions=preconditions,
-                      settings=dict({'max_recoveries': 0}, **settings))
+    machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=Looking(goto('C')),
+                      preconditions=preconditions, settings=dict({'max_recoveries': 0}, **settings))
     machine.machine.userdata.cup = 'mug'
     assert machine.run() == 'done'
     return machine, found
