@@ -15,7 +15,7 @@ from .transforms import from_rpy
 
 MOST_CHARACTERS = 8000000
 MOST_LINKS = 2000
-MOST_SHAPES = 4000
+MOST_SHAPES = 2000
 FURTHEST = 1e4  # m, of any part from its parent
 GREY = (168, 174, 184)
 

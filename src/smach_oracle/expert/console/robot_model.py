@@ -13,6 +13,7 @@ from .mesh_files import MeshFiles
 
 MOST_TRIANGLES = 28000  # that a browser draws, over all links
 LEAST_TRIANGLES = 40  # of a mesh that has more
+MOST_ROUND = 300  # shapes of a robot whose cylinders and spheres are drawn round
 MOST_CORNERS = 65536  # of a geometry
 MOST_TOLD = 20  # meshes that are missing
 _ROUND = 16  # sides of a cylinder
@@ -72,12 +73,13 @@ class RobotModel:
     def _add_all(self, files: MeshFiles) -> None:
         shapes, meshes = self._found(files)
         most = _share([len(meshes[shape.mesh].triangles) for shape in shapes if shape.mesh])
+        round_as = {} if len(shapes) <= MOST_ROUND else {'cylinder': 'box', 'sphere': 'box'}
         known: Dict[str, int] = {}
         for shape in shapes:
-            name = shape.mesh or shape.kind
+            name = shape.mesh or round_as.get(shape.kind, shape.kind)
             if name not in known:
                 known[name] = len(self._geometries)
-                self._geometries.append(_fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[shape.kind])
+                self._geometries.append(_fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[name])
             place = shape.origin @ np.diag(list(shape.size) + [1.0])
             self._parts.append(Part(shape.link, known[name], place, shape.colour))
 
