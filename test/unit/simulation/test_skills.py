@@ -7,10 +7,12 @@ from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 from worlds import CAN, CARTON, TABLE, scene
 
+from smach_oracle.geometry.box import UprightBox
 from smach_oracle.msg import BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal
 from smach_oracle.simulation.robot.arm import Means, SkillError
 from smach_oracle.simulation.robot.arms_aside import ASIDE, is_aside
 from smach_oracle.simulation.robot.collision import installed_model
+from smach_oracle.simulation.robot.grasps import grasps
 from smach_oracle.simulation.robot.interface import ARM_JOINTS, RobotError
 from smach_oracle.simulation.robot.manipulation import Manipulation
 from smach_oracle.simulation.world.direct import DirectRobot
@@ -184,3 +186,12 @@ def test_other_goals_that_cannot_be(still):
         still.skills.build_collision_map(BuildCollisionMapGoal(pose(0.8, 0, 0.7), [pose(0.6, 0, 0.8)], []), say)
     with pytest.raises(SkillError, match="table: frame 'moon'"):
         still.skills.build_collision_map(BuildCollisionMapGoal(pose(0.8, 0, 0.7, frame='moon'), [], []), say)
+
+
+def test_a_large_square_thing_is_taken_by_its_sides_and_not_by_its_corners():
+    straight = math.atan2(0.19, 0.65)  # from the right shoulder
+    box = UprightBox(np.array([0.6, 0.0, 0.78]), np.array([0.068, 0.067, 0.12]), straight + math.pi / 4)
+    off = (grasps(box, 'right')[0].heading - box.yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4
+    assert abs(off) < math.radians(21)
+    small = UprightBox(box.centre, np.array([0.055, 0.054, 0.12]), box.yaw)
+    assert abs(grasps(small, 'right')[0].heading - straight) < 0.11

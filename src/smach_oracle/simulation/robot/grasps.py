@@ -5,8 +5,11 @@ import numpy as np
 
 from ...geometry.box import UprightBox
 from ...geometry.transforms import from_rpy
+from .interface import GRIPPER_OPEN
 
 WIDEST = 0.085  # m between the tips that a thing may take up
+CORNERS = 0.6  # what a heading costs, as a turn in rad, from which fingers may come down on corners and squeeze it out
+SPARE = 0.002  # m between the open tips and such corners that is enough
 SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}  # x, y in base_footprint, m
 HEADINGS = np.linspace(-1.3, 1.3, 14)  # rad, beside the straight one from the shoulder
 PITCHES = (0.0, 0.4, 0.8, np.pi / 2)  # rad, of the hand downwards
@@ -38,13 +41,18 @@ def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
             width = width_across(box, heading)
             if width <= WIDEST:
                 pose = from_rpy(_middle(box, heading, pitch), pitch=pitch, yaw=heading)
-                yield abs(turn) + 0.8 * pitch + 8.0 * width, Grasp(pose, float(heading), float(pitch), width)
+                corners = CORNERS if _projected(box, heading) > GRIPPER_OPEN - SPARE else 0.0
+                yield abs(turn) + 0.8 * pitch + 8.0 * width + corners, Grasp(pose, float(heading), float(pitch), width)
 
 
 def width_across(box: UprightBox, heading: float) -> float:
     """How much (m) of the gap between the tips a thing takes up, for a hand that comes along `heading`."""
     if box.wide - box.narrow < 0.012:  # as good as round, or square: its corners turn in between the tips
         return box.wide
+    return _projected(box, heading)
+
+
+def _projected(box: UprightBox, heading: float) -> float:
     angle = heading - box.yaw
     return float(box.size[0] * abs(np.sin(angle)) + box.size[1] * abs(np.cos(angle)))
 
