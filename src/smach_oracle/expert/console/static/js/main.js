@@ -34,7 +34,7 @@ class App {
 
   buildTop() {
     this.status = h('span', { id: 'status', class: 'status' });
-    this.person = h('button', { id: 'person', class: 'icon-button', onclick: () => this.askName() });
+    this.person = h('button', { id: 'person', class: 'icon-button', disabled: true, onclick: () => this.askName() });
     this.theme = h('button', { class: 'icon-button', onclick: () => this.nextTheme() });
     this.setTheme(remembered('theme', 'auto'));
     replace(document.getElementById('top'),
@@ -87,6 +87,7 @@ class App {
     document.body.dataset.link = state;
     setText(this.person, session && session.expert ? session.expert + (this.mayAnswer ? '' : ' (viewer)') : 'Name');
     this.person.hidden = state === 'signed-out';
+    this.person.disabled = !session;
     if (state === 'signed-out') this.askToken();
     if (state === 'connected') {
       if (!document.getElementById('main').contains(this.view(this.current || 'questions').root)) this.show(location.hash.slice(1));
