@@ -6,7 +6,8 @@ import { BoxLayer, CloudLayer, GridLayer, unpacked } from './scene_layers.js';
 import { SceneView } from './scene_view.js';
 
 const DIM = 0.62; // what is around the object
-const SPACING = 0.005; // m between its points
+const SPACING = 0.007; // m between its points
+const NEAR = 0.05; // m: an object that has not moved further is the same
 
 export class ObjectView {
   // `numbers()`: of the sensors of the frame's image and cloud
@@ -28,6 +29,7 @@ export class ObjectView {
 
   // What was made out, as the console tells it; null where nothing is.
   show(found) {
+    const far = !found || !this.last || Math.hypot(...found.position.map((each, axis) => each - this.last[axis])) > NEAR;
     this.found = found;
     this.root.hidden = !found;
     if (!found) return;
@@ -35,7 +37,8 @@ export class ObjectView {
     this.own = unpacked(bytes.buffer, found.cloud);
     if (!this.robot) this.startRobot();
     this.build();
-    this.home();
+    if (far) this.home(); // while it is refined it is looked at from where it was
+    this.last = found.position;
   }
 
   startRobot() {
@@ -87,6 +90,6 @@ export class ObjectView {
   home() {
     const [low, high] = this.box.bounds();
     const size = Math.hypot(...high.map((each, axis) => each - low[axis]));
-    this.scene.orbit.look(low.map((each, axis) => (each + high[axis]) / 2), Math.max(0.7, 4.5 * size), { azimuth: -1.8, elevation: 0.45 });
+    this.scene.orbit.look(low.map((each, axis) => (each + high[axis]) / 2), Math.max(0.5, 3.5 * size), { azimuth: -1.1, elevation: 0.55 });
   }
 }
