@@ -1,13 +1,18 @@
 """A headless Chromium for tests of web pages, with a profile of its own."""
+import contextlib
+import os
 import shutil
+import signal
+import subprocess
 import tempfile
 import time
 
 from selenium import webdriver
-from selenium.common.exceptions import StaleElementReferenceException
+from selenium.common.exceptions import StaleElementReferenceException, WebDriverException
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
+from urllib3.exceptions import MaxRetryError
 from waiting import wait_for
 
 FLAGS = ['--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run', '--disable-background-networking',
@@ -30,8 +35,15 @@ class Browser:
 
     def close(self):
         """End it, with its profile."""
-        self.driver.quit()
+        with contextlib.suppress(WebDriverException, MaxRetryError):  # it may have been killed
+            self.driver.quit()
         shutil.rmtree(self._profile, ignore_errors=True)
+
+    def kill(self):
+        """As when its machine loses its power; it can only be closed then."""
+        for pid in _below(self.driver.service.process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
     def find(self, selector, limit_s=20.0):
         """The first element that is there and shown; raises where none comes in time."""
@@ -89,3 +101,15 @@ class Browser:
                          if element.is_displayed()), None)
         except StaleElementReferenceException:
             return None
+
+
+def _below(process):
+    """The processes that a process has started, and those that they have."""
+    listed = subprocess.run(['ps', '-e', '-o', 'pid=,ppid='], stdout=subprocess.PIPE, check=True).stdout.decode()
+    pairs = [tuple(map(int, line.split())) for line in listed.splitlines()]
+    found = []
+    new = [pid for pid, parent in pairs if parent == process]
+    while new:
+        found += new
+        new = [pid for pid, parent in pairs if parent in new]
+    return found

@@ -13,6 +13,7 @@ from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_browser import Node, free_port  # noqa: E402
+from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
@@ -32,7 +33,7 @@ class TheHand(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.arm = FakeArm()
+        cls.arm, cls.lag = FakeArm(), MachineLag()
         cls.audited, cls.states, cls.commands = [], [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/manipulation_interface/state', TeleopState, cls.states.append, tcp_nodelay=True)
@@ -71,10 +72,12 @@ class TheHand(unittest.TestCase):
         return wait_for(lambda: self.arm.moved_s > begun_s + 0.2)
 
     def assert_stops(self, let_go):
+        asked_s = time.monotonic()
         let_go()
         stopped_s = time.monotonic()
         time.sleep(0.5)  # as long as nothing may move
-        self.assertLess(self.arm.moved_s - stopped_s, STOPS_WITHIN_S)
+        # three processes have a part in it, each of which a busy machine keeps waiting
+        self.assertLess(self.arm.moved_s - stopped_s, STOPS_WITHIN_S + 3 * self.lag.most_s(asked_s - 0.1))
 
     def key(self, down):
         chain = ActionChains(self.browser.driver, duration=0)
@@ -122,10 +125,47 @@ class TheHand(unittest.TestCase):
             'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'))
         ActionChains(self.browser.driver, duration=0).release().perform()
 
-    def test_4_a_link_that_is_lost_stops_the_hand_and_what_was_held_back_does_not_move_it(self):
+    def pad(self, held=True, forward=1.0, **more):
+        """Put a fake gamepad where the page looks for one."""
+        self.browser.run(
+            'const [held, forward, more] = arguments;'
+            'const buttons = Array.from({ length: 17 }, () => ({ pressed: false, value: 0 }));'
+            'buttons[4] = { pressed: held, value: Number(held) };'
+            'const pad = { id: "fake", connected: true, mapping: "standard", axes: [0, -forward, 0, 0], buttons };'
+            'navigator.getGamepads = () => [null, Object.assign(pad, more)];', held, forward, more)
+
+    def pushed(self):
+        """How fast forward (m/s) the hand is told to go, None while the dead-man is not held."""
+        newest = self.commands[-1][1]
+        return newest.twist.linear.x if newest.dead_man else None
+
+    def test_4_a_gamepad_moves_the_hand_while_its_shoulder_button_is_held(self):
+        self.assert_stops(lambda: self.pad(held=False))  # a stick alone moves nothing
+        self.pad()
+        self.assertTrue(self.moves())
+        fast = self.pushed()
+        self.pad(forward=0.5)
+        self.assertTrue(wait_for(lambda: self.pushed() and abs(self.pushed() - fast / 2) < 1e-6), 'half as fast')
+        self.pad(forward=0.1)
+        self.assertTrue(wait_for(lambda: self.pushed() == 0.0), 'a stick at rest is never quite in the middle')
+        self.assert_stops(lambda: self.pad(held=False))
+        forward = 1.0
+        for lost in ('navigator.getGamepads()[1].connected = false', 'navigator.getGamepads = () => []',
+                     'window.dispatchEvent(new Event("blur"))'):
+            forward = -forward
+            self.pad(held=False)
+            time.sleep(0.2)  # the page looks 40 times a second
+            self.pad(forward=forward)
+            self.assertTrue(self.moves(), (lost, self.states[-1], self.browser.text('.hand')))
+            self.assert_stops(lambda: self.browser.run(lost))
+            self.assert_stops(self.pad)  # held all along: to move again it must be let go first
+        self.browser.run('navigator.getGamepads = () => []')
+
+    def test_5_a_link_that_is_lost_stops_the_hand_and_what_was_held_back_does_not_move_it(self):
         self.key(True)
         self.assertTrue(self.moves())
         process = self.console._process
+        self.addCleanup(process.send_signal, signal.SIGCONT)
         self.assert_stops(lambda: process.send_signal(signal.SIGSTOP))
         self.key(False)
         time.sleep(0.2)  # so long have the youngest of those that are held back waited
@@ -135,11 +175,24 @@ class TheHand(unittest.TestCase):
         self.assert_stops(lambda: None)
         self.assertFalse(any(command.dead_man for _, command in self.commands[relayed:]), 'none that moves it')
 
-    def test_5_the_gripper_and_the_end(self):
+    def test_6_a_browser_that_is_killed_at_the_wheel_stops_and_leaves_it_to_others(self):
+        if not self.browser.says('You drive.', '.driver', 5.0):  # the page had given the link up meanwhile
+            self.browser.click('.wheel')
+            self.assertTrue(self.browser.says('You drive.', '.driver', 30.0))
+        self.key(True)
+        self.assertTrue(self.moves())
+        self.assert_stops(self.browser.kill)
+        self.assertTrue(wait_for(lambda: self.told('leave_wheel')[-1:]
+                                 and self.told('leave_wheel')[-1].message == 'the page is gone'))
+        self.browser.close()
+        type(self).browser = Browser(1360, 1000)
+        self.browser.driver.get(self.page)
+        self.browser.click(QUESTION)
+        self.browser.click('.wheel', 40.0)
+        self.assertTrue(self.browser.says('You drive.', '.driver', 30.0))
+
+    def test_7_the_gripper_and_the_end(self):
         browser = self.browser
-        if not browser.says('You drive.', '.driver', 5.0):  # the page had given the link up meanwhile
-            browser.click('.wheel')
-            self.assertTrue(browser.says('You drive.', '.driver', 30.0))
         ActionChains(browser.driver, duration=0).key_down('c').perform()
         self.assertTrue(wait_for(lambda: self.states[-1].gripper_stalled), 'it has met something')
         ActionChains(browser.driver, duration=0).key_up('c').perform()

@@ -12,6 +12,7 @@ export class DriveInput {
   constructor(changed) {
     this.changed = changed;
     this.active = false;
+    this.padSpent = true; // its dead-man must be let go before it holds (again)
     this.pressed = new Map(); // what holds it -> move
     this.off = new AbortController();
     const listen = (target, type, f) => target.addEventListener(type, f, { signal: this.off.signal, capture: true });
@@ -66,6 +67,7 @@ export class DriveInput {
     const held = this.pressed.size || this.padHeld;
     this.pressed.clear();
     this.padHeld = false;
+    this.padSpent = true;
     if (held) this.changed(false);
   }
 
@@ -78,8 +80,9 @@ export class DriveInput {
       else wish.gripper = move;
     }
     const pad = this.active && document.hasFocus() && !document.hidden ? this.pad(wish) : false;
-    if (this.padHeld && !pad && !this.pressed.size) this.changed(false);
+    const letGo = this.padHeld && !pad && !this.pressed.size;
     this.padHeld = pad;
+    if (letGo) this.changed(false); // which reads again
     for (const part of [wish.linear, wish.angular]) part.forEach((value, axis) => { part[axis] = Math.max(-1, Math.min(1, value)); });
     wish.held = this.pressed.size > 0 || pad;
     return wish;
@@ -88,7 +91,12 @@ export class DriveInput {
   pad(wish) {
     const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((each) => each && each.connected && each.mapping === 'standard');
     this.gamepad = pad ? pad.id : '';
-    if (!pad || !HOLD_BUTTONS.some((index) => pad.buttons[index] && pad.buttons[index].pressed)) return false;
+    if (!pad || !HOLD_BUTTONS.some((index) => pad.buttons[index] && pad.buttons[index].pressed)) this.padSpent = !pad;
+    else if (!this.padSpent) return this.readPad(pad, wish);
+    return false;
+  }
+
+  readPad(pad, wish) {
     const axis = (index) => { const value = pad.axes[index] || 0; return Math.abs(value) < DEAD_ZONE ? 0 : value; };
     const button = (index) => (pad.buttons[index] ? pad.buttons[index].value : 0);
     wish.linear[0] -= axis(1);
