@@ -51,7 +51,15 @@ def test_settings_that_are_refused_are_named(key, changes):
     assert error.value.key == key
 
 
-def test_the_settings_that_come_along_are_right():
+@pytest.mark.parametrize('axis', range(6))
+def test_the_settings_that_come_along_are_a_spacenav_s(axis):
+    """spacenav_node: x forward, y left, z up, then the turns about these; two buttons."""
     path = Path(__file__).resolve().parents[3] / 'launch' / 'joy_teleoperation.yaml'
     settings = JoySettings.from_dict(yaml.safe_load(path.read_text()))
-    assert settings.dead_man == 0 and len(settings.axes) == 6
+    pushed = [1.0 if index == axis else 0.03 for index in range(6)]  # the others are never quite still
+    wish = wish_of(settings, pushed, [1, 0])
+    assert wish.held and wish.gripper is None
+    assert [value > 0 for value in wish.linear + wish.angular] == [index == axis for index in range(6)]
+    assert all(value == 0.0 for index, value in enumerate(wish.linear + wish.angular) if index != axis)
+    assert wish_of(settings, pushed, [0, 0]) == STILL and wish_of(settings, pushed, [0, 1]) == STILL
+    assert wish_of(settings, pushed, [1, 1]).gripper == 0.0
