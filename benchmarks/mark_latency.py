@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""How long the perception interface's work takes from a drawing to a mask with its object, at 640 x 480: a rectangle around
-a thing, one with strokes, and one as large as the image; with what the console makes of the answer for its page.
+"""How long the perception interface's work takes from a drawing to a mask with its object, at 640 x 480: a rectangle
+around a thing, one with strokes, and one as large as the image; with what the console makes of the answer for its page.
 
     benchmarks/mark_latency.py [--check]
 
 Frames are cast from a scene, so that every machine cuts the same pixels; what is measured is the processor's time, so
-that others on the machine do not count. --check fails where the 90th percentile of any of them is above the budget, which
-leaves the rest of the 300 ms that a person may wait to the network and the browser.
+that others on the machine do not count. --check fails where the 90th percentile of any of them is above the budget,
+which leaves the rest of the 300 ms that a person may wait to the network and the browser.
 """
 import argparse
 import sys
