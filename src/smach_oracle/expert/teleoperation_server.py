@@ -5,7 +5,7 @@ robot with a robot_description, joint_states, arms that take joint trajectories 
 """
 import threading
 import time
-from typing import Any, Collection, Dict, Mapping, Optional
+from typing import Any, Collection, Dict, Mapping, Optional, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -190,7 +190,7 @@ class TeleoperationServer:
         self._arm = command.arm
         hand = self._hands[command.arm]
         wish = (command.gripper, command.gripper_effort or self._settings.gripper_effort)
-        # a front end may repeat it for as long as it is held, so that none is lost; what has been done is not done again
+        # a front end may repeat it for as long as it is held, so that none is lost; what is done is not done again
         if command.move_gripper and (self._settings.lock_step or wish != self._gripped):
             hand.gripper.move(*wish)
         self._gripped = wish if command.move_gripper else None
