@@ -12,7 +12,7 @@ import rospy
 import rostest
 import tf2_ros
 from control_msgs.msg import PointHeadAction, PointHeadGoal
-from geometry_msgs.msg import Point, PointStamped, Vector3
+from geometry_msgs.msg import Point, PointStamped, Pose, Quaternion, Vector3
 from roslib.packages import find_node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -23,7 +23,7 @@ from thin_line import ThinLine  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.geometry.transforms import from_quaternion  # noqa: E402
-from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+from smach_oracle.msg import CollisionBoxes, ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
@@ -215,7 +215,8 @@ class Drive(unittest.TestCase):
             last = len(held) - 1 - held[::-1].index(True)
             told = self.robot.commands[last:last + 2][-1]  # the release, where there is one
             self.key(key, False)
-        return self.robot.moved_last('right', begun) - told.header.stamp.to_sec()
+        moved = self.robot.moved_last('right', begun)
+        return moved - told.header.stamp.to_sec() if moved else float('inf')  # it stood before: this says nothing
 
     def assert_stops(self, what, stop):
         """The least of a few: a machine that is busy with others delays the test, too, and the nodes under test."""
@@ -223,7 +224,7 @@ class Drive(unittest.TestCase):
         while len(times) < 2 or min(times) >= STOPS_WITHIN_S and len(times) < 8:
             self.take_the_wheel()
             times.append(self.time_to_stop(stop, 'ad'[len(times) % 2]))
-        rospy.loginfo('%s: stands after %s ms', what, [round(each * 1e3) for each in times])
+        rospy.loginfo('%s: stands after %s ms', what, ['{:.0f}'.format(each * 1e3) for each in times])
         self.assertLess(min(times), STOPS_WITHIN_S, (what, times))
 
     def test_4_it_stands_when_the_key_is_let_go_the_page_is_hidden_or_the_link_is_lost(self):
@@ -248,7 +249,22 @@ class Drive(unittest.TestCase):
         self.assert_stops('link held up', self.line.held_up)
         self.assert_stops('link cut', cut)
 
-    def test_5_the_gripper_and_then_the_machine_goes_on(self):
+    def test_5_the_hand_slows_before_what_the_robot_knows_to_be_there(self):
+        self.take_the_wheel()
+        self.browser.click('[data-frame=base]')
+        below = self.stands('right')[:3, 3] - [0.0, 0.0, 0.2]
+        boxes = rospy.Publisher('collision_map', CollisionBoxes, queue_size=1, latch=True)
+        boxes.publish(CollisionBoxes(Header(frame_id=BASE), 'map', ['table'], [Pose(
+            Point(*below), Quaternion(0, 0, 0, 1))], [Vector3(0.6, 0.6, 0.04)]))
+        self.addCleanup(boxes.publish, CollisionBoxes(Header(frame_id=BASE), '', [], [], []))
+        self.assertTrue(wait_for(boxes.get_num_connections))
+        self.key('f', True)
+        self.assertTrue(wait_for(lambda: 'table' in self.robot.states[-1].limit), self.robot.states[-1])
+        self.assertTrue(self.browser.says('table', '.drive-light'), 'the page says what slows it')
+        self.assertTrue(wait_for(lambda: self.robot.states[-1].speed < 0.5), 'the nearer the slower')
+        self.key('f', False)
+
+    def test_6_the_gripper_and_then_the_machine_goes_on(self):
         browser = self.browser
         self.take_the_wheel()
         for key, moved in (('c', lambda: self.robot.joint(FINGER) < 0.01),
