@@ -5,6 +5,18 @@ import { CLASSES, chip, percent, rateBar } from './format.js';
 import { OutputField } from './output_field.js';
 import { Preconditions } from './preconditions.js';
 
+const MOST_AT_ONCE = 12;
+const LIKELIEST = 6;
+
+// Of very many states those that are chosen most: what has helped, the failed one, where its success leads, and whence the machine came.
+function likeliest({ choices, state, supersede, history }) {
+  const helped = choices.filter((choice) => choice.helped[0] > 0).sort((one, other) => other.helped[0] / other.helped[1] - one.helped[0] / one.helped[1]).slice(0, 2);
+  const came = history.filter((visit) => visit.result === 'success').reverse();
+  const named = [...helped.map((choice) => choice.state), state, ...supersede.map((choice) => choice.target), ...came.map((visit) => visit.state)];
+  const found = new Set(named.map((name) => choices.find((choice) => choice.state === name)).filter(Boolean));
+  return choices.filter((choice) => [...found].slice(0, LIKELIEST).includes(choice));
+}
+
 export class AnswerForm {
   // `onAnswer({kind, name, outputs, why})`
   constructor(question, onAnswer) {
@@ -55,24 +67,34 @@ export class AnswerForm {
   }
 
   states() {
-    const { choices, state } = this.question;
-    return [h('h4', {}, 'Go to'), h('div', { class: 'choices' }, choices.map((choice, index) => {
-      const button = this.choice('goto', choice.state, index < 9 ? String(index + 1) : '',
-        h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, choice.state), choice.state === state && chip('again', '', 'The state that failed'), h('span', { class: 'spacer' }),
-          rateBar(1 - choice.success, choice.success, percent(choice.success) + ' ok')),
-        h('span', { class: 'chips' }, CLASSES[choice.class] && chip(CLASSES[choice.class], 'class-' + choice.class),
-          choice.blocked && chip('blocked: ' + choice.blocked, 'bad'),
-          choice.missing.length > 0 && chip('missing: ' + choice.missing.join(', '), 'warn', 'Userdata that it needs and would not have'),
-          choice.visits > 0 && chip(choice.visits + (choice.visits === 1 ? ' visit' : ' visits'), '', 'In this trial'),
-          choice.helped[1] > 0 && chip('helped ' + choice.helped[0] + ' of ' + choice.helped[1], choice.helped[0] * 2 > choice.helped[1] ? 'good' : '', 'How often going there helped when ' + state + ' had failed, as far as this console saw')));
-      if (choice.preconditions.length) {
-        const standing = new Preconditions(choice.preconditions);
-        this.standings.set(choice.state, standing);
-        button.lastElementChild.append(standing.root);
-      }
-      if (choice.blocked) button.dataset.blocked = 'yes';
-      return button;
-    }))];
+    const { choices } = this.question;
+    if (choices.length <= MOST_AT_ONCE) return [h('h4', {}, 'Go to'), h('div', { class: 'choices' }, choices.map((choice, index) => this.state(choice, String(index + 1))))];
+    const first = likeliest(this.question);
+    const rest = choices.filter((choice) => !first.includes(choice)).map((choice) => this.state(choice, ''));
+    const filter = h('input', { type: 'search', class: 'state-filter', placeholder: 'Part of a name', 'aria-label': 'States whose name has', oninput: () => {
+      for (const button of rest) button.hidden = !button.dataset.name.toLowerCase().includes(filter.value.trim().toLowerCase());
+    } });
+    return [h('h4', {}, 'Go to'), h('div', { class: 'choices' }, first.map((choice, index) => this.state(choice, String(index + 1)))),
+      h('details', { class: 'all-states' }, h('summary', {}, rest.length + ' more states'), filter, h('div', { class: 'choices' }, rest))];
+  }
+
+  state(choice, key) {
+    const { state } = this.question;
+    const button = this.choice('goto', choice.state, key,
+      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, choice.state), choice.state === state && chip('again', '', 'The state that failed'), h('span', { class: 'spacer' }),
+        rateBar(1 - choice.success, choice.success, percent(choice.success) + ' ok')),
+      h('span', { class: 'chips' }, CLASSES[choice.class] && chip(CLASSES[choice.class], 'class-' + choice.class),
+        choice.blocked && chip('blocked: ' + choice.blocked, 'bad'),
+        choice.missing.length > 0 && chip('missing: ' + choice.missing.join(', '), 'warn', 'Userdata that it needs and would not have'),
+        choice.visits > 0 && chip(choice.visits + (choice.visits === 1 ? ' visit' : ' visits'), '', 'In this trial'),
+        choice.helped[1] > 0 && chip('helped ' + choice.helped[0] + ' of ' + choice.helped[1], choice.helped[0] * 2 > choice.helped[1] ? 'good' : '', 'How often going there helped when ' + state + ' had failed, as far as this console saw')));
+    if (choice.preconditions.length) {
+      const standing = new Preconditions(choice.preconditions);
+      this.standings.set(choice.state, standing);
+      button.lastElementChild.append(standing.root);
+    }
+    if (choice.blocked) button.dataset.blocked = 'yes';
+    return button;
   }
 
   interfaces() {

@@ -26,6 +26,11 @@ export function times(number) {
   return number === 1 ? 'once' : number === 2 ? 'twice' : number + ' times';
 }
 
+// Of a traceback that is the line that says what happened.
+export function lastLine(text) {
+  return text.trim().split('\n').pop().slice(-300);
+}
+
 // A bar for a failure rate, green to red; `share` is what is filled, where it is not the rate itself.
 export function rateBar(rate, share, text) {
   if (rate === null || rate === undefined) return h('span', { class: 'rate unknown' }, '–');

@@ -1,7 +1,7 @@
 // One trial, to be replayed: a cursor on its time axis, the machine as it stood then, and what happened in words.
 import { Course, activePath, liveAt } from './course.js';
 import { h, replace, setText, typing } from './dom.js';
-import { chip } from './format.js';
+import { chip, lastLine } from './format.js';
 import { MachineView } from './machines.js';
 import { StillView } from './situation_camera.js';
 import { Timeline } from './timeline.js';
@@ -162,11 +162,11 @@ export class Replay {
     this.question.hidden = !question;
     if (!question) return;
     const { answer } = question;
-    replace(this.question, h('p', {}, h('strong', {}, 'Question about ', question.state), question.reason && ': ' + question.reason,
+    replace(this.question, h('div', { class: 'replay-told' }, h('p', {}, h('strong', {}, 'Question about ', question.state), question.reason && ': ' + question.reason,
       question.holder && !answer && [' ', chip(question.holder + ' works on it', 'warn')]),
     question.steps.map((step) => h('p', { class: 'dim' }, step)),
     answer ? h('p', { class: 'replay-answer' }, h('strong', {}, 'Answer'), answer.by && ' of ' + answer.by, ': ', answer.kind.replace('_', ' '), answer.target && ' ' + answer.target, answer.why && h('span', { class: 'dim' }, ' – ' + answer.why))
-      : h('p', { class: 'dim' }, question.closed ? 'No answer: ' + question.closed + '.' : 'Not answered yet.'), this.pictures(question.query));
+      : h('p', { class: 'dim' }, question.closed ? 'No answer: ' + question.closed + '.' : 'Not answered yet.')), this.pictures(question.query));
   }
 
   // What cameras saw at the failure; asked for once.
@@ -239,7 +239,7 @@ export class Replay {
 }
 
 function said(event) {
-  return (event.words || event.kind) + (event.text && event.text !== event.words && event.kind === 'failure' ? ' ' + event.text.slice(-200) : '');
+  return (event.words || event.kind) + (event.text && event.text !== event.words && event.kind === 'failure' ? ' ' + lastLine(event.text) : '');
 }
 
 function seconds(number) {

@@ -4,7 +4,8 @@ import { duration } from './format.js';
 
 const LANE = 26;
 const NAME = 168;
-const TOP = 26;
+const TOP = 6;
+const AXIS = 24;
 const MARKS = { failure: 'bad', decision: 'oracle', jump: 'oracle', supersede: 'expert', give_up: 'bad', warning: 'warn',
   query_opened: 'expert', query_claimed: 'expert', query_answered: 'expert', query_expired: 'bad', interface_start: 'expert', interface_end: 'expert',
   precondition_start: 'oracle', precondition_end: 'oracle', preempt: 'warn' };
@@ -13,11 +14,13 @@ export class Timeline {
   // `onPick(seq)`: an event was chosen; `onSeek(t)`: a time; `onKey(event)`: a key while the cursor has the focus
   constructor({ onPick, onSeek, onKey }) {
     Object.assign(this, { onPick, onSeek });
-    this.canvas = h('div', { class: 'timeline-canvas' });
-    this.handle = h('div', { class: 'cursor-handle' });
-    this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0', 'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey }, this.handle);
     this.cursor = h('div', { class: 'cursor-line' });
-    this.root = h('div', { class: 'timeline' }, this.canvas, this.cursor, this.slider);
+    this.lanes = h('div', {});
+    this.canvas = h('div', { class: 'timeline-canvas' }, this.lanes, this.cursor);
+    this.handle = h('div', { class: 'cursor-handle' });
+    this.axis = h('div', { class: 'axis' });
+    this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0', 'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey }, this.axis, this.handle);
+    this.root = h('div', { class: 'timeline' }, this.slider, this.canvas);
     for (const element of [this.slider, this.canvas]) this.listen(element);
     new ResizeObserver(() => this.draw()).observe(this.root);
   }
@@ -68,12 +71,18 @@ export class Timeline {
   pick(seq) {
     this.picked = seq;
     for (const mark of this.root.querySelectorAll('[data-seq]')) mark.classList.toggle('picked', Number(mark.dataset.seq) === seq);
+    const event = (this.events || []).find((each) => each.seq === seq);
+    const lane = event && this.shownLanes ? this.shownLanes.indexOf(laneOf(event)) : -1;
+    if (lane < 0) return;
+    const top = TOP + lane * LANE;
+    const { scrollTop, clientHeight } = this.canvas;
+    if (top < scrollTop || top + LANE > scrollTop + clientHeight) this.canvas.scrollTop = top - clientHeight / 2;
   }
 
   draw() {
-    const width = this.root.clientWidth;
+    const width = this.canvas.clientWidth;
     if (!this.events || !this.events.length || width < 50) {
-      replace(this.canvas, h('p', { class: 'empty' }, 'No events.'));
+      replace(this.lanes, h('p', { class: 'empty' }, 'No events.'));
       this.scale = null;
       this.slider.hidden = this.cursor.hidden = true;
       return;
@@ -87,9 +96,13 @@ export class Timeline {
     const x = (t) => name + (width - name - 14) * Math.min(1, Math.max(0, (t - begin) / whole));
     const height = TOP + lanes.length * LANE + 6;
     const y = (lane) => TOP + lanes.indexOf(lane) * LANE;
-    replace(this.canvas, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
-      ticks(whole).map((tick) => [s('line', { class: 'tick', x1: x(begin + tick), x2: x(begin + tick), y1: TOP - 6, y2: height }),
-        s('text', { class: 'tick-text', x: Math.min(x(begin + tick), width - 26), y: 14 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))]),
+    this.shownLanes = lanes;
+    this.cursor.style.setProperty('--height', height + 'px');
+    const marks = ticks(whole, Math.max(2, (width - name) / 62));
+    replace(this.axis, s('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS, 'aria-hidden': true },
+      marks.map((tick) => s('text', { class: 'tick-text', x: Math.min(x(begin + tick), width - 26), y: 16 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick)))));
+    replace(this.lanes, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
+      marks.map((tick) => s('line', { class: 'tick', x1: x(begin + tick), x2: x(begin + tick), y1: 0, y2: height })),
       lanes.map((lane) => s('text', { class: 'lane', x: 0, y: y(lane) + 16 }, short(lane, name), s('title', {}, lane))),
       bars.map((bar) => s('rect', { class: 'bar ' + bar.kind, x: x(bar.from), y: y(bar.lane) + 4, rx: 3, height: LANE - 8,
         width: Math.max(2, x(bar.to) - x(bar.from)) }, s('title', {}, bar.words))),
@@ -144,8 +157,8 @@ function spans(events, end) {
   return { lanes: lanes.concat(seen.oracle ? ['oracle'] : [], seen.expert ? ['expert'] : []), bars };
 }
 
-function ticks(whole) {
-  const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600].find((each) => whole / each <= 7) || whole / 5;
+function ticks(whole, most) {
+  const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600].find((each) => whole / each <= Math.min(8, most)) || whole / 5;
   const found = [];
   for (let tick = 0; tick <= whole; tick += step) found.push(tick);
   return found;

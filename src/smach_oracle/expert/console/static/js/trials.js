@@ -1,6 +1,6 @@
 // Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be replayed.
 import { h, replace, setText } from './dom.js';
-import { chip, clock, duration, percent } from './format.js';
+import { chip, clock, duration, lastLine, percent } from './format.js';
 import { Recorded } from './recorded.js';
 import { Replay } from './replay.js';
 
@@ -41,6 +41,7 @@ class Trials {
     if (trial && trial.number !== undefined) this.watchRecorded(trial);
     else this.watch(id);
     this.update(['trials']);
+    if (matchMedia('(max-width: 760px)').matches) this.detail.scrollIntoView();
   }
 
   begin(id, bag) {
@@ -162,7 +163,7 @@ class Trials {
     for (const event of fresh) {
       this.log.prepend(h('li', { 'data-seq': event.seq, class: 'event ' + event.kind, onclick: () => this.replay.pick(event.seq) },
         h('span', { class: 'number dim' }, '+' + (event.t - begin).toFixed(2) + ' s'), h('span', {}, event.words || event.kind,
-          event.text && event.text !== event.words ? h('span', { class: 'dim' }, ' ' + event.text.slice(-300)) : null)));
+          event.text && event.text !== event.words ? h('span', { class: 'dim' }, ' ' + lastLine(event.text)) : null)));
     }
     while (this.log.childElementCount > SHOWN_EVENTS) this.log.lastElementChild.remove();
     const { robot } = this.trial;
