@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 import unittest
+from functools import partial
 
 import rospy
 import rostest
@@ -157,7 +158,7 @@ class TheHand(unittest.TestCase):
             time.sleep(0.2)  # the page looks 40 times a second
             self.pad(forward=forward)
             self.assertTrue(self.moves(), (lost, self.states[-1], self.browser.text('.hand')))
-            self.assert_stops(lambda: self.browser.run(lost))
+            self.assert_stops(partial(self.browser.run, lost))
             self.assert_stops(self.pad)  # held all along: to move again it must be let go first
         self.browser.run('navigator.getGamepads = () => []')
 

@@ -28,7 +28,8 @@ def test_a_driving_command_is_taken_apart():
     {'held': 1}, {'held': 'true'}, {'held': None}, {'frame': 'map'}, {'frame': 'base_footprint'}, {'frame': ['tool']},
     {'linear': [2, 0, 0]}, {'linear': [0, 0]}, {'linear': [0, 0, 0, 0]}, {'linear': [True, 0, 0]},
     {'linear': ['1', 0, 0]}, {'linear': {'x': 1}}, {'linear': None}, {'angular': [0, 0, -1.01]}, {'gripper': 0.05},
-    {'gripper': 'crush'}, {'sent': -1}, {'sent': '0'}, {'sent': 1e13}, {'arm': 3}, {'arm': 'x' * 101}, {'operator': 'bob'},
+    {'gripper': 'crush'}, {'sent': -1}, {'sent': '0'}, {'sent': 1e13}, {'arm': 3},
+    {'arm': 'x' * 101}, {'operator': 'bob'},
     {'topic': '/cmd_vel'}, {'gripper_effort': 500}])
 def test_anything_else_is_refused(wrong):
     with pytest.raises(BadCommand):
