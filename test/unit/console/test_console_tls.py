@@ -58,7 +58,7 @@ class TestEncrypted(console_case.ConsoleCase):
 
     @tornado.testing.gen_test
     async def test_without_encryption_nothing_is_told(self):
-        with pytest.raises(tornado.iostream.StreamClosedError):
+        with pytest.raises((ConnectionResetError, tornado.iostream.StreamClosedError)):
             await self.http_client.fetch(self.get_url('/').replace('https', 'http'))
 
     @tornado.testing.gen_test
