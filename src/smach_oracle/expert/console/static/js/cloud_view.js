@@ -71,7 +71,7 @@ class LiveScene {
 
   changed() {
     const robot = this.robotLayer;
-    this.scene.show([robot && new GridLayer(), this.cloud, robot]);
+    this.scene.show([robot && new GridLayer(this.robot.floor), this.cloud, robot]);
     const shape = [Boolean(robot), Boolean(this.cloud), this.cloud && Boolean(this.facts.place)].join();
     if (shape !== this.shape && (robot || this.cloud)) this.home();
     this.shape = shape;
@@ -83,7 +83,7 @@ class LiveScene {
     const robot = this.robotLayer;
     const near = this.cloud && robot ? around(this.cloud.bounds(), robot.bounds()) : null;
     const optical = Boolean(this.cloud && !this.facts.place && /optical|^$/.test(this.facts.frame));
-    this.scene.frame(near ? [{ bounds: () => near }] : [this.cloud, robot], robot ? { optical, azimuth: -1.15, elevation: 0.35, reach: 0.85 } : { optical });
+    this.scene.frame(near ? [{ bounds: () => near }] : [this.cloud, robot], robot ? { optical, azimuth: -1.15, elevation: 0.35, reach: near ? 0.9 : 1.25 } : { optical });
   }
 
   // In the middle of the picture as long as there is none, below it from then on.

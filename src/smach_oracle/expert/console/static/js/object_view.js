@@ -83,7 +83,7 @@ export class ObjectView {
     const robot = this.robot && this.robot.layer;
     if (robot) robot.dim = 0.35;
     const shown = robot && this.place && this.showsRobot;
-    this.scene.show([this.place && new GridLayer(), this.around, shown && robot, this.object, this.box]);
+    this.scene.show([shown && new GridLayer(this.robot.floor), this.around, shown && robot, this.object, this.box]);
   }
 
   // From the side, so that the robot does not stand in between.

@@ -17,7 +17,7 @@ export function robotOf(app, topic) {
 export class RobotFeed {
   // `topic`: the parameter with its description; `root`: an element on the page; `moved()`: there is something new
   constructor(app, topic, root, { moved, say }) {
-    Object.assign(this, { app, topic, moved, say, layer: null, facts: {} });
+    Object.assign(this, { app, topic, moved, say, layer: null, floor: 0, facts: {} });
     this.feed = new FrameFeed(app, () => this.number, root, { every: 120, take: (answer, facts) => this.take(answer, facts), say });
   }
 
@@ -39,6 +39,8 @@ export class RobotFeed {
       const model = await this.fetchModel();
       if (model.version !== facts.model || poses.length !== 12 * model.links.length) return; // it has changed meanwhile
       this.layer = new RobotLayer(model, poses);
+      const box = this.layer.bounds();
+      this.floor = box ? Math.min(0, box[0][2]) : 0; // of one whose root is not at its feet
     }
     this.layer.poses = poses;
     this.facts = facts;
@@ -63,7 +65,7 @@ export function modelOf(data) {
     at += raw.byteLength + triangles.byteLength;
     const corners = new Float32Array(raw.length);
     for (let i = 0; i < raw.length; i += 1) corners[i] = told.offset[i % 3] + told.scale[i % 3] * raw[i] / 65535;
-    return { corners, triangles };
+    return { corners, triangles, box: [told.offset, told.offset.map((low, axis) => low + told.scale[axis])] };
   });
   return model;
 }

@@ -71,8 +71,17 @@ export class RobotLayer {
 
   bounds() {
     if (!this.model.parts.length) return null;
-    const middles = this.model.parts.map(([link, , place]) => placed(this.pose(link), [place[3], place[7], place[11]]));
-    return [-0.15, 0.15].map((more, end) => [0, 1, 2].map((axis) => Math[end ? 'max' : 'min'](...middles.map((each) => each[axis])) + more));
+    const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+    for (const [link, geometry, place] of this.model.parts) {
+      const at = chained(this.pose(link), place);
+      for (const corner of cornersOf(this.model.geometries[geometry].box)) {
+        placed(at, corner).forEach((value, axis) => {
+          low[axis] = Math.min(low[axis], value);
+          high[axis] = Math.max(high[axis], value);
+        });
+      }
+    }
+    return [low, high];
   }
 
   draw(raster, view, { ground }) {
@@ -82,8 +91,15 @@ export class RobotLayer {
   }
 }
 
-// The floor of the robot's frame, in squares of half a metre.
+// The eight corners of a box [low, high].
+function cornersOf(box) {
+  return [0, 1].flatMap((x) => [0, 1].flatMap((y) => [0, 1].map((z) => [box[x][0], box[y][1], box[z][2]])));
+}
+
+// The floor, in squares of half a metre, at a height in m.
 export class GridLayer {
+  constructor(floor) { this.floor = floor; }
+
   bounds() { return null; }
 
   draw(raster, view, { ground, ratio }) {
@@ -91,8 +107,8 @@ export class GridLayer {
     for (let at = -GRID; at <= GRID; at += 0.5) {
       const colour = ground.map((level) => level + (dark ? 1 : -1) * (at === 0 ? 46 : 22));
       const thick = Math.max(1, Math.round(ratio * 0.7));
-      raster.line(view, [at, -GRID, 0], [at, GRID, 0], colour, thick, 0.999);
-      raster.line(view, [-GRID, at, 0], [GRID, at, 0], colour, thick, 0.999);
+      raster.line(view, [at, -GRID, this.floor], [at, GRID, this.floor], colour, thick, 0.999);
+      raster.line(view, [-GRID, at, this.floor], [GRID, at, this.floor], colour, thick, 0.999);
     }
   }
 }
@@ -109,7 +125,7 @@ export class BoxLayer {
   corner(signs) { return placed(this.at, signs.map((sign, axis) => sign * this.size[axis] / 2)); }
 
   bounds() {
-    const corners = [-1, 1].flatMap((x) => [-1, 1].flatMap((y) => [-1, 1].map((z) => this.corner([x, y, z]))));
+    const corners = cornersOf([[-1, -1, -1], [1, 1, 1]]).map((signs) => this.corner(signs));
     return [Math.min, Math.max].map((most) => [0, 1, 2].map((axis) => most(...corners.map((each) => each[axis]))));
   }
 
