@@ -6,6 +6,7 @@ import sys
 import tempfile
 import unittest
 
+import rosbag
 import rospy
 import rostest
 from roslib.packages import find_node
@@ -16,7 +17,7 @@ from ports import free_port  # noqa: E402
 from published_camera import PublishedCamera  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.msg import ExpertQueryGoal, FailureFrames, OpenQueries  # noqa: E402
+from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, OpenQueries  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
@@ -45,6 +46,7 @@ class SituationAndHistory(unittest.TestCase):
         rospy.set_param('/alpha/failure_cameras', [CAMERA])
         cls.camera = PublishedCamera('head_camera', [TABLE], streams=True)
         cls.open = []
+        cls.printed = rospy.Publisher('/alpha/interface_output', InterfaceOutput, queue_size=1)
         rospy.Subscriber('/alpha/expert_query/open', OpenQueries, cls.open.append)
         cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
                                                       'console_history_robot.py'), '__name:=alpha')
@@ -85,6 +87,8 @@ class SituationAndHistory(unittest.TestCase):
         self.assertEqual((frames.query_id, frames.topics), (self.question().query_id, [CAMERA]))
         self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.still-view.shown canvas')))
         self.assertEqual(browser.text('.still-view figcaption .dim'), 'at the failure')
+        self.assertTrue(wait_for(lambda: self.printed.get_num_connections()))
+        self.printed.publish(InterfaceOutput(query_id=frames.query_id, lines=['ready']))
         red = browser.run(MIDDLE, '.still-view canvas')
         self.assertGreater(red[0], red[2] + 40)
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
@@ -114,6 +118,11 @@ class SituationAndHistory(unittest.TestCase):
     def test_4_a_trial_is_replayed_from_its_bag_after_a_restart(self):
         browser = self.browser
         self.assertTrue(wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:]))
+        with rosbag.Bag(os.path.join(self.bags, min(name for name in os.listdir(self.bags) if name[0] == '2'))) as bag:
+            told = {topic: message for topic, message, _ in bag.read_messages(
+                ['/alpha/interface_output', '/alpha/failure_frames'])}
+        self.assertEqual(told['/alpha/interface_output'].lines, ['ready'], 'what interfaces print is in the bag')
+        self.assertEqual(told['/alpha/failure_frames'].topics, [CAMERA])
         type(self).console.stop()
         type(self).console = self.start_console()
         self.assertTrue(browser.says('live', '#status', 40.0))

@@ -11,7 +11,8 @@ import console_case
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'recorder'))
-from fake_trials import play  # noqa: E402
+from fake_trials import FakeMachine, play  # noqa: E402
+from waiting import wait_for  # noqa: E402
 
 from smach_oracle.analysis.groups import make_groups  # noqa: E402
 from smach_oracle.analysis.trials import load_trials  # noqa: E402
@@ -21,6 +22,7 @@ from smach_oracle.expert.console.layout import Layouter  # noqa: E402
 from smach_oracle.expert.console.recorded import RecordedTrials  # noqa: E402
 from smach_oracle.expert.console.sections import Sections  # noqa: E402
 from smach_oracle.expert.console.stills import StillFiles  # noqa: E402
+from smach_oracle.oracle.events import EventKind  # noqa: E402
 from smach_oracle.ros.recorder import TrialRecorder  # noqa: E402
 
 TRIALS = 12
@@ -145,11 +147,26 @@ def test_a_trial_is_read_with_its_machine_and_one_that_is_gone_says_so(folder, t
         told.text(section()['trials'][-1]['number'])
 
 
-def test_long_trials_are_cut(folder, monkeypatch):
+def test_long_trials_are_cut_and_too_large_ones_refused(folder, monkeypatch):
     monkeypatch.setattr(recorded, 'MOST_EVENTS', 7)
     shelf, section = shelf_of(folder)
-    assert len(json.loads(RecordedTrials(shelf, Layouter(), StillFiles()).text(
-        section()['trials'][0]['number']))['events']) == 7
+    number = section()['trials'][0]['number']
+    assert len(json.loads(RecordedTrials(shelf, Layouter(), StillFiles()).text(number))['events']) == 7
+    monkeypatch.setattr(recorded, 'MOST_BYTES', 1000)
+    with pytest.raises(NotRead, match='too large'):
+        RecordedTrials(shelf, Layouter(), StillFiles()).text(number)
+
+
+def test_one_that_a_recorder_writes_is_left_alone(tmp_path):
+    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
+    FakeMachine(recorder).emit(EventKind.TRIAL_START)
+    active = wait_for(lambda: list(tmp_path.glob('*.bag.active')))
+    os.utime(str(active[0]), (1, 1))
+    shelf, section = shelf_of(str(tmp_path))
+    assert not section()['broken'] and not section()['trials']
+    assert recorder.close(30.0)
+    shelf.look()
+    assert [each['ending'] for each in section()['trials']] == ['unfinished']
 
 
 class TestServed(console_case.ConsoleCase):

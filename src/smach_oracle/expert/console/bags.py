@@ -3,6 +3,7 @@
 Bags are files that may come from anywhere: what they hold is read as messages by their own definitions, bounded, and
 never as code. A browser knows a trial by the number that it was given here.
 """
+import fcntl
 import itertools
 import os
 import threading
@@ -165,14 +166,17 @@ class BagShelf:
         self._read[path] = state
         reason = ''
         try:
-            if path.endswith('.active') and time.time() - state[1] / 1e9 < BEING_WRITTEN_S:
+            if path.endswith('.active') and (time.time() - state[1] / 1e9 < BEING_WRITTEN_S or _is_written(path)):
+                del self._read[path]
                 return  # its trial runs; it is shown live
             if state[0] > MOST_BYTES:
                 raise NotRead('it has {:.1f} GiB; at most {:.0f} are read'.format(state[0] / 2 ** 30,
                                                                                MOST_BYTES / 2 ** 30))
             self._count(path)
-        except (NotRead, OracleError) as err:
+        except OracleError as err:
             reason = str(err).replace(path, self._short(path))
+        except OSError:
+            del self._read[path]  # it has just got its final name, or is gone: the next look tells
         with self._lock:
             self._broken.pop(path, None)
             if reason:
@@ -199,6 +203,16 @@ class BagShelf:
     def _short(self, path: str) -> str:
         """A bag's name below its folder."""
         return short_name(path, self._folders)
+
+
+def _is_written(path: str) -> bool:
+    """Whether a living recorder of this machine holds it."""
+    with open(path, 'rb') as bag:
+        try:
+            fcntl.flock(bag.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
 
 
 def short_name(path: str, folders: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ import rospy
 from sensor_msgs.msg import CompressedImage
 
 from ...oracle.events import Event, EventKind
-from .bags import BagShelf
+from .bags import BagShelf, NotRead
 from .graph import Edge, Structure, dot_text, drawing, make_structure
 from .layout import Layouter
 from .robot import guess
@@ -19,6 +19,8 @@ from .views import event_view
 MOST_EVENTS = 20000  # of a trial: the first ones
 LAYOUT_WAIT_S = 8.0
 REMEMBERED = 4
+MOST_BYTES = 20000000  # of what is sent
+MOST_TEXT = 4000000  # of all events' texts, in characters
 
 
 class RecordedTrials:
@@ -40,7 +42,10 @@ class RecordedTrials:
             trial, events = self._shelf.events(number)
             key = (number, trial.summary.bags)
             if key not in self._known:
-                self._known[key] = json.dumps(self._made(trial.summary.bags, events[:MOST_EVENTS]), allow_nan=False)
+                text = json.dumps(self._made(trial.summary.bags, _shortened(events[:MOST_EVENTS])), allow_nan=False)
+                if len(text) > MOST_BYTES:
+                    raise NotRead('The trial is too large to be shown: {:.0f} MB.'.format(len(text) / 1e6))
+                self._known[key] = text
                 while len(self._known) > REMEMBERED:
                     self._known.popitem(last=False)
             return self._known[key]
@@ -81,6 +86,13 @@ class RecordedTrials:
             nested = [label for label in structure.states if '{}/{}'.format(path, label) in structures]
             found[path] = drawing(structure, layout, nested)
         return found
+
+
+def _shortened(events: Sequence[Event]) -> List[Event]:
+    """With the ends of long texts, the longer the fewer events there are."""
+    longest = max(200, MOST_TEXT // max(1, len(events)))
+    return [event if len(event.text) <= longest else event._replace(text='…' + event.text[-longest:])
+            for event in events]
 
 
 def guess_of(path: str, events: Sequence[Event]) -> Structure:
