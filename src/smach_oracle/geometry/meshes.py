@@ -10,6 +10,7 @@ import numpy as np
 from .robot_shapes import parsed
 
 MOST_BYTES = 100000000  # of a file
+MOST_TEXT = 40000000  # of one that is text: it takes many times its size to read
 MOST_TRIANGLES = 2000000
 FURTHEST = 1e6  # of a corner from the origin, in the file's unit
 _STL = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
@@ -36,8 +37,9 @@ def read_mesh(data: bytes, kind: str) -> Mesh:
     reader = _READERS.get(kind)
     if reader is None:
         raise MeshError('it is of the kind {!r}; readable: {}'.format(kind[:20], ', '.join(sorted(_READERS))))
-    if len(data) > MOST_BYTES:
-        raise MeshError('it has {} bytes; allowed: {}'.format(len(data), MOST_BYTES))
+    most = MOST_BYTES if kind == 'stl' else MOST_TEXT
+    if len(data) > most:
+        raise MeshError('it has {} bytes; allowed: {}'.format(len(data), most))
     try:
         mesh = reader(data)
     except (ValueError, IndexError, KeyError, OverflowError) as err:
@@ -112,9 +114,9 @@ def _stl(data: bytes) -> Mesh:
             data[:5] == b'solid' and b'facet' in data[:400]):
         corners = np.frombuffer(data, _STL, count, 84)['corners'].reshape(-1, 3).astype(np.float64)
     else:
-        words = data.split()
-        if len(words) < 4 or words[0] != b'solid' or len(words) > 40 * MOST_TRIANGLES:
-            raise MeshError('it is no STL file')
+        words = data.split() if len(data) <= MOST_TEXT else []
+        if len(words) < 4 or words[0] != b'solid':
+            raise MeshError('it is no STL file, or one of text with more than {} bytes'.format(MOST_TEXT))
         corners = np.array([words[at + 1:at + 4] for at, word in enumerate(words) if word == b'vertex'],
                            np.float64).reshape(-1, 3)
     return Mesh(corners, np.arange(len(corners) // 3 * 3).reshape(-1, 3))
@@ -140,7 +142,7 @@ def _obj(data: bytes) -> Mesh:
 
 def _dae(data: bytes) -> Mesh:
     try:
-        root = parsed(data.decode('utf-8'), 'COLLADA', MOST_BYTES)
+        root = parsed(data.decode('utf-8'), 'COLLADA', MOST_TEXT)
     except ValueError as err:
         raise MeshError('it is no COLLADA file, or one with a document type or in another encoding') from err
     for element in root.iter():

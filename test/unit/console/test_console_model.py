@@ -2,6 +2,7 @@
 import json
 import os
 import struct
+import time
 
 import console_case
 import numpy as np
@@ -117,11 +118,13 @@ def test_a_robot_of_very_many_round_parts_is_drawn_of_boxes(files):
 class Silent:
     """A subscriber, or transforms, of which nothing comes."""
 
+    alive = 0
+
     def __init__(self, *_, **__):
-        pass
+        Silent.alive += 1
 
     def unregister(self):
-        pass
+        Silent.alive -= 1
 
     stop = unregister
 
@@ -131,6 +134,7 @@ class Silent:
 
 @pytest.fixture
 def quiet(monkeypatch):
+    Silent.alive = 0
     for module in (sensors, robot_sensor, depth_clouds):
         monkeypatch.setattr(module.rospy, 'Subscriber', Silent)
     monkeypatch.setattr(robot_sensor, '_Transforms', Silent)
@@ -151,6 +155,23 @@ def test_a_robot_is_seen_before_its_joints_speak_and_moves_with_them(quiet):
     robot.take(JointState(name=['other'], position=[1.0]))
     encoded, facts = robot.file_of(robot.newer(1), 640)
     assert np.frombuffer(encoded.body, '<f4')[15] == 0.5 and json.loads(facts)['joints'] == 2
+
+
+@pytest.mark.parametrize('make, topics', [
+    (lambda: RobotSensor(1, '/robot_description', lambda _: BALL_HANDED), 2),
+    (lambda: DepthCloudSensor(1, DepthCamera('/d', '/info', '/colour')), 3)])
+def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(quiet, monkeypatch, make, topics):
+    sensor = make()
+    sensor.tend(True)
+    assert Silent.alive == 0
+    sensor.newer(0)
+    sensor.tend(True)
+    sensor.tend(True)
+    assert Silent.alive == topics
+    later = time.monotonic() + sensors.IDLE_S
+    monkeypatch.setattr(sensors.time, 'monotonic', lambda: later)
+    sensor.tend(True)
+    assert Silent.alive == 0 and sensor.newer(0) is None
 
 
 @pytest.mark.parametrize('urdf, said', [('<robot', 'not XML'), (7, 'holds no text'), ('<!DOCTYPE a>', 'not allowed')])

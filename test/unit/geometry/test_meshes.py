@@ -4,6 +4,7 @@ import struct
 import numpy as np
 import pytest
 
+from smach_oracle.geometry import meshes
 from smach_oracle.geometry.meshes import Mesh, MeshError, read_mesh, reduced
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
@@ -76,6 +77,17 @@ def test_what_is_no_mesh_is_refused_without_quoting_it(data, kind, said):
     with pytest.raises(MeshError) as error:
         read_mesh(data, kind)
     assert said in str(error.value) and 'passwd' not in str(error.value) and '/bin/sh' not in str(error.value)
+
+
+def test_sizes_are_limited_before_anything_is_made_of_them(monkeypatch):
+    monkeypatch.setattr(meshes, 'MOST_TEXT', 50)
+    for data, kind in ((OBJ * 2, 'obj'), (DAE.encode(), 'dae'), (text_stl(CORNERS[SQUARE]), 'stl')):
+        with pytest.raises(MeshError, match='50'):
+            read_mesh(data, kind)
+    monkeypatch.setattr(meshes, 'MOST_TRIANGLES', 1)
+    for data, kind in ((binary_stl(CORNERS[SQUARE]), 'stl'), (OBJ, 'obj')):
+        with pytest.raises(MeshError, match='triangles'):
+            read_mesh(data, kind)
 
 
 def test_nodes_deep_within_each_other_end_somewhere():
