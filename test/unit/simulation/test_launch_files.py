@@ -1,0 +1,35 @@
+"""The launch files of the simulated PR2: each piece apart, and the world's pace where people answer."""
+import pytest
+from roslaunch.config import load_config_default
+from roslaunch.substitution_args import resolve_args
+
+PIECES = {'pr2_world', 'pr2_perception', 'pr2_manipulation', 'perception_interface', 'manipulation_interface',
+          'scripted_operator'}
+
+
+def launched(name, *arguments):
+    """What roslaunch would start."""
+    return load_config_default([(resolve_args('$(find smach_oracle)/launch/{}.launch'.format(name)), list(arguments))],
+                               11311, verbose=False)
+
+
+def nodes(config):
+    return {node.type for node in config.nodes}
+
+
+def test_the_whole_robot_is_made_of_pieces_that_can_be_launched_apart():
+    assert nodes(launched('pr2')) == PIECES
+    for piece in PIECES:
+        assert nodes(launched(piece)) == {piece}
+
+
+@pytest.mark.parametrize('task', ['pick_and_place', 'drink_retrieval'])
+@pytest.mark.parametrize('arguments, factor, lock_step', [
+    ((), 0, True), (('scripted_expert:=false',), 1, False),
+    (('scripted_expert:=false', 'real_time_factor:=0'), 0, True), (('real_time_factor:=2',), 2, False)])
+def test_where_people_answer_the_world_keeps_the_walls_time_unless_told_otherwise(task, arguments, factor, lock_step):
+    config = launched(task, *arguments)
+    assert config.params['/pr2_world/real_time_factor'].value == factor
+    assert config.params['/pr2_world/task'].value == task
+    assert config.params['/manipulation_interface/lock_step'].value is lock_step
+    assert ('scripted_operator' in nodes(config)) == ('scripted_expert:=false' not in arguments)
