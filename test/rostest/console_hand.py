@@ -111,7 +111,7 @@ class TheHand(unittest.TestCase):
         # a quarter of them: the others may have waited for a loaded machine
         self.assertLess(gaps[len(gaps) // 4], 1 / 30.0, '30 commands a second or more')
 
-    def test_3_a_button_held_with_the_mouse_stops_when_the_page_loses_the_focus(self):
+    def test_2_a_button_held_with_the_mouse_stops_when_the_page_loses_the_focus(self):
         before = self.height()
         pad = self.browser.find('.pad[data-move=down]')
         ActionChains(self.browser.driver, duration=0).click_and_hold(pad).perform()
@@ -125,6 +125,26 @@ class TheHand(unittest.TestCase):
             'Object.defineProperty(document, "hidden", {value: true, configurable: true});'
             'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'))
         ActionChains(self.browser.driver, duration=0).release().perform()
+
+    def finger(self, pad=None):
+        """Put it on a button of the page, or lift it."""
+        box = self.browser.run('return arguments[0].getBoundingClientRect()', pad) if pad else None
+        at = [{'x': box['x'] + box['width'] / 2, 'y': box['y'] + box['height'] / 2}] if pad else []
+        self.browser.driver.execute_cdp_cmd(
+            'Input.dispatchTouchEvent', {'type': 'touchStart' if pad else 'touchEnd', 'touchPoints': at})
+
+    def test_3_a_finger_moves_the_hand_as_long_as_it_rests_on_a_button(self):
+        asks = 'return arguments[0].dispatchEvent(new MouseEvent("contextmenu", {bubbles: true, cancelable: true}))'
+        pad = self.browser.find('.pad[data-move=up]')
+        self.finger(pad)
+        self.assertTrue(self.moves())
+        self.assertFalse(self.browser.run(asks, pad), 'no menu, which a phone would show by now')
+        self.assertTrue(self.moves(), 'still')
+        self.assert_stops(self.finger)
+        self.finger(pad)
+        self.assertTrue(self.moves())
+        self.assert_stops(partial(self.browser.run, asks, self.browser.find('.hand-head')))
+        self.finger()
 
     def pad(self, held=True, forward=1.0, **more):
         """Put a fake gamepad where the page looks for one."""

@@ -27,6 +27,7 @@ LOOK_PERIOD_S = 0.5
 DRAW_PERIOD_S = 0.1
 NOT_RUNNING = 'No manipulation interface runs for this question.'
 TAKE_FIRST = 'Take the wheel first.'
+ANSWER_S = 2.0  # after which a command in lock-step counts as lost
 STILL = {'frame': 'base', 'linear': (0, 0, 0), 'angular': (0, 0, 0), 'gripper': '', 'arm': ''}
 
 
@@ -36,7 +37,8 @@ class Hand:
     def __init__(self, action: str) -> None:
         self.wheel = Wheel()
         self.state: Optional[TeleopState] = None
-        self._seq = 0
+        self._seq, self._sent_s = 0, -math.inf
+        self._in_steps = bool(rospy.get_param(action + '/lock_step', False))
         self._base = str(rospy.get_param(action + '/base_frame', 'base_footprint'))
         self._camera = str(rospy.get_param(action + '/camera_frame', ''))
         arms = rospy.get_param(action + '/arms', {})
@@ -49,6 +51,12 @@ class Hand:
 
     def _take(self, state: TeleopState) -> None:
         self.state = state
+
+    def busy(self, operator: str) -> bool:
+        """Whether a world in lock-step has not carried out the last command yet: more would wait, and move the hand
+        after it was let go."""
+        answered = self.state is not None and (self.state.sender, self.state.seq) == (operator, self._seq)
+        return self._in_steps and not answered and time.monotonic() - self._sent_s < ANSWER_S
 
     @property
     def arms(self) -> List[str]:
@@ -69,7 +77,7 @@ class Hand:
         """One command, along the axes of the frame named."""
         arm = said['arm'] or self.arm
         frame = self.frames(arm).get(said['frame'], self._base)
-        self._seq += 1
+        self._seq, self._sent_s = self._seq + 1, time.monotonic()
         self._publisher.publish(TeleopCommand(
             header=Header(frame_id=frame, stamp=rospy.Time.now()), operator=operator, seq=self._seq,
             arm=arm, dead_man=held,
@@ -128,7 +136,8 @@ class Hands:
                 return Reply(False, 'unknown arm {}; allowed: {}'.format(shown(said['arm']), ', '.join(hand.arms)))
             was_held = hand.wheel.held
             if hand.wheel.hear(said['sent'] / 1e3, said['held'], time.monotonic()):
-                hand.send(_operator(drive), said, True)
+                if not hand.busy(_operator(drive)):
+                    hand.send(_operator(drive), said, True)
             elif was_held or said['held']:
                 hand.release(_operator(drive))
         return Reply(True)

@@ -18,7 +18,8 @@ export class DriveInput {
     const listen = (target, type, f) => target.addEventListener(type, f, { signal: this.off.signal, capture: true });
     listen(window, 'keydown', (event) => this.key(event, true));
     listen(window, 'keyup', (event) => this.key(event, false));
-    for (const type of ['blur', 'pagehide', 'contextmenu', 'freeze']) listen(window, type, () => this.releaseAll());
+    for (const type of ['blur', 'pagehide', 'freeze']) listen(window, type, () => this.releaseAll());
+    listen(window, 'contextmenu', (event) => this.menu(event));
     listen(document, 'visibilitychange', () => this.releaseAll());
   }
 
@@ -38,6 +39,12 @@ export class DriveInput {
     event.stopImmediatePropagation(); // these letters mean something else elsewhere on the page
     if (down && !event.repeat) this.press(event.code, move);
     else if (!down) this.release(event.code);
+  }
+
+  // A finger that rests on a button asks for a menu: there is none. Elsewhere one may cover what is held.
+  menu(event) {
+    if (event.target instanceof Element && event.target.closest('.pad')) event.preventDefault();
+    else this.releaseAll();
   }
 
   // Make an element hold a move for as long as it is pressed.

@@ -1,0 +1,91 @@
+"""A hand as the console drives it: arms, frames, and no more commands than a world in lock-step can take."""
+import pytest
+import rospy
+
+from smach_oracle.expert.console import hands
+from smach_oracle.expert.console.audit import Person
+from smach_oracle.expert.console.commands import Command
+from smach_oracle.expert.console.wheel import Drive
+from smach_oracle.msg import TeleopState
+
+ARMS = {'left': {'tool': 'l_tool'}, 'right': {'tool': 'r_tool'}}
+SAID = {'question': 'q', 'held': True, 'frame': 'tool', 'linear': (1.0, 0.0, 0.0), 'angular': (0.0, 0.0, 0.0),
+        'gripper': '', 'arm': ''}
+
+
+class FakePublisher:
+
+    def __init__(self, *_, **__):
+        self.sent = []
+        self.publish = self.sent.append
+
+
+class Silent:
+
+    def tell(self, *_):
+        """Nobody listens."""
+
+
+@pytest.fixture(name='make')
+def make_hands(monkeypatch):
+    """Hands with one of two arms, at the wheel of which is page 1."""
+    def make(**parameters):
+        known = dict({'/hand/arms': ARMS, '/hand/camera_frame': 'eye'},
+                     **{'/hand/' + name: value for name, value in parameters.items()})
+        monkeypatch.setattr(rospy, 'get_param', lambda name, default=None: known.get(name, default))
+        monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
+        monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
+        monkeypatch.setattr(rospy, 'get_name', lambda: '/console')
+        monkeypatch.setattr(rospy.Time, 'now', lambda: rospy.Time(7))
+        made = hands.Hands(None, None, Silent())
+        hand = made._hands['q'] = hands.Hand('/hand')
+        hand.state = TeleopState(arm='right')
+        hand.wheel.take(Drive('q', 1, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
+        return made, hand, hand._publisher.sent
+    return make
+
+
+def drive(made, sent_s=0.0, browser=1, **more):
+    return made.drive(Command(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), browser)
+
+
+def test_the_arm_is_the_interface_s_own_choice_until_another_is_named(make):
+    made, _, sent = make()
+    assert drive(made).ok and drive(made, arm='left').ok
+    assert [(each.arm, each.header.frame_id, each.dead_man) for each in sent] == [
+        ('right', 'r_tool', True), ('left', 'l_tool', True)]
+
+
+def test_an_arm_that_is_not_there_stops_the_hand(make):
+    made, _, sent = make()
+    drive(made)
+    reply = drive(made, arm='/cmd_vel')
+    assert (reply.ok, reply.message) == (False, "unknown arm '/cmd_vel'; allowed: left, right")
+    assert [each.dead_man for each in sent] == [True, False] and sent[-1].arm == 'right'
+
+
+def test_another_page_drives_nothing(make):
+    made, _, sent = make()
+    assert drive(made, browser=2).message == hands.TAKE_FIRST and sent == []
+
+
+def test_a_world_in_lock_step_gets_the_next_command_when_it_has_carried_out_the_last(make):
+    made, hand, sent = make(lock_step=True)
+    for _ in range(5):
+        drive(made)
+    assert [each.seq for each in sent] == [1]
+    hand.state = TeleopState(arm='right', seq=1, sender=sent[0].operator)
+    drive(made)
+    drive(made)
+    drive(made, held=False)
+    assert [(each.seq, each.dead_man) for each in sent] == [(1, True), (2, True), (3, False)], 'a release never waits'
+    hand._sent_s -= hands.ANSWER_S
+    drive(made)
+    assert sent[-1].seq == 4, 'an answer may get lost'
+
+
+def test_a_world_of_its_own_pace_gets_them_all(make):
+    made, _, sent = make()
+    for _ in range(5):
+        drive(made)
+    assert len(sent) == 5
