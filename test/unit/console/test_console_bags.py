@@ -113,7 +113,7 @@ def test_number_and_size_are_bounded(folder, monkeypatch):
     monkeypatch.setattr(bags, 'SHOWN_TRIALS', 3)
     _, section = shelf_of(folder)
     assert section()['table'][0]['runs'] == 5 and len(section()['trials']) == 3
-    assert 'Of 12 bags the newest 5 are read.' in section()['note']
+    assert section()['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
     monkeypatch.setattr(bags, 'MOST_BYTES', 10)
     _, section = shelf_of(folder)
     assert not section()['trials'] and 'at most' in section()['broken'][0]['reason']

@@ -95,8 +95,10 @@ class BagShelf:
         with self._lock:
             trials = sorted(self._trials.values(), key=lambda each: -each.summary.start_time)
             broken = sorted(self._broken.items())
+        notes = self._notes + (['Of {} trials the latest {} are listed.'.format(len(trials), SHOWN_TRIALS)]
+                               if len(trials) > SHOWN_TRIALS else [])
         self._sections.put(SECTION, {
-            'waiting': waiting, 'note': ' '.join(self._notes), 'table': _table([each.summary for each in trials]),
+            'waiting': waiting, 'note': ' '.join(notes), 'table': _table([each.summary for each in trials]),
             'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
             'broken': [{'name': self._short(path), 'reason': reason[:300]} for path, reason in broken[:SHOWN_BROKEN]]})
 

@@ -8,6 +8,8 @@ export const trials = { id: 'trials', title: 'Trials', create: (app) => new Tria
 
 const SHOWN_EVENTS = 600;
 const ENDINGS = { success: 'good', failure: 'bad', preempted: 'warn', unfinished: 'warn', '': 'accent' };
+const FILTERS = { all: ['All trials', () => true], failed: ['With failures', (trial) => trial.failures > 0], asked: ['With questions', (trial) => trial.questions > 0],
+  bad: ['Not ended well', (trial) => trial.ending && trial.ending !== 'success'] };
 const COLUMNS = ['Experiment', 'Arm', 'Runs', 'Failures', 'Oracle recoveries', 'Questions', 'Expert interventions', 'Ended in failure'];
 
 class Trials {
@@ -17,6 +19,7 @@ class Trials {
     this.events = [];
     this.table = h('div', { class: 'table-frame card' });
     this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
+    this.filter = h('select', { class: 'trial-filter', 'aria-label': 'Which trials are listed', onchange: () => this.update(['trials']) }, Object.entries(FILTERS).map(([name, [title]]) => h('option', { value: name }, title)));
     this.replay = new Replay(app, (event) => this.mark(event.seq));
     this.recorded = new Recorded(app, () => this.showRecorded());
     this.title = h('h2', {});
@@ -25,7 +28,7 @@ class Trials {
     this.log = h('ol', { class: 'event-log', 'aria-label': 'Events, newest first' });
     this.detail = h('section', { class: 'card trial-detail' }, h('div', {}, this.title, this.facts, this.problem), this.replay.root);
     this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log));
-    this.body = [this.table, this.recorded.root, h('div', { class: 'trial-body' }, this.list, this.detail)];
+    this.body = [this.table, this.recorded.root, h('div', { class: 'trial-body' }, h('div', { class: 'trial-side' }, this.filter, this.list), this.detail)];
     this.empty = h('p', { class: 'empty' }, 'No trials yet. They appear as robots run; of what happened before this console was started, the bags tell.');
     this.root = h('div', { class: 'panel trials' }, this.empty);
     app.store.onEvents((message) => this.take(message));
@@ -122,7 +125,7 @@ class Trials {
   }
 
   showList(all) {
-    const key = JSON.stringify([all, this.chosen]);
+    const key = JSON.stringify([all, this.chosen, this.filter.value]);
     if (key === this.listKey) return;
     this.listKey = key;
     const focused = document.activeElement && document.activeElement.dataset.trial;
@@ -130,15 +133,16 @@ class Trials {
       h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, trial.experiment), h('span', { class: 'spacer' }), chip(trial.outcome || trial.ending || 'running', ENDINGS[trial.ending])),
       h('span', { class: 'row dim' }, h('span', { class: 'ellipsis' }, trial.robot), h('span', { class: 'spacer' }), clock(trial.start)),
       h('span', { class: 'dim' }, summary(trial)));
-    const old = all.filter((trial) => trial.number !== undefined);
-    const live = all.filter((trial) => trial.number === undefined);
+    const wanted = all.filter(FILTERS[this.filter.value][1]);
+    const old = wanted.filter((trial) => trial.number !== undefined);
+    const live = wanted.filter((trial) => trial.number === undefined);
     let day = '';
     replace(this.list, live.map(row), old.map((trial) => {
       const date = new Date(trial.start * 1000).toLocaleDateString();
       const heading = date !== day && h('h4', { class: 'trial-day' }, 'Bags of ', date);
       day = date;
       return [heading, row(trial)];
-    }));
+    }), !wanted.length && h('p', { class: 'dim' }, 'None.'));
     const again = focused && [...this.list.children].find((each) => each.dataset.trial === focused);
     if (again) again.focus();
   }
