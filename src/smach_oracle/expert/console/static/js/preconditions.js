@@ -11,7 +11,7 @@ export class Preconditions {
       const sign = h('span', { class: 'sign', 'aria-hidden': 'true' });
       const word = h('span', { class: 'word' });
       const why = h('span', { class: 'why' });
-      const root = h('span', { class: 'precondition' }, sign, h('span', {}, name), ' ', word, ' ', why);
+      const root = h('span', { class: 'precondition' }, sign, h('span', {}, name), ' ', word, why);
       return { root, sign, word, why };
     });
     this.age = h('span', { class: 'dim age' });
@@ -30,7 +30,7 @@ export class Preconditions {
       setText(item.word, check ? word : '');
       const shown = 'precondition ' + (check ? kind : '') + (stale ? ' stale' : '');
       if (item.root.className !== shown) item.root.className = shown;
-      setText(item.why, check && check.holds !== true ? (check.text.startsWith(check.name + ' ') ? check.text.slice(check.name.length + 1) : check.text) : '');
+      setText(item.why, check && check.holds !== true && check.text ? ': ' + (check.text.startsWith(check.name + ' ') ? check.text.slice(check.name.length + 1) : check.text) : '');
       item.root.hidden = !check;
     });
     this.names.hidden = Boolean(checks);
