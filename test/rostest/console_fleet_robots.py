@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Many robots, each a node and a process of its own: their WORK fails, and each goes where it is sent, and tells where."""
+"""Many robots, each a process of its own: their WORK fails, and each goes where it is sent, and tells where that was."""
 import os
 import signal
 import sys
