@@ -68,6 +68,16 @@ class Eyes(unittest.TestCase):
             self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
             self.assertIn('allowed: 0 to 0.3', handle.get_result().reason)
 
+    def test_an_empty_scene_aborts_and_says_what_is_missing(self) -> None:
+        for target, height, words in (((0.75, 0.0, 0.75), 0.3, 'there is nothing on the table that stands higher than'),
+                                      ((0.5, -1.5, 1.6), 0.02, 'no table in view')):
+            self.robot.look_at(target)
+            handle = self.ended('detect_tabletop', DetectTabletopAction, DetectTabletopGoal(height))
+            self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
+            self.assertIn(words, handle.get_result().reason)
+            self.assertEqual(handle.get_goal_status_text(), handle.get_result().reason)
+            self.assertEqual(handle.get_result().objects, [])
+
     def test_there_is_no_refrigerator_here(self) -> None:
         handle = self.ended('detect_drink', DetectDrinkAction, DetectDrinkGoal())
         self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)

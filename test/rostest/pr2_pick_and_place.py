@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The first use case on the simulated PR2, over its nodes: as the task does it, and with goals that cannot be."""
 import math
+import threading
 import unittest
 
 import actionlib
@@ -33,12 +34,18 @@ class PickAndPlaceTest(unittest.TestCase):
         cls.reset = rospy.ServiceProxy('world/reset', ResetWorld)
         cls.judge = rospy.ServiceProxy('world/judge', Judge)
 
-    def done(self, name, spec, goal):
-        """How an action ended: (status, result)."""
+    def sent(self, name, spec, goal, **callbacks):
+        """A client with its goal under way."""
         client = actionlib.SimpleActionClient(name, spec)
         self.assertTrue(client.wait_for_server(LIMIT), name)
-        client.send_goal(goal)
-        self.assertTrue(client.wait_for_result(LIMIT), name)
+        client.send_goal(goal, **callbacks)
+        return client
+
+    def ended(self, client):
+        """How it ended: (status, result); the reason is what the status says, too, for those who see that alone."""
+        self.assertTrue(client.wait_for_result(LIMIT), client.action_client.ns)
+        if client.get_state() == GoalStatus.ABORTED:
+            self.assertEqual(client.get_goal_status_text(), client.get_result().reason)
         return client.get_state(), client.get_result()
 
     def test_1_bad_goals_are_aborted_and_say_why(self):
@@ -50,20 +57,36 @@ class PickAndPlaceTest(unittest.TestCase):
                  PointHeadGoal(PointStamped(Header(frame_id='moon'), Point(1, 0, 1))), "frame 'moon'; allowed"),
                 ('pick', PickAction, PickGoal('right', pose(math.nan, 0, 0), SIZE, ''), 'not finite'),
                 ('pick', PickAction, PickGoal('right', good, SIZE, 'map of the moon'), 'no collision map'),
+                ('pick', PickAction, PickGoal('right', pose(2.5, 0.0, 0.8), SIZE, ''), 'out of reach'),
+                ('place', PlaceAction, PlaceGoal('right', good, good, ''), 'there is nothing to stand on'),
+                ('place', PlaceAction, PlaceGoal('right', pose(math.inf, 0, 0), good, ''), 'pose: '),
                 ('place', PlaceAction, PlaceGoal('up', good, good, ''), "unknown arm 'up'")]:
-            with self.subTest(text):
-                status, result = self.done(name, spec, goal)
-                self.assertEqual(status, GoalStatus.ABORTED)
-                self.assertIn(text, result.reason)
+            status, result = self.ended(self.sent(name, spec, goal))
+            self.assertEqual((name, status), (name, GoalStatus.ABORTED))
+            self.assertIn(text, result.reason)
 
-    def test_2_the_task_succeeds_and_the_object_truly_stands_there(self):
-        self.assertTrue(self.reset(seed=4).ok)
-        machine = pick_and_place.make_machine()
-        machine.userdata = smach.UserData()
-        machine.userdata.place_pose = pick_and_place.place_pose()
-        self.assertEqual(machine.execute(), 'succeeded')
-        verdict = self.judge()
-        self.assertTrue(verdict.success, verdict.why)
+    def test_2_what_is_cancelled_stops_and_what_comes_next_is_done(self):
+        self.assertTrue(self.reset(seed=3).ok)
+        begun = threading.Event()
+        picking = self.sent('pick', PickAction, PickGoal('right', pose(0.6, -0.1, 0.78), SIZE, ''),
+                            feedback_cb=lambda feedback: begun.set())
+        self.assertTrue(begun.wait(60.0))
+        picking.cancel_goal()
+        status, result = self.ended(picking)
+        self.assertEqual(status, GoalStatus.PREEMPTED)
+        self.assertTrue(result.reason)
+        aside = self.sent('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal())
+        self.assertEqual(self.ended(aside)[0], GoalStatus.SUCCEEDED)
+
+    def test_3_the_task_succeeds_and_the_object_truly_stands_there(self):
+        for seed in (4, 9):
+            self.assertTrue(self.reset(seed=seed).ok)
+            machine = pick_and_place.make_machine()
+            machine.userdata = smach.UserData()
+            machine.userdata.place_pose = pick_and_place.place_pose()
+            self.assertEqual(machine.execute(), 'succeeded', seed)
+            verdict = self.judge()
+            self.assertTrue(verdict.success, verdict.why)
 
 
 if __name__ == '__main__':
