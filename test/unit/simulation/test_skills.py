@@ -9,7 +9,7 @@ from worlds import CAN, CARTON, TABLE, scene
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.msg import BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal
-from smach_oracle.simulation.robot.arm import Means, SkillError
+from smach_oracle.simulation.robot.arm import FEEL_EFFORT, Means, SkillError
 from smach_oracle.simulation.robot.arms_aside import ASIDE, is_aside
 from smach_oracle.simulation.robot.collision import installed_model
 from smach_oracle.simulation.robot.grasps import grasps
@@ -105,6 +105,22 @@ def test_nothing_in_the_hand_is_felt(bench):
     assert is_aside(bench.robot.joints(), 'right')
     with pytest.raises(SkillError, match='the right hand holds nothing'):
         bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
+
+
+def test_what_slipped_is_gripped_firmer_until_the_arms_go_aside_again():
+    bench = Bench(TABLE, CAN._replace(friction=0.05, mass=0.69), CARTON)
+    made = bench.map()
+    with pytest.raises(SkillError, match='slipped out'):
+        bench.pick(made.map_id)
+    grasp = bench.pick(made.map_id)
+    assert bench.world.holding('can') == 'right'
+    bench.robot.look_at((0.6, -0.2, 0.8))
+    bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
+    assert np.hypot(*(bench.world.body_pose('can')[:2, 3] - (0.6, -0.35))) < 0.03
+    bench.skills.move_arms_aside(MoveArmsAsideGoal(), say)
+    with bench.skills.firmer_after_slip() as effort:
+        assert effort == FEEL_EFFORT
+    bench.world.close()
 
 
 def test_what_a_hand_held_in_another_trial_does_not_count(bench):

@@ -103,7 +103,7 @@ class Pilot:
         """Open the gripper to `gap` m."""
         self.hand.grip(gap, 40.0)
 
-    def close(self, effort: float = 50.0) -> Grip:
+    def close(self, effort: float = 100.0) -> Grip:
         """Close it on whatever there is, with at most `effort` N."""
         return self.hand.grip(0.0, effort)
 

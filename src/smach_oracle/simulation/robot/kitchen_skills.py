@@ -5,7 +5,7 @@ from smach_oracle.msg import (CloseDoorGoal, CloseDoorResult, HandOverGoal, Hand
                               OpenDoorResult, PickGoal, PickResult)
 
 from ...geometry.transforms import transform
-from .arm import FEEL_EFFORT, Means, read_joints
+from .arm import Means, read_joints
 from .door import close_door, open_door
 from .drink import things_on_shelf
 from .frames import box_in_base, pose_in_base, pose_message
@@ -14,10 +14,9 @@ from .hand_over import hand_over
 from .kitchen import Kitchen, base_from_fridge
 from .manipulation import USUAL, Manipulation, known_arm
 from .own_limbs import limbs_of
-from .pick import Held, Slipped
+from .pick import FIRM, Held
 from .skill_server import Say
 
-FIRM = 100.0  # N, the strongest grip there is: of what has slipped, and of what a person put into the hand
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
 
 
@@ -27,11 +26,10 @@ class KitchenSkills(Manipulation):
     def __init__(self, means: Means, kitchen: Kitchen) -> None:
         super().__init__(means)
         self.kitchen = kitchen
-        self._effort = FEEL_EFFORT  # N, of the next grip
 
     def open_door(self, goal: OpenDoorGoal, say: Say) -> OpenDoorResult:
         """Open the refrigerator; what slipped before that is forgotten."""
-        self._effort = FEEL_EFFORT
+        self.forget_slips()
         say('opening the refrigerator')
         return OpenDoorResult(angle=open_door(self.means, self.kitchen, known_arm(goal.arm)))
 
@@ -52,11 +50,8 @@ class KitchenSkills(Manipulation):
         self.held.pop(arm, None)
         limbs = limbs_of(self._links, read_joints(self.means.robot))
         others = things_on_shelf(self.means.robot.see(), self.kitchen, fridge, limbs)
-        try:
-            self.held[arm] = pick_from_fridge(self.means, self.kitchen, fridge, arm, target, others, self._effort)
-        except Slipped:
-            self._effort = FIRM
-            raise
+        with self.firmer_after_slip() as effort:
+            self.held[arm] = pick_from_fridge(self.means, self.kitchen, fridge, arm, target, others, effort)
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def hand_over(self, goal: HandOverGoal, say: Say) -> HandOverResult:

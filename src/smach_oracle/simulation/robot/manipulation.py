@@ -10,7 +10,7 @@ from smach_oracle.msg import (BuildCollisionMapGoal, BuildCollisionMapResult, Mo
 from ...geometry import chain
 from ...geometry.box import UprightBox
 from ...geometry.transforms import inverse, yaw_of
-from .arm import Means, SkillError, read_joints, stands_open
+from .arm import FEEL_EFFORT, Means, SkillError, read_joints, stands_open
 from .arms_aside import arms_aside, is_aside
 from .clusters import NotSeen
 from .collision_map import CollisionMap, MapBook, around, map_of, map_of_frame, nearest_object
@@ -18,7 +18,7 @@ from .frames import box_in_base, point_in_base, pose_in_base, pose_message
 from .interface import ARMS
 from .kitchen import MapBox
 from .own_limbs import limbs_of
-from .pick import Held, pick
+from .pick import FIRM, Held, Slipped, pick
 from .place import Lost, place, put_back, stands_there
 from .skill_server import Say
 from .tabletop import find_tabletop
@@ -36,10 +36,12 @@ class Manipulation:
         self.means = means
         self.maps = MapBook()
         self.held: Dict[str, Held] = {}
+        self._effort = FEEL_EFFORT  # N, of the next grip
         self._links = chain.read_joints(means.model.urdf)
 
     def move_arms_aside(self, goal: MoveArmsAsideGoal, say: Say) -> MoveArmsAsideResult:
-        """Both arms, or those named, to the robot's sides."""
+        """Both arms, or those named, to the robot's sides; what slipped before that is forgotten."""
+        self.forget_slips()
         for arm in goal.arms:
             known_arm(arm)
         arms = list(goal.arms) or list(ARMS)
@@ -78,7 +80,8 @@ class Manipulation:
         self._put_back(arm, boxes)
         say('choosing a grasp')
         with self._withdrawing(arm, boxes):
-            self.held[arm] = pick(self.means, arm, target, boxes)
+            with self.firmer_after_slip() as effort:
+                self.held[arm] = pick(self.means, arm, target, boxes, effort)
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, say: Say) -> PlaceResult:
@@ -99,6 +102,19 @@ class Manipulation:
         if not stands_there(self.means.robot.see(), stood, held):
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
+
+    def forget_slips(self) -> None:
+        """The next grip is as gentle as the first."""
+        self._effort = FEEL_EFFORT
+
+    @contextlib.contextmanager
+    def firmer_after_slip(self) -> Iterator[float]:
+        """How firmly to grip, N; where it slips all the same, the next grip is the firmest."""
+        try:
+            yield self._effort
+        except Slipped:
+            self._effort = FIRM
+            raise
 
     @contextlib.contextmanager
     def _withdrawing(self, arm: str, boxes: Dict[str, MapBox], errors: Type[Exception] = SkillError) -> Iterator[None]:
@@ -126,15 +142,17 @@ class Manipulation:
         """What is held, and the boxes without it: by the map, by memory, or something of the usual size."""
         index = nearest_object(made, grasp[:3, 3], BESIDE_GRASP)
         boxes = dict(made.boxes)
+        known = self.held.get(arm)
+        if known is not None and np.linalg.norm((known.grasp - grasp)[:3, 3]) >= SAME_GRASP:
+            known = None
         if index is not None:
             box = made.objects[index]
             boxes.pop('object {}'.format(index))
-            return Held(grasp, inverse(grasp) @ box.matrix, box.size / 2), boxes
-        known = self.held.get(arm)
-        if known is not None and np.linalg.norm((known.grasp - grasp)[:3, 3]) < SAME_GRASP:
+            return Held(grasp, inverse(grasp) @ box.matrix, box.size / 2, known.effort if known else FIRM), boxes
+        if known is not None:
             return known, boxes
         upright = UprightBox(grasp[:3, 3], 2 * USUAL, 0.0)
-        return Held(grasp, inverse(grasp) @ upright.matrix, USUAL), boxes
+        return Held(grasp, inverse(grasp) @ upright.matrix, USUAL, FIRM), boxes
 
     def _seen(self, target: Optional[UprightBox] = None) -> CollisionMap:
         """The map of what the camera sees now, with the table, where it sees one."""

@@ -13,6 +13,7 @@ from .planner import PlanningError
 
 APPROACH = 0.10  # m, straight, towards the object
 LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
+FIRM = 100.0  # N, the strongest grip there is: of what has slipped, and of what a person put into the hand
 MISSES = 2  # grasps that may close on nothing before the robot says so
 EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 TARGET = 'the object'
