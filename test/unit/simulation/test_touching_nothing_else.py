@@ -1,0 +1,31 @@
+"""Whole tasks watched by physics: of all that stands around, the robot touches what it takes, and nothing else."""
+import pytest
+
+from smach_oracle.simulation.world import kitchen_scene, tabletop_scene
+from smach_oracle.simulation.world.drink_rehearsal import DrinkTrial
+from smach_oracle.simulation.world.physics import World
+from smach_oracle.simulation.world.rehearsal import Trial, rehearse
+
+
+class WatchedWorld(World):
+    """Remembers what pressed against the robot in any control period; no planner has a say in it."""
+
+    def __init__(self):
+        self.touched = set()
+        super().__init__()
+
+    def step(self, count=1):
+        for _ in range(count):
+            super().step(1)
+            self.touched |= {contact.other for contact in self.contacts('robot') if contact.force > 0}
+
+
+@pytest.mark.parametrize('task, draw, seed, expected', [
+    (Trial, tabletop_scene.draw, 4, {'object_0'}), (Trial, tabletop_scene.draw, 9, {'object_0'}),
+    (DrinkTrial, kitchen_scene.draw, 3, {'fridge', 'drink_0'})])
+def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expected):
+    world = WatchedWorld()
+    done = rehearse(draw(seed, benign=True), world, task)
+    assert done.success, (done.failed, done.reason, done.why)
+    assert len(world.movable()) > 1 and world.touched == expected
+    world.close()
