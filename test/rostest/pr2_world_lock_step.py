@@ -146,6 +146,16 @@ class Pr2World(unittest.TestCase):
         self.assertEqual(len({each.header.frame_id for each in (colour, info, depth, cloud)}), 1)
         self.assertFalse([each for each in topics[1].messages if each.header.stamp != second.stamp])
 
+    def test_who_comes_late_learns_how_the_robot_stands_though_nothing_moves(self) -> None:
+        states = Heard('joint_states', JointState)
+        buffer = tf2_ros.Buffer()
+        listener = tf2_ros.TransformListener(buffer)
+        self.assertTrue(wait_for(lambda: states.messages, LIMIT_S))
+        self.assertTrue(wait_for(lambda: buffer.can_transform('odom_combined', 'r_gripper_tool_frame', rospy.Time()),
+                                 LIMIT_S))
+        states.subscriber.unregister()
+        listener.unregister()
+
     def test_tf_takes_odometry_to_every_link_of_the_description(self) -> None:
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)

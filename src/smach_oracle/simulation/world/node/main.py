@@ -59,7 +59,7 @@ class WorldNode:
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
-        self._state = StatePublisher(publish_description(), list(self._world.joints()))
+        self._state = StatePublisher(publish_description(), list(self._world.joints()), settings.lock_step)
         self._camera = CameraPublisher()
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
         self._state_due = self._frame_due = 0.0

@@ -31,11 +31,14 @@ def publish_description() -> str:
 class StatePublisher:
     """Topics joint_states, /tf and, once, /tf_static."""
 
-    def __init__(self, urdf: str, joints: List[str]) -> None:
-        """`joints`: those that have encoders; the others of the URDF (the wheels') count as fixed."""
+    def __init__(self, urdf: str, joints: List[str], latch: bool) -> None:
+        """
+        :param joints: those that have encoders; the others of the URDF (the wheels') count as fixed.
+        :param latch: who comes late is told how things stand: a world that stands still has nothing new to tell.
+        """
         self._tree = TransformTree(urdf, joints)
-        self._states = rospy.Publisher('joint_states', JointState, queue_size=100, tcp_nodelay=True)
-        self._moving = rospy.Publisher('/tf', TFMessage, queue_size=100, tcp_nodelay=True)
+        self._states = rospy.Publisher('joint_states', JointState, queue_size=100, tcp_nodelay=True, latch=latch)
+        self._moving = rospy.Publisher('/tf', TFMessage, queue_size=100, tcp_nodelay=True, latch=latch)
         self._fixed = rospy.Publisher('/tf_static', TFMessage, queue_size=10, latch=True)
         self._fixed_told = False
 
