@@ -62,6 +62,8 @@ class JoyTeleoperation(unittest.TestCase):
 
     def test_each_axis_moves_the_hand_its_own_way(self):
         self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])  # from the stretched arm of another test
+        self.push([0] * 6, [0, 0])
+        self.stopped_after()
         for axis in (0, 1, 2):
             before = self.ann.tool()
             self.push_until_it_moves([0.5 if each == axis else 0.04 for each in range(6)], [1, 0])
