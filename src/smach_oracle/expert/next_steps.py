@@ -1,19 +1,15 @@
 """What a robot does after an answer, from its oracle/events."""
 import queue
-import threading
 import time
 from typing import Iterator
 
-import rosgraph
-import rosgraph.names
-import rospy
-
 from smach_oracle.msg import OracleEvent
+
+from .listening import RobotListener
 
 _TOLD = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP, OracleEvent.INTERFACE_START,
          OracleEvent.WARNING, OracleEvent.STATE_START, OracleEvent.TRIAL_END)
 _LAST = (OracleEvent.STATE_START, OracleEvent.TRIAL_END, OracleEvent.INTERFACE_START)
-_MASTER_PERIOD_S = 0.5
 
 
 class NextSteps:
@@ -23,10 +19,7 @@ class NextSteps:
         """`robot`: the node's name; its events are on <robot>/oracle/events."""
         self._trial_id = trial_id
         self._events: 'queue.Queue[OracleEvent]' = queue.Queue(1000)
-        self._stopped = threading.Event()
-        if robot and rosgraph.names.is_legal_name(robot):  # anybody may put a question, under any name
-            threading.Thread(target=self._listen, args=(robot + '/oracle/events',), name='next steps',
-                             daemon=True).start()
+        self._listener = RobotListener(robot, '/oracle/events', OracleEvent, self._take)
 
     def follow(self, timeout_s: float = 3.0) -> Iterator[OracleEvent]:
         """The events from the answer to the next state that runs, at most for the time given."""
@@ -47,17 +40,7 @@ class NextSteps:
 
     def stop(self) -> None:
         """Listen no longer."""
-        self._stopped.set()
-
-    def _listen(self, topic: str) -> None:
-        """Aside, and not before the master is there: until then rospy would not come back from subscribing, and would
-        hold a lock without which the node cannot even shut down."""
-        while not rosgraph.is_master_online():
-            if self._stopped.wait(_MASTER_PERIOD_S):
-                return
-        subscriber = rospy.Subscriber(topic, OracleEvent, self._take, queue_size=100, tcp_nodelay=True)
-        self._stopped.wait()
-        subscriber.unregister()
+        self._listener.stop()
 
     def _take(self, event: OracleEvent) -> None:
         if event.trial_id == self._trial_id and event.kind in _TOLD and not self._events.full():

@@ -18,6 +18,14 @@ _LOOK_PERIOD_S = 0.2
 _STYLE = Style.from_dict({'bottom-toolbar': 'noreverse bg:#303030 #e0e0e0', 'prompt': 'bold'})
 
 
+class Leave(Exception):
+    """The expert is done with this question."""
+
+
+class Quit(Exception):
+    """The expert is done for today."""
+
+
 class Interrupted(Exception):
     """The prompt ended because what it asked about is over; the text says why."""
 

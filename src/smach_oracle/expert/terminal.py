@@ -20,23 +20,17 @@ from .front_end import FrontEnd, wait_for_question
 from .interface_talk import InterfaceTalk
 from .next_steps import NextSteps
 from .options import Option, choose, options
-from .prompts import Choice, Interrupted, JsonValidator, Prompts
+from .prompts import Choice, Interrupted, JsonValidator, Leave, Prompts, Quit
 from .running_interface import RunningInterface
+from .standing import StandingPreconditions
 from .terminal_start import parse, wait_for_master
 from .text import clean, duration
 
 _COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'), ('t', 'take it over from who holds it'),
-                           ('r', 'show the question again'), ('q', 'quit')]
+                           ('p', 'show how the preconditions stand now'), ('r', 'show the question again'),
+                           ('q', 'quit')]
 _FIRST_LIST_S = 1.0
 _RETURN_S = 20.0  # how long a server may take to come back, and its robots to ask it again
-
-
-class Leave(Exception):
-    """The expert is done with this question."""
-
-
-class Quit(Exception):
-    """The expert is done for today."""
 
 
 class Terminal:
@@ -44,9 +38,12 @@ class Terminal:
 
     def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
                  next_steps: Callable[[str, str], NextSteps] = NextSteps,
-                 interface: Callable[[Listed, str], RunningInterface] = RunningInterface) -> None:
+                 interface: Callable[[Listed, str], RunningInterface] = RunningInterface,
+                 standing: Callable[[str, str], StandingPreconditions] = StandingPreconditions) -> None:
         self._next_steps = next_steps
         self._interface = interface
+        self._standing = standing
+        self._stands: Optional[StandingPreconditions] = None
         self._front_end = front_end
         self._console = console
         self._prompts = prompts
@@ -109,6 +106,7 @@ class Terminal:
         """Claim, show and answer one question."""
         self._missing_since_s = math.inf
         steps = self._next_steps(listed.goal.robot, listed.goal.trial_id)
+        self._stands = self._standing(listed.goal.robot, listed.goal.query_id)
         try:
             self._claim_first(listed)
             self._console.rule(style='dim')
@@ -122,6 +120,7 @@ class Terminal:
         finally:
             self._front_end.release(listed)
             steps.stop()
+            self._stands.stop()
 
     def _claim_first(self, listed: Listed) -> None:
         """Claim it, if that can be done now: otherwise it is claimed while the expert reads (`_look`)."""
@@ -159,9 +158,12 @@ class Terminal:
             raise Leave
         if line == 't':
             self._claim(listed, take_over=True)
+        elif line == 'p' and self._stands is not None:
+            for text, style in self._stands.lines() or [('  The robot tells nothing of them.', 'dim')]:
+                self._say(text, style)
         elif line == 'r':
             self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
-        return line in ('', 't', 'r')
+        return line in ('', 't', 'p', 'r')
 
     def _decide(self, listed: Listed, option: Option) -> Optional[ExpertDecision]:
         """The decision with its outputs and reason; None where Ctrl-C went back."""

@@ -15,8 +15,9 @@ import rospy
 from smach_oracle.expert import terminal
 from smach_oracle.expert.followed_server import Listed, ServerGoneError
 from smach_oracle.expert.prompts import Interrupted, JsonValidator, Prompts, ValidationError
+from smach_oracle.expert.standing import StandingPreconditions
 from smach_oracle.expert.terminal import Terminal
-from smach_oracle.msg import ExpertDecision, OpenQuery, OracleEvent
+from smach_oracle.msg import ExpertDecision, OpenQuery, OracleEvent, PreconditionCheck, PreconditionChecks
 from smach_oracle.oracle.question import InterfaceOffer
 from smach_oracle.ros.question_messages import to_goal
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
@@ -103,6 +104,19 @@ class FakeSteps:
         pass
 
 
+class FakeStanding(StandingPreconditions):
+    """The robot has looked once at this question."""
+
+    def __init__(self, robot, query_id):
+        super().__init__('', query_id)
+        looked = [PreconditionCheck('PICK', 'view_is_clear', PreconditionCheck.DOES_NOT_HOLD, 'it\x1b[31m is dark', 1.0),
+                  PreconditionCheck('PICK', 'DETECT', PreconditionCheck.UNKNOWN, 'only running it would tell', -1.0),
+                  PreconditionCheck('PLACE', 'free', PreconditionCheck.HOLDS, 'yes', 65.0)]
+        self.take(PreconditionChecks(query_id='another', checks=[]))
+        if query_id == 'q1':
+            self.take(PreconditionChecks(query_id=query_id, checks=looked))
+
+
 def goal(query_id='q1', **changes):
     return to_goal(make_question(query_id, **changes), '/robot', rospy.Time(1))
 
@@ -114,8 +128,16 @@ def converse(front_end, typed, meanwhile=None, steps=FakeSteps, after_s=0.8):
         keys.send_text(typed)
         if meanwhile is not None:
             threading.Timer(after_s, meanwhile, [keys]).start()
-        Terminal(front_end, console, Prompts(keys, DummyOutput()), steps).run()
+        Terminal(front_end, console, Prompts(keys, DummyOutput()), steps, standing=FakeStanding).run()
     return console.file.getvalue()
+
+
+def test_how_the_preconditions_stand_now_is_told_on_request():
+    shown = converse(FakeFrontEnd(goal()), 'p' + ENTER + 'q' + ENTER)
+    assert '✗ view_is_clear of PICK does not hold (1 s ago): it' in shown and '\x1b[31m is dark' not in shown
+    assert '? DETECT of PICK unknown: only running it would tell' in shown
+    assert '✓ free of PLACE holds (1:05' in shown
+    assert 'The robot tells nothing of them.' in converse(FakeFrontEnd(goal('q2')), 'p' + ENTER + 'q' + ENTER)
 
 
 def test_an_answer_by_number_is_sent_with_its_reason_and_what_followed_is_told():
