@@ -52,7 +52,7 @@ def test_no_subsystem_of_the_robot_can_read_the_truth_of_the_world():
         assert not wrong, '{} imports {}'.format(shown(path), wrong)
 
 
-@pytest.mark.parametrize('room', ['oracle', 'ros', 'tasks', 'simulation/robot'])
+@pytest.mark.parametrize('room', ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'simulation/robot'])
 def test_neither_executive_nor_task_nor_subsystem_asks_for_the_truth_or_its_causes(room):
     for path in python_files('src/smach_oracle/' + room):
         found = re.findall(r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',

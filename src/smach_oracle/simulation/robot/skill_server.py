@@ -59,7 +59,8 @@ class SkillServer:
             self._resume()
             if server.is_preempt_requested():
                 self._running = ''
-                server.set_preempted(result)
+                result.reason = 'cancelled before it began'
+                server.set_preempted(result, result.reason)
                 return
             try:
                 server_result = handler(goal, say)
