@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Many robots, each a process of its own: their WORK fails, and each goes where it is sent, and tells where that was."""
+"""Many robots, each a process of its own: their WORK fails, each goes where it is sent, and tells where that was."""
 import os
 import signal
 import sys

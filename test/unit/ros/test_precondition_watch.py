@@ -1,0 +1,120 @@
+"""Preconditions are looked at while somebody listens; what raises or hangs is told, and nobody waits for it."""
+import sys
+import threading
+import time
+
+import pytest
+import rospy
+from waiting import wait_for
+
+from smach_oracle.msg import PreconditionCheck
+from smach_oracle.oracle.question import Look, Standing
+from smach_oracle.ros import precondition_watch
+from smach_oracle.ros.precondition_watch import PreconditionWatch
+
+
+class FakePublisher:
+    """Keeps what is published; listeners as a test wants them."""
+
+    def __init__(self, *_, **__):
+        self.sent = []
+        self.listeners = 1
+
+    def publish(self, message):
+        self.sent.append(message)
+
+    def get_num_connections(self):
+        return self.listeners
+
+
+class FakeLook(Look):
+    """Calls functions by their names."""
+
+    def __init__(self, **functions):
+        self.names = tuple(('PICK', name) for name in functions)
+        self.called = []
+        self._functions = list(functions.values())
+
+    def look(self, number):
+        self.called.append(number)
+        return self._functions[number]()
+
+
+class FakeQuestion:
+    """As much of one as is needed."""
+
+    def __init__(self, look):
+        self.preconditions = look
+        self.query_id = 'q1'
+
+
+@pytest.fixture
+def watch(monkeypatch):
+    monkeypatch.setattr(precondition_watch.rospy, 'Publisher', FakePublisher)
+    monkeypatch.setattr(precondition_watch.rospy, 'get_rostime', lambda: rospy.Time(1))
+    for name in ('PERIOD_S', 'PATIENCE_S', 'LISTENER_PERIOD_S'):
+        monkeypatch.setattr(precondition_watch, name, 0.05)
+    return PreconditionWatch()
+
+
+def sent(watch):
+    return watch._publisher.sent
+
+
+def holds():
+    return Standing(True, 'it does')
+
+
+def test_they_are_looked_at_again_and_again_until_the_question_is_over(watch):
+    found = [Standing(False, 'not yet')]
+    look = FakeLook(free=lambda: found[-1])
+    with watch.over(FakeQuestion(look)):
+        assert wait_for(lambda: sent(watch))
+        assert [(each.state, each.name, each.result, each.text) for each in sent(watch)[0].checks] == [
+            ('PICK', 'free', PreconditionCheck.DOES_NOT_HOLD, 'not yet')]
+        assert sent(watch)[0].query_id == 'q1' and 0.0 <= sent(watch)[0].checks[0].age < 10.0
+        found.append(holds())
+        assert wait_for(lambda: sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)
+    time.sleep(0.2)
+    told = len(sent(watch))
+    time.sleep(0.2)
+    assert len(sent(watch)) == told
+
+
+def test_nobody_looks_where_nobody_listens(watch):
+    watch._publisher.listeners = 0
+    look = FakeLook(free=holds)
+    with watch.over(FakeQuestion(look)):
+        time.sleep(0.2)
+        assert not look.called
+        watch._publisher.listeners = 1
+        assert wait_for(lambda: sent(watch))
+
+
+def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(watch):
+    never = threading.Event()
+    look = FakeLook(door=never.wait, free=holds)
+    began_s = time.monotonic()
+    with watch.over(FakeQuestion(look)):
+        assert wait_for(lambda: len(sent(watch)) > 2)
+        door, free = sent(watch)[-1].checks
+        assert door.result == PreconditionCheck.UNKNOWN and 'has not come back for' in door.text and door.age == -1.0
+        assert free.result == PreconditionCheck.HOLDS
+        left_s = time.monotonic()
+    assert time.monotonic() - left_s < 0.5, 'the answer does not wait for it'
+    assert look.called.count(0) == 1 and time.monotonic() - began_s < 15.0
+    never.set()
+
+
+def test_what_leaves_the_program_does_not(watch):
+    with watch.over(FakeQuestion(FakeLook(quits=lambda: sys.exit(3), free=holds))):
+        assert wait_for(lambda: sent(watch))
+        assert 'raised SystemExit(3)' in sent(watch)[0].checks[0].text
+        assert sent(watch)[0].checks[1].result == PreconditionCheck.HOLDS
+
+
+@pytest.mark.parametrize('look', [None, FakeLook()])
+def test_a_question_without_any_starts_nothing(watch, look):
+    before = threading.active_count()
+    with watch.over(FakeQuestion(look)):
+        assert threading.active_count() == before
