@@ -161,7 +161,10 @@ class TheHand(unittest.TestCase):
         return newest.twist.linear.x if newest.dead_man else None
 
     def test_4_a_gamepad_moves_the_hand_while_its_shoulder_button_is_held(self):
+        self.assert_stops(lambda: self.pad(mapping=''))  # its axes might be any
+        self.assertTrue(self.browser.says('fake has a layout that this browser does not know', '.hint'))
         self.assert_stops(lambda: self.pad(held=False))  # a stick alone moves nothing
+        self.assertTrue(self.browser.says('fake moves while a shoulder button is held', '.hint'))
         self.pad()
         self.assertTrue(self.moves())
         fast = self.pushed()

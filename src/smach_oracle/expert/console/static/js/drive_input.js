@@ -96,8 +96,9 @@ export class DriveInput {
   }
 
   pad(wish) {
-    const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((each) => each && each.connected && each.mapping === 'standard');
-    this.gamepad = pad ? pad.id : '';
+    const pads = [...(navigator.getGamepads ? navigator.getGamepads() : [])].filter((each) => each && each.connected);
+    const pad = pads.find((each) => each.mapping === 'standard');
+    this.gamepad = pad ? pad.id + ' moves while a shoulder button is held.' : pads.length ? pads[0].id + ' has a layout that this browser does not know: it moves nothing.' : '';
     if (!pad || !HOLD_BUTTONS.some((index) => pad.buttons[index] && pad.buttons[index].pressed)) this.padSpent = !pad;
     else if (!this.padSpent) return this.readPad(pad, wish);
     return false;

@@ -29,9 +29,11 @@ export class HandPanel {
     this.light = h('div', { class: 'drive-light' });
     this.facts = h('dl', { class: 'drive-facts' });
     this.camera = h('div', { class: 'drive-camera' });
+    this.hint = h('p', { class: 'dim hint' });
     this.root = this.build();
     this.showScale();
     this.choose(this.frame);
+    this.showHeld(this.input.read());
     this.timer = setInterval(() => this.beat(), PERIOD_MS);
     this.update();
   }
@@ -46,7 +48,7 @@ export class HandPanel {
           h('label', { class: 'row' }, h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
           h('h4', {}, TITLES.linear), group('linear'), h('h4', {}, TITLES.angular), group('angular'),
           h('h4', {}, 'Gripper'), h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' }, this.pads.get('open'), this.pads.get('close')),
-          h('p', { class: 'dim hint' }, 'Hold to move, let go to stop. A gamepad moves while a shoulder button is held.'))));
+          this.hint)));
   }
 
   pad(name) {
@@ -139,6 +141,7 @@ export class HandPanel {
   }
 
   showHeld(wish) {
+    setText(this.hint, 'Hold to move, let go to stop. ' + (this.input.gamepad || (navigator.getGamepads ? 'A gamepad moves while a shoulder button is held.' : '')));
     for (const [name, button] of this.pads) button.classList.toggle('held', wish.moves.has(name));
     this.root.classList.toggle('driving', wish.held);
   }
