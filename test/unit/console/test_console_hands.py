@@ -1,11 +1,14 @@
 """A hand as the console drives it: arms, frames, and no more commands than a world in lock-step can take."""
+import time
+
 import pytest
 import rospy
 
 from smach_oracle.expert.console import hands
 from smach_oracle.expert.console.audit import Person
 from smach_oracle.expert.console.commands import Command
-from smach_oracle.expert.console.wheel import Drive
+from smach_oracle.expert.console.sections import Sections
+from smach_oracle.expert.console.wheel import SILENT_S, Drive
 from smach_oracle.msg import TeleopState
 
 ARMS = {'left': {'tool': 'l_tool'}, 'right': {'tool': 'r_tool'}}
@@ -24,6 +27,12 @@ class Silent:
 
     def tell(self, *_):
         """Nobody listens."""
+
+
+class NoQuestions:
+
+    def questions(self):
+        return []
 
 
 @pytest.fixture(name='make')
@@ -89,3 +98,16 @@ def test_a_world_of_its_own_pace_gets_them_all(make):
     for _ in range(5):
         drive(made)
     assert len(sent) == 5
+
+
+def test_a_page_that_has_fallen_silent_loses_the_wheel_and_the_hand_stands(make, monkeypatch):
+    made, hand, sent = make()
+    drive(made)
+    made._sections, made._front_end = Sections(), NoQuestions()
+    made.draw()
+    assert hand.wheel.drive is not None, 'it has just been heard'
+    begun_s = time.monotonic()
+    monkeypatch.setattr(time, 'monotonic', lambda: begun_s + SILENT_S + 0.1)
+    made.draw()
+    assert hand.wheel.drive is None and not sent[-1].dead_man
+    assert drive(made).message == hands.TAKE_FIRST
