@@ -251,13 +251,14 @@ class Drive(unittest.TestCase):
 
     def test_5_the_hand_slows_before_what_the_robot_knows_to_be_there(self):
         self.take_the_wheel()
+        self.assertTrue(self.browser.says('no collision map', '[data-fact=around]'))
         self.browser.click('[data-frame=base]')
         below = self.stands('right')[:3, 3] - [0.0, 0.0, 0.2]
         boxes = rospy.Publisher('collision_map', CollisionBoxes, queue_size=1, latch=True)
         boxes.publish(CollisionBoxes(Header(frame_id=BASE), 'map', ['table'], [Pose(
             Point(*below), Quaternion(0, 0, 0, 1))], [Vector3(0.6, 0.6, 0.04)]))
         self.addCleanup(boxes.publish, CollisionBoxes(Header(frame_id=BASE), '', [], [], []))
-        self.assertTrue(wait_for(boxes.get_num_connections))
+        self.assertTrue(self.browser.says('1 box', '[data-fact=around]'))
         self.key('f', True)
         self.assertTrue(wait_for(lambda: 'table' in self.robot.states[-1].limit), self.robot.states[-1])
         self.assertTrue(self.browser.says('table', '.drive-light'), 'the page says what slows it')

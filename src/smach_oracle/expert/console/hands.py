@@ -10,7 +10,7 @@ import rospy
 from geometry_msgs.msg import Twist, Vector3
 from std_msgs.msg import Header
 
-from smach_oracle.msg import SharedAutonomyActionResult, TeleopCommand, TeleopState
+from smach_oracle.msg import CollisionBoxes, SharedAutonomyActionResult, TeleopCommand, TeleopState
 
 from ..followed_server import Listed
 from ..front_end import FrontEnd
@@ -47,10 +47,16 @@ class Hand:
         self._angular = float(rospy.get_param(action + '/limits/angular', 1.0))
         self._open = float(rospy.get_param(action + '/gripper_open', 0.08))
         self._publisher = rospy.Publisher(action + '/command', TeleopCommand, queue_size=2, tcp_nodelay=True)
-        self._subscriber = rospy.Subscriber(action + '/state', TeleopState, self._take, queue_size=2, tcp_nodelay=True)
+        self.boxes: Optional[int] = None  # that the robot's collision map has; None: there is no map
+        self._subscribers = [
+            rospy.Subscriber(action + '/state', TeleopState, self._take, queue_size=2, tcp_nodelay=True),
+            rospy.Subscriber(rosgraph.names.namespace(action) + 'collision_map', CollisionBoxes, self._map)]
 
     def _take(self, state: TeleopState) -> None:
         self.state = state
+
+    def _map(self, message: CollisionBoxes) -> None:
+        self.boxes = len(message.names)
 
     def busy(self, operator: str) -> bool:
         """Whether a world in lock-step has not carried out the last command yet: more would wait, and move the hand
@@ -92,7 +98,8 @@ class Hand:
     def stop(self) -> None:
         """Take the topics down."""
         self._publisher.unregister()
-        self._subscriber.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
 
 class Hands:
@@ -212,7 +219,7 @@ def _operator(drive: Drive) -> str:
 
 def _view(hand: Hand) -> Dict[str, Any]:
     state, drive = hand.state, hand.wheel.drive
-    view: Dict[str, Any] = {'frames': sorted(hand.frames(hand.arm)), 'arms': hand.arms,
+    view: Dict[str, Any] = {'frames': sorted(hand.frames(hand.arm)), 'arms': hand.arms, 'boxes': hand.boxes,
                             'wheel': drive.browser if drive else None, 'driver': drive.person.expert if drive else ''}
     if state is not None:
         at, way = state.tool_pose.position, state.achieved.linear

@@ -170,6 +170,7 @@ export class HandPanel {
     this.light.dataset.kind = !state ? '' : state.refused ? 'bad' : state.limit ? 'warn' : state.moving ? 'good' : '';
     const facts = state ? [['Speed', (state.speed === null ? '–' : Math.round(1000 * state.speed) + ' mm/s') + (state.moving && state.share !== null ? ', ' + Math.round(100 * state.share) + ' % of what is asked' : '')],
       ['Clearance', state.clearance === null ? 'nothing known is near' : (100 * state.clearance).toFixed(1) + ' cm'],
+      ['Around', this.view.boxes ? this.view.boxes + (this.view.boxes === 1 ? ' box' : ' boxes') + ' in its collision map' : 'no collision map: only its own body slows the hand'],
       ['Gripper', state.gripper === null ? 'not moved yet' : (1000 * state.gripper).toFixed(0) + ' mm' + (state.stalled ? ', holds something' : '')],
       ['Tool at', (this.view.arms.length > 1 ? state.arm + ': ' : '') + state.at.map((value, axis) => 'xyz'[axis] + ' ' + (value === null ? '–' : value.toFixed(3))).join('  ')]] : [];
     const key = JSON.stringify(facts);
