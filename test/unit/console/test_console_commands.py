@@ -3,7 +3,8 @@ import json
 
 import pytest
 
-from smach_oracle.expert.console.commands import COMMANDS, MOST_BYTES, BadCommand, Output, needed_role, parse
+from smach_oracle.expert.console.checks import Output
+from smach_oracle.expert.console.commands import COMMANDS, MOST_BYTES, BadCommand, needed_role, parse
 
 
 def text(**fields):
@@ -62,7 +63,8 @@ def test_what_is_left_out_is_empty():
     text(**dict(MARK, service='/shutdown')), text(**dict(MARK, action='/perception_interface')),
     text(do='use_frame', question='q'), text(do='use_frame', question='q', frame='/camera'),
     text(do='hand_over', question='q'), text(do='hand_over', question='q', outcome=''),
-    text(do='hand_over', question='q', outcome='done', outputs=[]), text(do='give_up_interface'),
+    text(do='hand_over', question='q', outcome='done', outputs=[{'key': 'a'}]), text(do='give_up_interface'),
+    text(do='give_up_interface', question='q', outputs=[]),
     text(do='hello', xsrf='x', expert='\u202egro.live'), text(do='hello', xsrf='', expert='ann'),
     text(do='hello', xsrf='x', expert='a' * 61)])
 def test_anything_else_is_refused_with_a_reason(message):

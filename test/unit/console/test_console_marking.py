@@ -18,6 +18,7 @@ from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.followed_server import Listed
 from smach_oracle.msg import ExpertQueryGoal, InterfaceOffer
 from smach_oracle.ros.images import cloud_message, mask_image
+from smach_oracle.ros.userdata_codec import decode_all
 from smach_oracle.srv import (FinishInterfaceResponse, GiveUpInterfaceResponse, SegmentObjectResponse,
                               UseFrameRequest, UseFrameResponse)
 
@@ -78,11 +79,13 @@ def test_a_mark_reaches_the_interface_and_its_refusal_the_page():
 def test_frames_handing_over_and_giving_up():
     calls = Calls()
     assert carry_out('use_frame', calls, frame='fresh').ok
-    assert not carry_out('hand_over', calls, outcome='done', why='seen').ok
+    assert not carry_out('hand_over', calls, outcome='done', why='seen', outputs=[{'key': 'fits', 'value': [True]}]).ok
     assert carry_out('give_up_interface', calls).ok
     assert [name for name, _ in calls] == ['/alpha/perception/' + each for each in ('use_frame', 'finish', 'give_up')]
     assert calls[0][1].frame == UseFrameRequest.FRESH
     assert (calls[1][1].outcome, calls[1][1].text, calls[2][1].text) == ('done', 'ann: seen', 'by ann')
+    assert [calls[1][1].query_id, calls[2][1].query_id] == ['q', 'q'], 'a late one ends no other'
+    assert decode_all(calls[1][1].outputs) == {'fits': [True]}
 
 
 def test_the_page_is_told_of_the_mask_the_place_and_the_size():

@@ -8,7 +8,7 @@ from geometry_msgs.msg import PointStamped
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
 from smach_oracle.expert.console import robots, sessions
-from smach_oracle.expert.console.commands import Output
+from smach_oracle.expert.console.checks import Output
 from smach_oracle.expert.console.desk import BadOutput, items
 from smach_oracle.expert.console.helped import Score
 from smach_oracle.expert.console.robot import Robot

@@ -4,17 +4,14 @@ A command is a JSON object {"id": number, "do": name, ...arguments}. No argument
 or a type to call: questions are named by their keys, and must be open ones.
 """
 import json
-import math
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, Dict, NamedTuple
 
 from ...oracle.errors import OracleError
-from .checks import QUESTION, Spec, one_of, shown, text
+from .checks import QUESTION, Spec, one_of, outputs, shown, text
 from .eye_commands import EYE_COMMANDS
 from .hand_commands import HAND_COMMANDS
 
 MOST_BYTES = 65536
-_MOST_OUTPUTS = 64
-_DEEPEST = 32
 KINDS = ('goto', 'supersede', 'give_up', 'interface')
 
 
@@ -24,14 +21,6 @@ class BadCommand(OracleError):
     def __init__(self, text: str, number: int = 0) -> None:
         super().__init__(text)
         self.number = number
-
-
-class Output(NamedTuple):
-    """A value for the userdata, as typed by a person."""
-
-    key: str
-    value: Any  # plain data
-    type: str  # '' for plain data, else the ROS message type that the value spells out
 
 
 class Command(NamedTuple):
@@ -95,36 +84,6 @@ def _person(value: Any) -> str:
     return name
 
 
-def _outputs(value: Any) -> List[Output]:
-    if value is None:
-        return []
-    if not isinstance(value, list) or len(value) > _MOST_OUTPUTS:
-        raise ValueError('"outputs" is a list of at most {} values'.format(_MOST_OUTPUTS))
-    outputs = [_output(each) for each in value]
-    if len({output.key for output in outputs}) < len(outputs):
-        raise ValueError('an output comes twice')
-    return outputs
-
-
-def _output(value: Any) -> Output:
-    if not isinstance(value, dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
-        raise ValueError('an output is {"key": ..., "value": ..., "type": ...}')
-    _check_depth(value['value'])
-    return Output(text(200, 1)(value['key']), value['value'], text(200)(value.get('type')))
-
-
-def _check_depth(value: Any) -> None:
-    waiting = [(value, 0)]
-    while waiting:
-        item, depth = waiting.pop()
-        if depth > _DEEPEST:
-            raise ValueError('an output is nested deeper than {}'.format(_DEEPEST))
-        if isinstance(item, float) and not math.isfinite(item):
-            raise ValueError('an output holds a number that is too large')
-        children = item.values() if isinstance(item, dict) else item if isinstance(item, list) else ()
-        waiting += [(child, depth + 1) for child in children]
-
-
 def _is_count(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 < value < 2 ** 53
 
@@ -135,7 +94,7 @@ COMMANDS: Dict[str, Spec] = {
     'claim': Spec('operator', QUESTION),
     'take_over': Spec('operator', QUESTION),
     'release': Spec('operator', QUESTION),
-    'answer': Spec('operator', dict(QUESTION, kind=one_of(KINDS), name=text(400), outputs=_outputs,
+    'answer': Spec('operator', dict(QUESTION, kind=one_of(KINDS), name=text(400), outputs=outputs,
                                     why=text(2000))),
     **EYE_COMMANDS,
     **HAND_COMMANDS,

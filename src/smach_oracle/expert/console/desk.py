@@ -15,7 +15,8 @@ from ...ros.userdata_codec import encode
 from ..followed_server import Listed, ServerGoneError
 from ..front_end import LEASE_S, FrontEnd
 from .audit import Audit, Person
-from .commands import KINDS, Command, Output
+from .checks import Output
+from .commands import KINDS, Command
 
 _RENEW_PERIOD_S = LEASE_S / 3.0
 _KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,

@@ -5,7 +5,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
 import genpy
 
-from .checks import QUESTION, Spec, one_of, shown, text
+from .checks import QUESTION, Spec, one_of, outputs, shown, text
 
 AT_GOAL, FRESH = 'at_goal', 'fresh'
 MOST_CORNERS = 2000
@@ -73,6 +73,6 @@ def _stamp(value: Any) -> genpy.Time:
 EYE_COMMANDS: Dict[str, Spec] = {
     'mark': Spec('operator', dict(QUESTION, stamp=_stamp, region=_points(3, MOST_CORNERS), strokes=_strokes)),
     'use_frame': Spec('operator', dict(QUESTION, frame=one_of((AT_GOAL, FRESH)))),
-    'hand_over': Spec('operator', dict(QUESTION, outcome=text(400, 1), why=text(2000))),
+    'hand_over': Spec('operator', dict(QUESTION, outcome=text(400, 1), outputs=outputs, why=text(2000))),
     'give_up_interface': Spec('operator', dict(QUESTION, why=text(2000))),
 }

@@ -9,7 +9,7 @@ import rosgraph.names
 from geometry_msgs.msg import Point32, Polygon
 from sensor_msgs.msg import PointCloud2
 
-from smach_oracle.msg import SegmentStroke
+from smach_oracle.msg import ExpertQueryGoal, SegmentStroke
 from smach_oracle.srv import (FinishInterface, FinishInterfaceRequest, GiveUpInterface, GiveUpInterfaceRequest,
                               SegmentObject, SegmentObjectRequest, SegmentObjectResponse, UseFrame, UseFrameRequest)
 
@@ -18,7 +18,7 @@ from ..followed_server import Listed, call_service
 from .audit import Person
 from .clouds import Cloud, CloudError, encode_points, thinned
 from .commands import Command
-from .desk import Reply, Worker
+from .desk import Reply, Worker, items
 from .eye_commands import FRESH
 
 FRAME_LIMIT_S = 15.0
@@ -54,7 +54,7 @@ class PerceptionDesk:
         if not action or not self._known(action):
             return Reply(False, NOT_RUNNING)
         work = getattr(self, '_' + command.name)
-        return work(action, command.arguments, person, listed.goal.query_id)  # type: ignore[no-any-return]
+        return work(action, command.arguments, person, listed.goal)  # type: ignore[no-any-return]
 
     def _mark(self, action: str, said: Dict[str, Any], *_: Any) -> Reply:
         request = SegmentObjectRequest(stamp=said['stamp'], polygon=Polygon(_corners(said['region'])), strokes=[
@@ -67,13 +67,14 @@ class PerceptionDesk:
         answer = self._call(action + '/use_frame', UseFrame, UseFrameRequest(which), FRAME_LIMIT_S)
         return Reply(answer.ok, answer.message)
 
-    def _hand_over(self, action: str, said: Dict[str, Any], person: Person, query_id: str) -> Reply:
-        request = FinishInterfaceRequest(outcome=said['outcome'], text=_record(person, said['why']), query_id=query_id)
+    def _hand_over(self, action: str, said: Dict[str, Any], person: Person, goal: ExpertQueryGoal) -> Reply:
+        request = FinishInterfaceRequest(said['outcome'], items(said['outputs'], goal), _record(person, said['why']),
+                                         goal.query_id)
         answer = self._call(action + '/finish', FinishInterface, request)
         return Reply(answer.ok, answer.message)
 
-    def _give_up_interface(self, action: str, said: Dict[str, Any], person: Person, query_id: str) -> Reply:
-        request = GiveUpInterfaceRequest(_record(person, said['why']), query_id)
+    def _give_up_interface(self, action: str, said: Dict[str, Any], person: Person, goal: ExpertQueryGoal) -> Reply:
+        request = GiveUpInterfaceRequest(_record(person, said['why']), goal.query_id)
         answer = self._call(action + '/give_up', GiveUpInterface, request)
         return Reply(answer.ok, answer.message)
 

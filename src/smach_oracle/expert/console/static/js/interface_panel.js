@@ -2,6 +2,7 @@
 import { h, replace, setText } from './dom.js';
 import { HandPanel } from './hand_panel.js';
 import { Lost } from './link.js';
+import { OutputField } from './output_field.js';
 
 const SAYS = { starting: 'is being started…', running: 'was started for this question', failed: 'could not be used', stopped: 'is being stopped' };
 
@@ -15,9 +16,11 @@ export class InterfacePanel {
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outcome = h('select', { 'aria-label': 'Outcome' }, question.supersede.map((choice) => h('option', { value: choice.outcome, selected: choice.outcome === 'succeeded' }, choice.outcome + ' → ' + choice.target)));
     this.why = h('input', { type: 'text', maxlength: 2000, placeholder: 'For the record (optional)', 'aria-label': 'For the record' });
-    this.finish = h('button', { class: 'primary finish', onclick: () => this.settle('hand_over', { outcome: this.outcome.value, why: this.why.value }) }, 'Done: the work is finished');
+    this.outputs = question.outputs.map((key) => new OutputField(key, question.userdata.find((item) => item.key === key), () => setText(this.problem, '')));
+    this.finish = h('button', { class: 'primary finish', onclick: () => this.handOver() }, 'Done: the work is finished');
     this.quit = h('button', { class: 'quit', onclick: () => this.settle('give_up_interface', { why: this.why.value }) }, 'Give up');
-    this.end = h('section', { class: 'card interface-end' }, h('h3', {}, 'When ', question.state, ' is done'), h('label', { class: 'outcome-row' }, h('span', { class: 'dim' }, 'The state ends with'), this.outcome), this.why,
+    this.end = h('section', { class: 'card interface-end' }, h('h3', {}, 'When ', question.state, ' is done'), h('label', { class: 'outcome-row' }, h('span', { class: 'dim' }, 'The state ends with'), this.outcome),
+      this.outputs.length > 0 && h('details', { class: 'outputs' }, h('summary', {}, 'Output userdata that the interface cannot tell itself'), this.outputs.map((output) => output.root)), this.why,
       h('div', { class: 'row' }, this.finish, this.quit), this.problem);
     this.place = h('div', { class: 'hand-place' });
     this.root = h('div', { class: 'interface-panel' }, this.place, this.end, this.output);
@@ -52,6 +55,17 @@ export class InterfacePanel {
     this.shown = text;
     setText(this.lines, text);
     if (below) this.lines.scrollTop = this.lines.scrollHeight;
+  }
+
+  handOver() {
+    let outputs;
+    try {
+      outputs = this.outputs.map((output) => output.read()).filter(Boolean);
+    } catch (err) {
+      setText(this.problem, err.message);
+      return;
+    }
+    this.settle('hand_over', { outcome: this.outcome.value, outputs, why: this.why.value });
   }
 
   async settle(command, said) {
