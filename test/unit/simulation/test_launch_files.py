@@ -3,6 +3,8 @@ import pytest
 from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
 
+from smach_oracle.simulation.world.node.settings import read_settings
+
 PIECES = {'pr2_world', 'pr2_perception', 'pr2_manipulation', 'perception_interface', 'manipulation_interface',
           'scripted_operator'}
 
@@ -33,3 +35,12 @@ def test_where_people_answer_the_world_keeps_the_walls_time_unless_told_otherwis
     assert config.params['/pr2_world/task'].value == task
     assert config.params['/manipulation_interface/lock_step'].value is lock_step
     assert ('scripted_operator' in nodes(config)) == ('scripted_expert:=false' not in arguments)
+
+
+@pytest.mark.parametrize('factor', [0, 1])
+def test_the_rates_that_are_launched_are_those_of_the_node_unless_told_otherwise(factor):
+    rates = ['camera_rate', 'state_rate']
+    config = launched('pr2_world', 'real_time_factor:={}'.format(factor))
+    node = read_settings(lambda name, usual: factor if name == '~real_time_factor' else usual)
+    assert [config.params['/pr2_world/' + rate].value for rate in rates] == [getattr(node, rate) for rate in rates]
+    assert launched('pr2_world', 'camera_rate:=7').params['/pr2_world/camera_rate'].value == 7
