@@ -36,7 +36,7 @@ export class OutputField {
     this.input = this.name === 'boolean'
       ? h('select', given, h('option', { value: '' }, 'not set'), h('option', { value: 'true' }, 'true'), h('option', { value: 'false' }, 'false'))
       : h('textarea', Object.assign({ rows: 1, spellcheck: 'false', placeholder: this.kind.hint }, given));
-    this.root = h('label', { class: 'output' }, h('span', {}, key, h('span', { class: 'dim kind' }, ' ' + this.kind.says)), this.input);
+    this.root = h('label', { class: 'output-field' }, h('span', {}, key, h('span', { class: 'dim kind' }, ' ' + this.kind.says)), this.input);
   }
 
   ofMessages(type) {
