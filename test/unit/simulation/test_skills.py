@@ -72,6 +72,18 @@ def test_a_grasp_survives_a_shake_and_the_object_then_stands_where_it_was_to_be(
     assert is_aside(bench.robot.joints(), 'right')
 
 
+def test_what_cannot_be_put_down_there_stays_in_the_hand_and_the_reason_is_told(bench):
+    made = bench.map()
+    grasp = bench.pick(made.map_id)
+    for place, text in ((pose(2.5, 0.0, 0.79), 'there is nothing to stand on at x 2.50.* beyond its edge'),
+                        (pose(1.1, 0.55, 0.79), 'no way to put the object down at x 1.10.*out of reach'),
+                        (pose(*CARTON.position), 'no way to put the object down')):
+        with pytest.raises(SkillError, match=text):
+            bench.skills.place(PlaceGoal('right', place, grasp, made.map_id), say)
+        assert bench.world.holding('can') == 'right'
+    assert np.hypot(*(bench.world.body_pose('carton')[:2, 3] - CARTON.position[:2])) < 0.01
+
+
 def shake(bench):
     """Turn the wrist and the shoulder to and fro, four times a second."""
     names = ARM_JOINTS['right']
