@@ -18,7 +18,7 @@ ROOM = 0.12  # m, around where the nearest thing is moved to
 TARGET = 0  # the thing that stands nearest
 
 CHANCE = {'arm_in_view': 0.085, 'glare': 0.075, 'dim_light': 0.05, 'crowded': 0.03, 'slippery_object': 0.02,
-          'object_moved': 0.075, 'goal_occupied': 0.006, 'edge_of_reach': 0.005}
+          'object_moved': 0.075, 'goal_occupied': 0.012, 'edge_of_reach': 0.01}
 
 
 class Draft(NamedTuple):
