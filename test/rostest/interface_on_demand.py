@@ -68,27 +68,34 @@ class InterfaceOnDemand(unittest.TestCase):
         return Settings.from_dict({'interfaces': {'by_hand': entry}}).offers_for('', 'PICK')[0]
 
     def run_interface(self, offer, work):
-        """Run it while a person works in a thread; the answer."""
+        """Run it while a person works in a thread; the answer. Nobody waits on when the person has gone."""
         del self.told[:]
-        thread = threading.Thread(target=work)
+        gone = threading.Event()
+        thread = threading.Thread(target=self.at_work, args=(work, gone))
         thread.start()
         try:
             return self.client.run_interface(offer, make_question(self.id(), output_keys=('object_name',)),
-                                             threading.Event(), lambda *what: None)
+                                             gone, lambda *what: None)
         finally:
             thread.join()
 
+    @staticmethod
+    def at_work(work, gone):
+        if not work():
+            gone.set()
+
     def said(self, text):
-        return wait_for(lambda: any(text in line for told in list(self.told) for line in told.lines), 30.0)
+        return wait_for(lambda: any(text in line for told in list(self.told) for line in told.lines), 60.0)
 
     def finish(self):
-        """What a front end does: as soon as the interface has said that it is ready."""
+        """What a front end does: as soon as the interface has said that it is ready. Whether it has done so."""
         def finished():
             try:
                 return call_service('/by_hand/finish', FinishInterface, FinishInterfaceRequest(outcome='succeeded')).ok
             except ServerGoneError:
                 return False
-        self.seen = bool(self.said('Now do the work of PICK')) and bool(wait_for(finished))
+        self.seen = bool(self.said('Now do the work of PICK'))
+        return self.seen and bool(wait_for(finished, 30.0))
 
     def assert_gone(self):
         self.assertTrue(self.client._starter._last['by_hand'].ended(25.0), 'nothing of it is left')
@@ -96,6 +103,7 @@ class InterfaceOnDemand(unittest.TestCase):
     def assert_works(self, offer):
         answer = self.run_interface(offer, self.finish)
         self.assertTrue(self.seen, 'what it prints is told')
+        self.assertIsNotNone(answer, 'it is finished')
         self.assertEqual((answer.outcome, answer.outputs), ('succeeded', {'object_name': 'mug'}))
         self.assert_gone()
         self.assertEqual(self.told[-1].status, InterfaceOutput.STOPPED)
@@ -110,7 +118,7 @@ class InterfaceOnDemand(unittest.TestCase):
 
     def assert_fails(self, offer, *texts):
         with self.assertRaises(InterfaceError) as raised:
-            self.run_interface(offer, lambda: None)
+            self.run_interface(offer, lambda: True)
         for text in texts:
             self.assertIn(text, str(raised.exception))
         self.assertTrue(wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED))
@@ -127,7 +135,7 @@ class InterfaceOnDemand(unittest.TestCase):
 
     def test_one_that_nobody_can_start_is_waited_for_only_so_long(self):
         with self.assertRaises(InterfaceError) as raised:
-            self.run_interface(self.offer(node=None), lambda: None)
+            self.run_interface(self.offer(node=None), lambda: True)
         self.assertIn('no action server at /by_hand within 3 s', str(raised.exception))
 
 

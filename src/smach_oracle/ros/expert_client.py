@@ -145,7 +145,7 @@ class ExpertQueryClient(Expert):
                 return _interface_result(offer, event)
             if event is None and (not link.alive() or sent.unheard(time.monotonic())):
                 rospy.logwarn('Interface %s: its action server %s is gone', offer.name, link.name)
-                return None
+                break
         sent.cancel()
         return None
 

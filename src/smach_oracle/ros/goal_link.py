@@ -13,7 +13,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 
 POLL_S = 0.02  # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
-_ACK_S = 1.5  # a goal that nobody acknowledged by then was lost on its way
+_ACK_S = 3.0  # a goal that nobody acknowledged by then was lost on its way
 _RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
 
 
@@ -94,7 +94,7 @@ class GoalLink:
     def ready(self) -> bool:
         """Whether one live server is connected to all five topics of the action."""
         client = self._client
-        return any(client.pub_goal.impl.has_connection(server) and client.pub_cancel.impl.has_connection(server)
+        return any(_reaches(client.pub_goal, server) and _reaches(client.pub_cancel, server)
                    and server in _live(client.result_sub) and server in _live(client.feedback_sub)
                    for server in _live(client.status_sub))
 
@@ -129,3 +129,13 @@ def _live(subscriber: rospy.Subscriber) -> List[str]:
         return []
     return [connection.callerid_pub for connection in subscriber.impl.connections
             if getattr(connection, 'socket', None) is not None]
+
+
+def _reaches(publisher: rospy.Publisher, subscriber: str) -> bool:
+    """Whether a living node of that name listens. rospy looks only now and then whether one has died; one that was
+    started again under its name would seem to be there before it listens."""
+    topic = publisher.impl
+    if topic is None:
+        return False
+    topic.check()
+    return bool(topic.has_connection(subscriber))

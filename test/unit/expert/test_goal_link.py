@@ -4,7 +4,7 @@ import time
 import pytest
 from actionlib import CommState
 
-from smach_oracle.ros.goal_link import SentGoal
+from smach_oracle.ros.goal_link import SentGoal, _reaches
 
 
 class FakeHandle:
@@ -43,3 +43,24 @@ def test_a_goal_nobody_took_up_and_an_end_without_a_result_are_lost_in_time(stat
 def test_a_result_that_is_here_is_an_event():
     event = sent_and_seen(CommState.ACTIVE, CommState.WAITING_FOR_RESULT, CommState.DONE).poll(0.0)
     assert (event.status, event.result, event.text) == (3, 'the result', 'as told')
+
+
+class FakePublisher:
+    """As rospy's: the connection of a node that has died is there until somebody checks."""
+
+    def __init__(self, *nodes, dead=()):
+        self.impl = self
+        self._nodes = set(nodes)
+        self._dead = set(dead)
+
+    def check(self):
+        self._nodes -= self._dead
+
+    def has_connection(self, node):
+        return node in self._nodes
+
+
+def test_a_connection_to_a_node_that_has_died_reaches_nobody():
+    assert _reaches(FakePublisher('/by_hand'), '/by_hand')
+    assert not _reaches(FakePublisher('/by_hand', dead=['/by_hand']), '/by_hand')
+    assert not _reaches(FakePublisher('/other'), '/by_hand')
