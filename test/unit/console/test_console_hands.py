@@ -111,3 +111,14 @@ def test_a_page_that_has_fallen_silent_loses_the_wheel_and_the_hand_stands(make,
     made.draw()
     assert hand.wheel.drive is None and not sent[-1].dead_man
     assert drive(made).message == hands.TAKE_FIRST
+
+
+def test_settings_that_are_none_take_nobody_else_s_hand_away(make, monkeypatch):
+    made, hand, _ = make()
+    monkeypatch.setattr(rospy, 'logerr_throttle', lambda *_: None)
+    known = rospy.get_param
+    monkeypatch.setattr(rospy, 'get_param', lambda name, default=None: (
+        'no arms' if name == '/evil/arms' else known(name, default)))
+    made._begin('e', '/evil')
+    made._begin('r', '/hand')
+    assert sorted(made._hands) == ['q', 'r'] and made._hands['q'] is hand

@@ -1,11 +1,12 @@
 """What cameras saw when questions were put, and how preconditions stand: kept, bounded, of whom they are."""
 import numpy as np
 import pytest
+import rospy
 from expert_fixtures import make_question
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from smach_oracle.expert.console import conditions, sensors, stills
+from smach_oracle.expert.console import conditions, stills
 from smach_oracle.expert.console.conditions import Conditions
 from smach_oracle.expert.console.images import Encoded
 from smach_oracle.expert.console.sections import Sections
@@ -27,8 +28,7 @@ class NoSubscriber:
 
 @pytest.fixture(autouse=True)
 def no_master(monkeypatch):
-    for module in (sensors, stills, conditions):
-        monkeypatch.setattr(module.rospy, 'Subscriber', NoSubscriber)
+    monkeypatch.setattr(rospy, 'Subscriber', NoSubscriber)
 
 
 def listed(monkeypatch, robot='/alpha', asked_s=100.0, query_id='q1'):

@@ -4,16 +4,13 @@ import time
 from collections import OrderedDict
 from typing import Any, Callable, Dict, Iterable, List, Tuple
 
-import rosgraph.names
-import rospy
-
 from smach_oracle.msg import PreconditionCheck, PreconditionChecks
 
 from ..followed_server import Listed
+from .robot_topics import RobotTopics
 from .sections import Sections
 
 SECTION = 'conditions'
-MOST_ROBOTS = 64
 MOST_QUESTIONS = 64
 LONGEST_TEXT = 400
 _HOLDS = {PreconditionCheck.HOLDS: True, PreconditionCheck.DOES_NOT_HOLD: False}
@@ -24,23 +21,16 @@ class Conditions:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._topics = RobotTopics('/oracle/preconditions', PreconditionChecks, self.taker, queue_size=5)
         self._newest: 'OrderedDict[Tuple[str, str], Dict[str, List[Dict[str, Any]]]]' = OrderedDict()
 
     def draw(self, sections: Sections, questions: Iterable[Listed]) -> None:
         """Bring the section up to date; robots whose questions are new are listened to from now on."""
         questions = list(questions)
-        for listed in questions:
-            self._follow(listed.goal.robot)
+        self._topics.follow([listed.goal.robot for listed in questions])
         with self._lock:
             found = {listed.key: self._newest.get((listed.goal.robot, listed.goal.query_id)) for listed in questions}
         sections.put(SECTION, {key: states for key, states in found.items() if states is not None})
-
-    def _follow(self, robot: str) -> None:
-        if robot and robot not in self._subscribers and rosgraph.names.is_legal_name(robot) \
-                and len(self._subscribers) < MOST_ROBOTS:
-            self._subscribers[robot] = rospy.Subscriber(robot + '/oracle/preconditions', PreconditionChecks,
-                                                        self.taker(robot), queue_size=5)
 
     def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
         """What takes in a robot's messages."""

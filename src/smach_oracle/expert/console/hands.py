@@ -195,9 +195,16 @@ class Hands:
         for key in set(self._hands) - set(moving):
             self._leave(key, None, 'the interface has ended')
             self._hands.pop(key).stop()
+        self._outputs.follow([listed.goal.robot for listed in self._front_end.questions()])
         for key in set(moving) - set(self._hands):
-            self._hands[key] = Hand(moving[key])
-        self._outputs.follow({listed.goal.robot for listed in self._front_end.questions()})
+            self._begin(key, moving[key])
+
+    def _begin(self, key: str, action: str) -> None:
+        try:
+            self._hands[key] = Hand(action)
+        except (AttributeError, TypeError, ValueError) as err:  # what one robot says must not take the others' hands
+            rospy.logerr_throttle(10, 'The settings of {} are none of a manipulation interface: {!r}'.format(
+                action, err))
 
     def draw(self) -> None:
         """Bring the sections up to date; let go what silent pages hold."""

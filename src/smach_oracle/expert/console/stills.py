@@ -10,7 +10,6 @@ import time
 from collections import OrderedDict
 from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence
 
-import rosgraph.names
 import rospy
 from sensor_msgs.msg import CompressedImage
 
@@ -18,13 +17,13 @@ from smach_oracle.msg import FailureFrames
 
 from ..followed_server import Listed
 from .images import Encoded, encode_image
+from .robot_topics import RobotTopics
 from .sections import Sections
 from .sensors import Sensors
 
 SECTION = 'stills'
 MOST_KEPT = 200
 MOST_BYTES = 40 * 2 ** 20  # of all together
-MOST_ROBOTS = 64
 MOST_QUESTIONS = 64
 MOST_CAMERAS = 2  # that the console looks at by itself, for one question
 LOOK_WITHIN_S = 15.0  # of the question: what is seen later tells nothing of the failure
@@ -79,7 +78,7 @@ class Stills:
         self._files = files
         self._sensors = sensors
         self._lock = threading.Lock()
-        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._topics = RobotTopics('/failure_frames', FailureFrames, self.taker, queue_size=5, buff_size=1 << 24)
         self._told: 'OrderedDict[str, List[Still]]' = OrderedDict()  # by robot and query id
         self._seen: 'OrderedDict[str, Dict[str, Still]]' = OrderedDict()  # by question: topic -> what we saw
         self._failed: Dict[str, float] = {}  # cameras that could not be shown, and when
@@ -88,8 +87,8 @@ class Stills:
         """Look where there is something to be seen, and bring the section up to date."""
         now_s = time.monotonic()
         found = {}
+        self._topics.follow([listed.goal.robot for listed in questions])
         for listed in questions:
-            self._follow(listed.goal.robot)
             with self._lock:
                 told = self._told.get(_name(listed.goal.robot, listed.goal.query_id))
             shown = told or self._looked(listed, now_s)
@@ -119,12 +118,6 @@ class Stills:
         except ValueError as err:
             self._failed[camera['topic']] = now_s
             rospy.logdebug('What %s saw cannot be shown: %s', camera['topic'], err)
-
-    def _follow(self, robot: str) -> None:
-        if robot and robot not in self._subscribers and rosgraph.names.is_legal_name(robot) \
-                and len(self._subscribers) < MOST_ROBOTS:
-            self._subscribers[robot] = rospy.Subscriber(robot + '/failure_frames', FailureFrames, self.taker(robot),
-                                                        queue_size=5, buff_size=1 << 24)
 
     def taker(self, robot: str) -> Callable[[FailureFrames], None]:
         """What takes in a robot's messages."""
