@@ -3,7 +3,7 @@
 The cameras are listened to all the time, for the frame must be there when the failure is. Nothing of it is waited for.
 """
 import threading
-from typing import Any, Dict, List, Sequence
+from typing import Any, Dict, List, Sequence, Tuple
 
 import rosgraph
 import rospy
@@ -18,6 +18,7 @@ TOPIC = '~failure_frames'
 PARAMETER = '~failure_cameras'
 MOST_CAMERAS = 4
 JPEG_QUALITY = 85
+OLDEST_S = 10.0  # ROS time: what a camera saw before it fell silent tells nothing of the failure
 LOOK_AGAIN_S = 1.0  # for the types of topics that nobody has advertised yet
 _TYPES = {Image._type: Image, CompressedImage._type: CompressedImage}
 
@@ -34,7 +35,8 @@ class FailureCameras:
             raise ConfigError('parameter ' + rospy.resolve_name(PARAMETER), topics,
                               'at most {} names of topics'.format(MOST_CAMERAS))
         self._topics = [rospy.resolve_name(topic) for topic in topics]
-        self._newest: Dict[str, Any] = {}
+        self._newest: Dict[str, Tuple[Any, rospy.Time]] = {}  # and when it came
+        self._stopped = threading.Event()
         self._subscribers: Dict[str, rospy.Subscriber] = {}
         self._lock = threading.Lock()
         if self._topics:
@@ -42,20 +44,23 @@ class FailureCameras:
             threading.Thread(target=self._listen, name='failure cameras', daemon=True).start()
 
     def tell(self, question: Question) -> None:
-        """Publish what is there now, in a thread of its own; nothing where no camera has been heard."""
+        """Publish what is there now, in a thread of its own; nothing where no camera has been heard of late."""
+        now = rospy.get_rostime()
         with self._lock:
-            frames = [(topic, self._newest[topic]) for topic in self._topics if topic in self._newest]
+            newest = [(topic, *self._newest[topic]) for topic in self._topics if topic in self._newest]
+        frames = [(topic, image) for topic, image, came in newest if abs((now - came).to_sec()) <= OLDEST_S]
         if frames:
             threading.Thread(target=self._publish, args=(question, frames), name='failure frames', daemon=True).start()
 
     def stop(self) -> None:
         """Listen no longer."""
+        self._stopped.set()
         for subscriber in list(self._subscribers.values()):
             subscriber.unregister()
 
     def _listen(self) -> None:
         """Subscribe to each as soon as its type is known."""
-        while len(self._subscribers) < len(self._topics) and not rospy.is_shutdown():
+        while len(self._subscribers) < len(self._topics) and not rospy.is_shutdown() and not self._stopped.is_set():
             try:
                 types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
             except (OSError, rosgraph.MasterException):
@@ -64,11 +69,11 @@ class FailureCameras:
                 if topic not in self._subscribers and types.get(topic) in _TYPES:
                     self._subscribers[topic] = rospy.Subscriber(topic, _TYPES[types[topic]], self._keep,
                                                                 callback_args=topic, queue_size=1, buff_size=1 << 24)
-            rospy.rostime.wallsleep(LOOK_AGAIN_S)
+            self._stopped.wait(LOOK_AGAIN_S)
 
     def _keep(self, image: Any, topic: str) -> None:
         with self._lock:
-            self._newest[topic] = image
+            self._newest[topic] = image, rospy.get_rostime()
 
     def _publish(self, question: Question, frames: List[Any]) -> None:
         message = FailureFrames(trial_id=question.trial_id, query_id=question.query_id)

@@ -15,14 +15,16 @@ PERIOD_S = 2.0
 PATIENCE_S = 1.0  # for one function
 LISTENER_PERIOD_S = 0.25  # how soon somebody who begins to listen is noticed
 MOST = 500  # of one question; further ones are not looked at
+MOST_HANGING = 32  # looks that have not come back, of all questions: each keeps a thread
 _RESULT = {None: PreconditionCheck.UNKNOWN, True: PreconditionCheck.HOLDS, False: PreconditionCheck.DOES_NOT_HOLD}
 
 
 class _Watched:
     """One precondition: the latest word on it, and the thread that looks."""
 
-    def __init__(self, look: Look, number: int) -> None:
+    def __init__(self, look: Look, number: int, room: threading.Semaphore) -> None:
         self.state, self.name = look.names[number]
+        self._room = room
         self._look = look
         self._number = number
         self._latest = Standing(None, 'not looked at yet')
@@ -33,6 +35,9 @@ class _Watched:
     def refresh(self) -> None:
         """Look, waiting a second at most; one who still looks is left to it."""
         if self._thread is None or not self._thread.is_alive():
+            if not self._room.acquire(blocking=False):
+                self._latest = Standing(None, 'not looked at: {} looks have not come back'.format(MOST_HANGING))
+                return
             self._began_s = time.monotonic()
             self._thread = threading.Thread(target=self._work, name='look at ' + self.name, daemon=True)
             self._thread.start()
@@ -53,6 +58,8 @@ class _Watched:
             self._latest = self._look.look(self._number)
         except BaseException as err:  # a function may call sys.exit
             self._latest = Standing(None, '{} raised {!r}'.format(self.name, err))
+        finally:
+            self._room.release()
         self._at_s = time.monotonic()
 
 
@@ -60,10 +67,10 @@ class _Session:
     """One open question."""
 
     def __init__(self, question: Question, look: Look, publish: Callable[[PreconditionChecks], None],
-                 listened: Callable[[], bool]) -> None:
+                 listened: Callable[[], bool], room: threading.Semaphore) -> None:
         self.over = threading.Event()
         self._query_id = question.query_id
-        self._watched = [_Watched(look, number) for number in range(min(MOST, len(look.names)))]
+        self._watched = [_Watched(look, number, room) for number in range(min(MOST, len(look.names)))]
         self._publish = publish
         self._listened = listened
         threading.Thread(target=self._run, name='preconditions', daemon=True).start()
@@ -95,6 +102,7 @@ class PreconditionWatch:
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher(TOPIC, PreconditionChecks, latch=True, queue_size=5)
+        self._room = threading.Semaphore(MOST_HANGING)
 
     @contextlib.contextmanager
     def over(self, question: Question) -> Iterator[None]:
@@ -103,7 +111,7 @@ class PreconditionWatch:
         session = None
         if look is not None and look.names:
             session = _Session(question, look, self._publisher.publish,
-                               lambda: self._publisher.get_num_connections() > 0)
+                               lambda: self._publisher.get_num_connections() > 0, self._room)
         try:
             yield
         finally:
