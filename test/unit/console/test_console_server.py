@@ -176,11 +176,14 @@ class TestSocket(console_case.ConsoleCase):
         page._writing = False
         self.office.push()
         self.office.push()
-        assert json.loads(await socket.read_message())['sections'] == {'robots': [99]}
+        first = json.loads(await socket.read_message())
+        assert first['sections'] == {'robots': [99]} and first['all'], 'what else a page knows from before is gone'
         self.sections.put('robots', None)
-        await asyncio.sleep(0.05)
+        while page._writing:
+            await asyncio.sleep(0.01)
         self.office.push()
-        assert json.loads(await socket.read_message())['sections'] == {'robots': None}
+        second = json.loads(await socket.read_message())
+        assert second['sections'] == {'robots': None} and 'all' not in second
 
 
 class TestWithoutTokens(console_case.ConsoleCase):

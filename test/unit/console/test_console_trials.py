@@ -5,7 +5,7 @@ import pytest
 import smach
 
 from smach_oracle.analysis.trials import summarise
-from smach_oracle.expert.console import trial_log
+from smach_oracle.expert.console import helped, trial_log
 from smach_oracle.expert.console.helped import HelpScores
 from smach_oracle.expert.console.tally import Tally, table
 from smach_oracle.expert.console.trial_log import TrialLog
@@ -132,6 +132,25 @@ def test_the_log_is_bounded_and_forgets_details_first(monkeypatch):
     assert [trial['id'] for trial in log.overview()['trials']] == ['8', '7', '6', '5', '4']
     assert [len(log.events(str(number), 0).events) for number in range(3, 9)] == [0, 0, 0, 0, 3, 3]
     assert len(log.events('8', 2).events) == 1 and log.events('unknown', 0).events == []
+
+
+def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeypatch):
+    monkeypatch.setattr(trial_log, 'MOST_DETAILED', 1)
+    log = TrialLog()
+    for trial in ('long', 'short', 'long'):
+        log.add('/robot', event(EventKind.STATE_START, trial=trial))
+    assert log.events('long', 0).events == []
+    assert [(each['id'], each['detailed']) for each in log.overview()['trials']] == [('short', True), ('long', False)]
+
+
+def test_scores_of_robots_that_come_and_go_are_bounded(monkeypatch):
+    monkeypatch.setattr(helped, '_MOST_SCORES', 3)
+    scores = HelpScores()
+    for number in range(6):
+        for kind in (EventKind.FAILURE, EventKind.JUMP, EventKind.TRANSITION):
+            scores.add('/robot_{}'.format(number), Event(kind, 't', 0, 0.0, 'TASK', 'A', target='B'), False)
+    tried = [scores.score(('/robot_{}'.format(number), 'TASK', 'A'), 'B').tried for number in range(6)]
+    assert tried == [0, 0, 0, 1, 1, 1]
 
 
 def test_a_robot_that_dies_leaves_its_trial_marked():

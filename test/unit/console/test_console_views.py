@@ -8,6 +8,7 @@ from geometry_msgs.msg import PointStamped
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
 from smach_oracle.expert.console import robots, sessions
+from smach_oracle.expert.console import sections as sections_module
 from smach_oracle.expert.console.checks import Output
 from smach_oracle.expert.console.desk import BadOutput, items
 from smach_oracle.expert.console.helped import Score
@@ -101,6 +102,18 @@ def test_a_section_is_sent_again_only_when_it_has_changed():
     sections.put('a', None)
     later, changed = sections.since(version)
     assert later > version and changed == [('a', 'null')] and sections.since(0)[1] == []
+
+
+def test_of_sections_that_are_gone_the_latest_are_remembered(monkeypatch):
+    monkeypatch.setattr(sections_module, '_MOST_GONE', 10)
+    sections = Sections()
+    sections.put('stays', 1)
+    for number in range(100):
+        sections.put('robot {}'.format(number), 1)
+        version = sections.version
+        sections.put('robot {}'.format(number), None)
+    assert sections.since(version) == (201, [('robot 99', 'null')])
+    assert len(sections._sections) <= 12 and sections.get('stays') == 1
 
 
 class NoLayouter:

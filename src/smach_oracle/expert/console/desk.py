@@ -1,6 +1,8 @@
 """Carries out what people say to questions: claims, which it keeps alive as long as their browsers are there, and
 answers. Called from several threads; a call may take as long as a robot's service does (5 s at most)."""
 import threading
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import genpy
@@ -19,6 +21,7 @@ from .checks import Output
 from .commands import KINDS, Command
 
 _RENEW_PERIOD_S = LEASE_S / 3.0
+_MOST_MISSED = 12  # rounds in which a question was not open: it is over, and no server that is being restarted
 _KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,
                          ExpertDecision.INTERFACE)))
 _ACTION = {'claim': ClaimQueryRequest.CLAIM, 'take_over': ClaimQueryRequest.TAKE_OVER,
@@ -51,6 +54,8 @@ class Desk:
         self._audit = audit
         self._lock = threading.Lock()
         self._held: Dict[Tuple[str, str], Set[int]] = {}  # question, expert -> browsers that show it
+        self._missed: 'Counter[Tuple[str, str]]' = Counter()
+        self._renewers = ThreadPoolExecutor(8, 'renew')  # one robot that hangs must not cost the others' claims
         threading.Thread(target=self._keep_claims, name='keep claims', daemon=True).start()
 
     def carry_out(self, command: Command, person: Person, browser: int) -> Reply:
@@ -114,16 +119,25 @@ class Desk:
         stopped = threading.Event()
         rospy.on_shutdown(stopped.set)
         while not stopped.wait(_RENEW_PERIOD_S):
-            with self._lock:
-                held = list(self._held)
-            for key in held:
-                self._renew(key)
+            self.renew()
+
+    def renew(self) -> None:
+        """Renew all claims that somebody still shows, once."""
+        with self._lock:
+            held = list(self._held)
+        for key in set(self._missed) - set(held):
+            del self._missed[key]
+        list(self._renewers.map(self._renew, held))
 
     def _renew(self, key: Tuple[str, str]) -> None:
         """Renew a claim; forget it where it is lost or its question closed, keep trying where only the way is."""
         listed = self._front_end.find(key[0])
-        if listed is None:
-            return  # closed, or its server is being restarted: whoever shows it claims again
+        if listed is None:  # closed, or its server is being restarted: whoever shows it claims again
+            self._missed[key] += 1
+            if self._missed[key] > _MOST_MISSED:
+                self._forget(key)
+            return
+        self._missed.pop(key, None)
         try:
             response = self._front_end.server(listed).claim(listed.goal.query_id, key[1], ClaimQueryRequest.RENEW,
                                                             LEASE_S)
@@ -131,8 +145,11 @@ class Desk:
             rospy.logdebug('A claim was not renewed: %s', err)
             return
         if not response.ok:
-            with self._lock:
-                self._held.pop(key, None)
+            self._forget(key)
+
+    def _forget(self, key: Tuple[str, str]) -> None:
+        with self._lock:
+            self._held.pop(key, None)
 
 
 def items(outputs: Sequence[Output], goal: ExpertQueryGoal) -> List[UserdataItem]:

@@ -5,6 +5,7 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 from ...oracle.events import Event, EventKind
 
 _REMEMBERED = 2000  # trials under way
+_MOST_SCORES = 20000  # pairs of states
 Place = Tuple[str, str, str]  # robot, container path, state
 
 
@@ -20,7 +21,7 @@ class HelpScores:
     again."""
 
     def __init__(self) -> None:
-        self._scores: Dict[Tuple[Place, str], List[int]] = {}
+        self._scores: 'OrderedDict[Tuple[Place, str], List[int]]' = OrderedDict()  # the latest at the end
         self._trying: 'OrderedDict[Tuple[str, str], Dict[str, str]]' = OrderedDict()  # trial, path -> S -> T
 
     def add(self, robot: str, event: Event, failing_end: bool) -> None:
@@ -51,5 +52,8 @@ class HelpScores:
         """Count a try, if there was one."""
         if target:
             score = self._scores.setdefault(((robot, path, state), target), [0, 0])
+            self._scores.move_to_end(((robot, path, state), target))
+            if len(self._scores) > _MOST_SCORES:
+                self._scores.popitem(last=False)
             score[0] += helped
             score[1] += 1

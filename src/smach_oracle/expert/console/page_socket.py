@@ -201,6 +201,8 @@ class Socket(tornado.websocket.WebSocketHandler):
             return
         parts = ['"now":{:.3f}'.format(time.time())]
         if changed:
+            if not self._sent_version:
+                parts.append('"all":true')  # of an earlier connection the page may know some that are gone
             parts.append('"sections":{%s}' % ','.join('{}:{}'.format(json.dumps(name), text)
                                                       for name, text in changed))
         if new:

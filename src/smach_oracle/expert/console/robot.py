@@ -38,7 +38,8 @@ class Robot:
         edges = [Edge(*each) for each in zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)]
         structure = make_structure(path, message.children, edges, message.container_outcomes)
         with self._lock:
-            if self._structures.get(path) != structure and len(self._structures) < MOST_CONTAINERS:
+            room = path in self._structures or len(self._structures) < MOST_CONTAINERS
+            if room and self._structures.get(path) != structure:
                 self._structures[path] = structure
                 self.changed = self._reshaped = True
 

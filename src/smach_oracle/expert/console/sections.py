@@ -3,6 +3,8 @@ import json
 import threading
 from typing import Any, Dict, List, NamedTuple, Tuple
 
+_MOST_GONE = 2000  # that are remembered, for pages that have not been told yet
+
 
 class _Section(NamedTuple):
     version: int
@@ -31,6 +33,8 @@ class Sections:
                 return
             self._version += 1
             self._sections[name] = _Section(self._version, text)
+            if text == 'null':
+                self._forget_gone()
 
     def get(self, name: str) -> Any:
         """A section as it is now, None where there is none."""
@@ -43,3 +47,10 @@ class Sections:
             changed = [(name, section.text) for name, section in self._sections.items() if section.version > version
                        and (version or section.text != 'null')]
             return self._version, changed
+
+    def _forget_gone(self) -> None:
+        """Of very many that are gone, such as those of anonymous nodes; with the lock held."""
+        gone = [name for name, section in self._sections.items() if section.text == 'null']
+        if len(gone) > _MOST_GONE:
+            for name in sorted(gone, key=lambda each: self._sections[each].version)[:_MOST_GONE // 2]:
+                del self._sections[name]

@@ -23,6 +23,7 @@ class _Trial:
         self.robot = robot
         self.tally = Tally(first)
         self.events: List[Dict[str, Any]] = []
+        self.detailed = True  # whether the events are kept
 
 
 class Slice(NamedTuple):
@@ -49,7 +50,7 @@ class TrialLog:
                 trial = self._trials[event.trial_id] = _Trial(robot, event)
                 self._forget()
             trial.tally.add(event)
-            if len(trial.events) < MOST_EVENTS:
+            if trial.detailed and len(trial.events) < MOST_EVENTS:
                 trial.events.append(event_view(event))
             self._helped.add(robot, event, ended and (not event.outcome or event.outcome in _FAILING
                                                       or event.outcome.lower() == 'preempted'))
@@ -83,7 +84,9 @@ class TrialLog:
         while len(self._trials) > MOST_TRIALS:
             self._trials.popitem(last=False)
         if len(self._trials) > MOST_DETAILED:
-            list(self._trials.values())[-MOST_DETAILED - 1].events.clear()
+            oldest = list(self._trials.values())[-MOST_DETAILED - 1]
+            oldest.detailed = False
+            oldest.events.clear()
 
 
 def _row(trial_id: str, trial: _Trial) -> Dict[str, Any]:
@@ -91,4 +94,4 @@ def _row(trial_id: str, trial: _Trial) -> Dict[str, Any]:
     return {'id': trial_id, 'robot': trial.robot, 'experiment': tally.experiment, 'start': tally.start_s,
             'end': tally.end_s, 'ending': tally.ending, 'outcome': tally.outcome, 'oracle': tally.recovers,
             'failures': tally.failures, 'recoveries': tally.recoveries, 'questions': tally.questions,
-            'answered': tally.answered, 'lost': tally.lost, 'detailed': bool(trial.events)}
+            'answered': tally.answered, 'lost': tally.lost, 'detailed': trial.detailed}

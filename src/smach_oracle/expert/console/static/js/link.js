@@ -25,8 +25,9 @@ export class Store {
   take(message) {
     this.offset = message.now - Date.now() / 1000;
     const names = Object.keys(message.sections || {});
+    if (message.all) names.push(...[...this.sections.keys()].filter((name) => !(name in message.sections))); // gone meanwhile
     for (const name of names) {
-      if (message.sections[name] === null) this.sections.delete(name);
+      if (message.sections[name] === null || message.sections[name] === undefined) this.sections.delete(name);
       else this.sections.set(name, message.sections[name]);
     }
     if (names.length) this.listeners.forEach((listener) => listener(names));
