@@ -15,6 +15,7 @@ from .followed_server import FollowedServer, Listed, ServerGoneError
 
 LEASE_S = 15.0
 _DISCOVERY_PERIOD_S = 2.0
+_FORGET_S = 600.0  # after which a server that was found, and is gone, is followed no longer
 _FAREWELL_S = 1.0  # for giving back claims at the end; a server or master that hangs does not hold it up
 
 
@@ -33,6 +34,7 @@ class FrontEnd:
         self._changed = threading.Condition()
         self._version = 0
         self._servers: Dict[str, FollowedServer] = {}
+        self._gone_since_s: Dict[str, float] = {}
         self._held: Dict[str, Listed] = {}
         self._stopped = threading.Event()
         for name in servers:
@@ -113,8 +115,14 @@ class FrontEnd:
             server.stop()
 
     def server(self, listed: Listed) -> FollowedServer:
-        """The server of a question, for front ends that serve several experts and keep their claims themselves."""
-        return self._servers[listed.server]
+        """The server of a question, for front ends that serve several experts and keep their claims themselves.
+
+        :raises ServerGoneError: where it has been gone for so long that it is followed no longer.
+        """
+        followed = self._servers.get(listed.server)
+        if followed is None:
+            raise ServerGoneError('{} is gone'.format(listed.server))
+        return followed
 
     def _follow(self, name: str) -> None:
         self._servers[name] = FollowedServer(name, self._notify)
@@ -142,6 +150,16 @@ class FrontEnd:
                     self._follow(name)
         for name, server in list(self._servers.items()):
             server.refresh(name + '/open' in lists)
+            if self._discover:
+                self._forget_gone(name, server, name + '/open' in lists)
+
+    def _forget_gone(self, name: str, server: FollowedServer, advertised: bool) -> None:
+        """Robots with names of the moment come and go for days."""
+        if advertised or server.connected:
+            self._gone_since_s.pop(name, None)
+        elif time.monotonic() - self._gone_since_s.setdefault(name, time.monotonic()) > _FORGET_S:
+            del self._servers[name], self._gone_since_s[name]
+            server.stop()
 
     def _keep_claims(self) -> None:
         while not self._stopped.wait(self._lease_s / 3.0) and not rospy.is_shutdown():

@@ -14,6 +14,10 @@ class FakePublisher:
         self.sent = []
         self.publish = self.sent.append
         self.listeners = 0
+        self.there = True
+
+    def unregister(self):
+        self.there = False
 
     def get_num_connections(self):
         return self.listeners
@@ -59,3 +63,15 @@ def test_each_command_is_told_with_who_gave_it_and_never_at_length(monkeypatch):
     assert (record.client, record.session, record.role, record.expert, record.ok) == (
         '10.0.0.7', 'abc', 'viewer', 'bob', False)
     assert len(record.message) == 1000 and len(record.arguments) == audit.LONGEST_ARGUMENTS
+
+
+def test_beside_servers_that_are_gone_nothing_is_advertised_any_more(monkeypatch):
+    monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
+    book = Audit()
+    book.prepare(['/a/expert_query', '/b/expert_query'])
+    first, second = (book._by_server[name] for name in ('/a/expert_query', '/b/expert_query'))
+    book.prepare(['/b/expert_query'])
+    assert list(book._by_server) == ['/b/expert_query'] and book._by_server['/b/expert_query'] is second
+    assert second._publisher.there and not first._publisher.there
+    first.tell(ConsoleCommand(command='answer'))
+    assert first._publisher.sent == [] and not first._waiting

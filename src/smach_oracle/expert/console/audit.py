@@ -36,16 +36,25 @@ class Told(rospy.SubscribeListener):
     def __init__(self, topic: str) -> None:
         super().__init__()
         self._lock = threading.Lock()
+        self._stopped = False
         self._waiting: Deque[Tuple[float, ConsoleCommand]] = deque(maxlen=MOST_WAITING)
         self._publisher = rospy.Publisher(topic, ConsoleCommand, subscriber_listener=self, queue_size=1000)
 
     def tell(self, record: ConsoleCommand) -> None:
         """Publish it, or keep it for who comes first."""
         with self._lock:
+            if self._stopped:
+                return
             if self._publisher.get_num_connections():
                 self._publisher.publish(record)
             else:
                 self._waiting.append((time.monotonic(), record))
+
+    def stop(self) -> None:
+        """Take the topic down."""
+        with self._lock:
+            self._stopped = True
+        self._publisher.unregister()
 
     def peer_subscribe(self, topic_name: str, topic_publish: Callable, peer_publish: Callable) -> None:
         """Called by rospy for each listener that has come."""
@@ -66,11 +75,13 @@ class Audit:
 
     def prepare(self, servers: Sequence[str]) -> None:
         """Advertise beside servers as soon as they are known, so that recorders are connected before the first
-        command."""
+        command; beside those that are followed no longer not any more."""
         for server in servers:
-            with self._lock:
-                if server not in self._by_server:
-                    self._by_server[server] = Told(audit_topic(server))
+            self._beside(server)
+        with self._lock:
+            gone = [self._by_server.pop(server) for server in set(self._by_server) - set(servers)]
+        for told in gone:
+            told.stop()
 
     def tell(self, person: Person, command: str, ok: bool, message: str, arguments: Optional[Mapping[str, Any]] = None,
              listed: Optional[Listed] = None) -> None:
@@ -89,5 +100,10 @@ class Audit:
             return
         self._own.publish(record)
         if listed is not None:
-            self.prepare([listed.server])
-            self._by_server[listed.server].tell(record)
+            self._beside(listed.server).tell(record)
+
+    def _beside(self, server: str) -> Told:
+        with self._lock:
+            if server not in self._by_server:
+                self._by_server[server] = Told(audit_topic(server))
+            return self._by_server[server]
