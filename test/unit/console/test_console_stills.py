@@ -70,6 +70,17 @@ def test_a_console_that_comes_late_shows_nothing_for_the_failure(monkeypatch):
     assert shown(Stills(StillFiles(), found), listed(monkeypatch, asked_s=50.0)) == []
 
 
+def test_the_last_frame_of_a_camera_that_died_before_is_none_of_the_question(monkeypatch):
+    found = seen('/head/rgb/image_raw')
+    board, question = Stills(StillFiles(), found), listed(monkeypatch)
+    monkeypatch.setattr(stills.time, 'monotonic', lambda: 97.0)
+    found.on('/head/rgb/image_raw').take(picture())
+    monkeypatch.setattr(stills.time, 'monotonic', lambda: 100.5)
+    assert shown(board, question) == []
+    found.on('/head/rgb/image_raw').take(picture())
+    assert [each['late'] for each in shown(board, question)] == [0.5]
+
+
 def test_the_robot_is_believed_first_and_about_its_own_question_alone(monkeypatch):
     found = seen('/head/rgb/image_raw')
     found.on('/head/rgb/image_raw').take(picture())

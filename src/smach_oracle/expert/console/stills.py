@@ -26,6 +26,7 @@ MOST_KEPT = 200
 MOST_BYTES = 40 * 2 ** 20  # of all together
 MOST_QUESTIONS = 64
 MOST_CAMERAS = 2  # that the console looks at by itself, for one question
+BEFORE_S = 2.0  # a frame that came earlier before the question is none of it: the camera may have died since
 LOOK_WITHIN_S = 15.0  # of the question: what is seen later tells nothing of the failure
 WIDTH = 640
 _NO_COLOUR = re.compile('depth|disparity|/ir/')
@@ -111,7 +112,7 @@ class Stills:
     def _look(self, camera: Dict[str, Any], listed: Listed, seen: Dict[str, Still], now_s: float) -> None:
         sensor = self._sensors.find(camera['id'])
         frame = sensor.newer(0) if sensor is not None else None
-        if frame is None or now_s - self._failed.get(camera['topic'], -LOOK_WITHIN_S) < LOOK_WITHIN_S:
+        if frame is None or frame.came_s < listed.asked_s - BEFORE_S or now_s - self._failed.get(camera['topic'], -LOOK_WITHIN_S) < LOOK_WITHIN_S:
             return
         try:
             seen[camera['topic']] = self._files.keep(camera['topic'], frame.message, frame.came_s - listed.asked_s)
