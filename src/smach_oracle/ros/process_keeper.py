@@ -25,8 +25,8 @@ def descendants(root: int) -> List[int]:
     for name in os.listdir('/proc'):
         if name.isdigit():
             try:
-                with open('/proc/{}/stat'.format(name)) as file:
-                    parent = file.read().rpartition(')')[2].split()[1]
+                with open('/proc/{}/stat'.format(name), 'rb') as file:  # a name may be cut within a letter
+                    parent = file.read().rpartition(b')')[2].split()[1]
             except (OSError, IndexError):
                 continue
             children.setdefault(int(parent), []).append(int(name))

@@ -1,5 +1,6 @@
 """The keeper of a command: nothing of it is left behind, whatever it does and whoever dies."""
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -86,3 +87,26 @@ def test_a_command_that_is_not_there_is_named():
     assert '/no/such/command' in keeper.stdout.readline()
     assert keeper.wait(20) == 127
 
+
+
+def test_a_name_that_is_cut_within_a_letter_hides_nothing(tmp_path):
+    program = str(tmp_path / ('é' * 10))  # the system keeps 15 bytes of it
+    shutil.copy(shutil.which('sleep'), program)
+    keeper = begin([program, '600'])
+    try:
+        until_s = time.monotonic() + 20.0
+        while not names_of(keeper.pid) and time.monotonic() < until_s:
+            time.sleep(0.02)
+        assert names_of(keeper.pid) == [b'(' + 'é'.encode() * 7 + 'é'.encode()[:1] + b')']
+    finally:
+        keeper.stdin.close()
+        assert keeper.wait(20) == 0
+
+
+def names_of(root):
+    """As the system has them, of those that run a program of their own."""
+    found = []
+    for pid in descendants(root):
+        with open('/proc/{}/stat'.format(pid), 'rb') as file:
+            found.append(file.read().split()[1])
+    return [name for name in found if name.startswith('(é'.encode())]
