@@ -108,10 +108,16 @@ class TeleoperationServer:
                 due_s = self._work(due_s)
             except rospy.ROSException as err:
                 rospy.logdebug('%s: the node goes down: %s', rospy.get_name(), err)
-            except Exception as err:  # whatever it was: the hand stands, and the next command is heard
+            except Exception as err:
                 rospy.logerr_throttle(1.0, '{}: {!r}'.format(rospy.get_name(), err))
-                self._dead_man.refuse(self._dead_man.holder(time.monotonic()))
-                self._held, self._step, self._refused = None, standing(), 'error: {}'.format(err)
+                self._fail(err)
+
+    def _fail(self, err: Exception) -> None:
+        """Whatever it was: hand and gripper stand, and the next command is heard."""
+        self._dead_man.refuse(self._dead_man.holder(time.monotonic()))
+        self._held, self._gripped, self._step, self._refused = None, None, standing(), 'error: {}'.format(err)
+        for hand in self._hands.values():
+            hand.gripper.stop()
 
     def _work(self, due_s: float) -> float:
         """Take the commands that have come, and move on by a period where it is time; when the next one is due."""
