@@ -112,7 +112,9 @@ class Stills:
     def _look(self, camera: Dict[str, Any], listed: Listed, seen: Dict[str, Still], now_s: float) -> None:
         sensor = self._sensors.find(camera['id'])
         frame = sensor.newer(0) if sensor is not None else None
-        if frame is None or frame.came_s < listed.asked_s - BEFORE_S or now_s - self._failed.get(camera['topic'], -LOOK_WITHIN_S) < LOOK_WITHIN_S:
+        if frame is None or frame.came_s < listed.asked_s - BEFORE_S:
+            return
+        if now_s - self._failed.get(camera['topic'], -LOOK_WITHIN_S) < LOOK_WITHIN_S:
             return
         try:
             seen[camera['topic']] = self._files.keep(camera['topic'], frame.message, frame.came_s - listed.asked_s)
