@@ -94,7 +94,7 @@ class TestInterfaces(unittest.TestCase):
         begun_s = time.monotonic()
         with self.assertRaises(InterfaceError):
             self.run_interface()
-        self.assertTrue(1.9 < time.monotonic() - begun_s < 6.0)
+        self.assertTrue(1.9 < time.monotonic() - begun_s < 12.0)
         self.assertEqual(self.told[-1], ('interface_end', 'assist', ''))
 
     def test_an_interface_that_fails_or_answers_nonsense_supersedes_nothing(self):
@@ -119,7 +119,7 @@ class TestInterfaces(unittest.TestCase):
         self.interface(work)
         begun_s = time.monotonic()
         self.assertIsNone(self.run_interface())
-        self.assertLess(time.monotonic() - begun_s, 3.0)
+        self.assertLess(time.monotonic() - begun_s, 8.0)
         self.assertTrue(preempted.wait(5.0), 'the interface was told')
 
 
