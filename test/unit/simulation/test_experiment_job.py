@@ -6,6 +6,7 @@ import pytest
 from smach_oracle.simulation.experiment import job as job_module
 from smach_oracle.simulation.experiment.command import parse
 from smach_oracle.simulation.experiment.job import Job
+from smach_oracle.simulation.experiment.launching import LOG_FILE
 from smach_oracle.simulation.experiment.plan import ExperimentError
 from smach_oracle.simulation.experiment.records import Progress
 
@@ -86,8 +87,31 @@ def test_a_launch_that_does_its_trials_is_the_only_one(run):
 def test_a_trial_that_hangs_or_dies_is_tried_once_more(run, hangs):
     job, started = run((2, hangs), (4, False))
     assert started == [(0, 6), (2, 4)] and job.lost == {}
-    assert ('no trial has ended' if hangs else 'it ended before') in job.messages[0]
+    assert ('nothing has happened' if hangs else 'it ended before') in job.messages[0]
     assert job.messages[0].endswith('started again')
+
+
+@pytest.mark.parametrize('signs, why', [(4, 'nothing has happened for 100 s'), (6, 'no trial has ended for 500 s')])
+def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(monkeypatch, tmp_path, signs, why):
+    now = [0.0]
+    monkeypatch.setattr(job_module, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
+    monkeypatch.setattr(job_module, 'JobRecords', FakeRecords)
+    FakeLaunch.script, FakeLaunch.started = [(0, True), (0, True)], []
+    plan = parse(['--trials', '6', '--seed', str(FIRST_SEED)]).plan
+    job = Job(plan, plan.arms[0], 0, tmp_path, hung_after_s=100.0)
+    FakeLaunch.records = job._records
+    job._records.folder.mkdir(parents=True)
+    job.start()
+    for second in range(1, 506):
+        now[0] = second
+        if second % 99 == 0 and second <= 99 * signs:
+            with (job._records.folder / LOG_FILE).open('a') as log:
+                log.write('PICK began\n')
+        job.watch()
+        if job.messages:
+            break
+    assert why in job.messages[0] and now[0] == (99 * 4 + 101 if signs == 4 else 501)
 
 
 def test_a_trial_that_hangs_twice_is_lost_and_the_next_one_begins(run):

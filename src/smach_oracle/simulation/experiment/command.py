@@ -118,7 +118,8 @@ def make_parser() -> argparse.ArgumentParser:
                         help='s of simulated time that the scripted expert takes, in the median (default: 15)')
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
     parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
-                        help='s without the end of a trial, after which it is run anew (default: 300)')
+                        help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
+                        'before it is run anew (default: 300)')
     parser.add_argument('--output', type=Path,
                         help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
     return parser

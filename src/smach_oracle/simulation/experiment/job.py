@@ -6,12 +6,13 @@ from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
 
-from .launching import LOG_FILE, Launch, end_marked, last_words
+from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .plan import TASKS, Arm, ExperimentError, Plan
 from .records import JobRecords
 
 LEFTOVER_GRACE_S = 15.0  # for what an earlier run left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
+LONGEST = 5  # times the time without a sign of life: what a trial may take that goes on and on
 LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a trial
 
 
@@ -33,7 +34,8 @@ class Job:
         self._records = JobRecords(output / arm.name / 'replicate_{}'.format(replicate), self._seed, plan.trials)
         self._launch: Optional[Launch] = None
         self._attempts: Dict[int, int] = {}
-        self._progress_at = 0.0
+        self._ended_at = self._sign_at = 0.0  # the latest trial's end, the latest line that the log grew by
+        self._logged = 0  # bytes
         self._started_at = 0.0
         left = end_marked(str(self._records.folder), LEFTOVER_GRACE_S)
         if left:
@@ -64,7 +66,7 @@ class Job:
 
     def start(self) -> None:
         """Launch the trials that are missing. Raises OSError."""
-        self._started_at = self._progress_at = time.monotonic()
+        self._started_at = self._ended_at = self._sign_at = time.monotonic()
         self._done_at_start = len(self.summaries)
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
@@ -84,10 +86,22 @@ class Job:
             return
         self._take_in()
         if self._launch.running():
-            if time.monotonic() - self._progress_at > self._hung_after_s:
-                self._again('no trial has ended for {:.0f} s'.format(self._hung_after_s))
+            hung = self._hung()
+            if hung:
+                self._again(hung)
         else:
             self._again('it ended before its trials were over')
+
+    def _hung(self) -> str:
+        """Why what runs is taken for hung; '' where it is not. A trial may take long on a machine with much to do."""
+        logged, now = size_of(self._records.folder / LOG_FILE), time.monotonic()
+        if logged != self._logged:
+            self._logged, self._sign_at = logged, now
+        if now - self._sign_at > self._hung_after_s:
+            return 'nothing has happened for {:.0f} s'.format(self._hung_after_s)
+        if now - self._ended_at > LONGEST * self._hung_after_s:
+            return 'no trial has ended for {:.0f} s'.format(LONGEST * self._hung_after_s)
+        return ''
 
     def _take_in(self) -> None:
         for path in self._records.closed_bags():
@@ -95,7 +109,7 @@ class Job:
                 recorded = self._records.read(path)
                 if recorded is not None:
                     self.summaries[path] = recorded.summary
-                    self._progress_at = time.monotonic()
+                    self._ended_at = self._sign_at = time.monotonic()
 
     def _again(self, why: str) -> None:
         self.stop()

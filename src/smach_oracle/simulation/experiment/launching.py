@@ -61,6 +61,14 @@ def environment_of(folder: Path, port: int) -> Dict[str, str]:
             'ROS_LOG_DIR': str(folder / 'log'), 'PYTHONUNBUFFERED': '1', MARK: str(folder)}
 
 
+def size_of(log: Path) -> int:
+    """Bytes; 0 where there is none."""
+    try:
+        return log.stat().st_size
+    except OSError:
+        return 0
+
+
 def last_words(log: Path, count: int = 6) -> str:
     """The last lines of a log, each on a line of its own; '' where there is none."""
     if not log.exists():
