@@ -195,6 +195,7 @@ export class Detail {
     if (running && !this.tools) {
       this.tools = new InterfacePanel(this.app, this.question, now.interface, () => this.follow());
       replace(this.bench, this.tools.root);
+      this.seen = false;
     } else if (running) {
       this.tools.update();
     } else if (this.tools) {
@@ -203,6 +204,10 @@ export class Detail {
       replace(this.bench);
     }
     this.bench.hidden = !this.tools;
+    if (this.tools && this.tools.hand && !this.seen) {
+      this.seen = true;
+      this.bench.scrollIntoView({ block: 'start' }); // it comes in above what was pressed
+    }
   }
 
   update(names) {
