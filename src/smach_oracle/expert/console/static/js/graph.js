@@ -6,7 +6,8 @@ import { hue, percent, times } from './format.js';
 const RAIL_GAP = 96;
 const RAIL_WIDTH = 64;
 const MARGIN = 24;
-const SMALLEST_READABLE = 0.62;
+const FOOT = 52; // px below the drawing, where the buttons are
+const SMALLEST_READABLE = 0.55;
 
 function spline(points) {
   if (points.length < 8) return '';
@@ -27,7 +28,7 @@ export class Graph {
     this.onOpen = onOpen;
     this.layer = s('g', {});
     this.svg = s('svg', { class: 'graph', role: 'img', tabindex: '0' },
-      s('defs', {}, ['edge', 'used', 'hot'].map((kind) => s('marker', { id: 'arrow-' + kind, class: 'arrow ' + kind,
+      s('defs', {}, ['edge', 'used', 'hot', 'oracle', 'failing'].map((kind) => s('marker', { id: 'arrow-' + kind, class: 'arrow ' + kind,
         viewBox: '0 0 8 8', refX: 7, refY: 4, markerWidth: 9, markerHeight: 9, markerUnits: 'userSpaceOnUse', orient: 'auto-start-reverse' },
       s('path', { d: 'M0 0.500L8 4L0 7.500z' })))), this.layer);
     this.follow = true;
@@ -179,7 +180,8 @@ export class Graph {
         || (latest[0] === '' && from === this.data.oracle && to === latest[1]);
       shown.group.classList.toggle('used', Boolean(taken));
       shown.group.classList.toggle('hot', hot);
-      shown.line.setAttribute('marker-end', shown.edge || taken ? 'url(#arrow-' + (hot ? 'hot' : taken ? 'used' : 'edge') + ')' : '');
+      const arrow = shown.edge ? (hot ? 'hot' : taken ? 'used' : 'edge') : hot ? 'failing' : 'oracle';
+      shown.line.setAttribute('marker-end', shown.edge || taken ? 'url(#arrow-' + arrow + ')' : '');
       const share = taken ? percent(taken.share) : '';
       const text = shown.edge ? shown.edge.outcome + (share ? ' ' + share : '')
         : !taken ? '' : to === this.data.oracle ? share + ' fail' : taken.count + '×';
@@ -213,15 +215,15 @@ export class Graph {
     const at = focus ? focus.at : [0, 0];
     const wide = this.size.width * scale > box.width - 2 * MARGIN;
     this.view = { scale, x: wide ? at[0] - box.width / scale / 2 : (this.size.width - box.width / scale) / 2,
-      y: Math.max(-MARGIN, Math.min(at[1] - box.height / scale / 2, this.size.height + MARGIN - box.height / scale)) };
+      y: Math.max(-MARGIN, Math.min(at[1] - box.height / scale / 2, this.size.height + FOOT / scale - box.height / scale)) };
     this.apply();
   }
 
   fit() {
     const box = this.root.getBoundingClientRect();
     if (!this.size || !box.width) return;
-    const scale = Math.min(1.15, (box.width - 2 * MARGIN) / this.size.width, (box.height - 2 * MARGIN) / this.size.height);
-    this.view = { scale, x: (this.size.width - box.width / scale) / 2, y: (this.size.height - box.height / scale) / 2 };
+    const scale = Math.min(1.15, (box.width - 2 * MARGIN) / this.size.width, (box.height - MARGIN - FOOT) / this.size.height);
+    this.view = { scale, x: (this.size.width - box.width / scale) / 2, y: (this.size.height - (box.height + MARGIN - FOOT) / scale) / 2 };
     this.apply();
   }
 
