@@ -34,6 +34,12 @@ export class MachineView {
     this.update();
   }
 
+  // Whether there is a choice between a drawing and a list.
+  get drawable() {
+    const data = this.store.get('graph ' + this.robot + ' ' + this.path);
+    return Boolean(data && data.drawn);
+  }
+
   update() {
     const data = this.store.get('graph ' + this.robot + ' ' + this.path);
     const live = liveOf(this.store, this.robot);
@@ -46,7 +52,7 @@ export class MachineView {
     const shown = drawn ? 'graph' : 'list';
     if (shown !== this.shown) replace(this.root, drawn ? this.graph.root : [this.note, this.list.root]);
     this.shown = shown;
-    setText(this.note, data.drawn || this.prefersList ? '' : 'Shown as a list: there is no drawing of it (yet). It needs Graphviz on the console’s machine.');
+    setText(this.note, data.drawn || this.prefersList ? '' : 'Shown as a list: there is no drawing of it, or not yet. Drawings need Graphviz on the console’s machine, and a machine that it can lay out in time.');
     if (drawn) {
       this.graph.set(this.robot, data);
       this.graph.setLive(live);
@@ -64,8 +70,8 @@ class Machines {
     this.view = new MachineView(app.store, (path) => this.open(this.robot, path));
     this.view.prefersList = remembered('machine-list', 'no') === 'yes';
     this.picker = h('div', { class: 'picker', role: 'tree', 'aria-label': 'Robots and their machines' });
-    this.title = h('h2', {});
-    this.state = h('span', { class: 'dim' });
+    this.title = h('h2', { class: 'ellipsis' });
+    this.state = h('span', { class: 'dim ellipsis' });
     this.toggle = h('button', { class: 'tool', onclick: () => this.toggleList() });
     this.body = h('section', { class: 'card machine-card' },
       h('div', { class: 'row head' }, this.title, this.state, h('span', { class: 'spacer' }), this.toggle), this.view.root, legend());
@@ -106,6 +112,7 @@ class Machines {
     const live = this.live(this.robot);
     setText(this.state, this.robot + (live.alive === false ? ' · gone' : ''));
     if (this.robot) this.view.show(this.robot, this.path);
+    this.toggle.hidden = !this.view.drawable;
   }
 
   live(robot) { return liveOf(this.app.store, robot); }
