@@ -1,7 +1,7 @@
 // Everything that may be answered, each a button: one press sends it. Keys: 1 to 9 a state, s the first supersede,
 // i the first interface, g give up.
 import { h } from './dom.js';
-import { CLASSES, chip, percent, rateBar } from './format.js';
+import { CLASSES, breakable, chip, percent, rateBar } from './format.js';
 import { OutputField } from './output_field.js';
 import { Preconditions } from './preconditions.js';
 
@@ -81,7 +81,7 @@ export class AnswerForm {
   state(choice, key) {
     const { state } = this.question;
     const button = this.choice('goto', choice.state, key,
-      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, choice.state), choice.state === state && chip('again', '', 'The state that failed'), h('span', { class: 'spacer' }),
+      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(choice.state, '_')), choice.state === state && chip('again', '', 'The state that failed'), h('span', { class: 'spacer' }),
         rateBar(1 - choice.success, choice.success, percent(choice.success) + ' ok')),
       h('span', { class: 'chips' }, CLASSES[choice.class] && chip(CLASSES[choice.class], 'class-' + choice.class),
         choice.blocked && chip('blocked: ' + choice.blocked, 'bad'),

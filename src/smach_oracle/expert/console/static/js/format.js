@@ -26,6 +26,11 @@ export function times(number) {
   return number === 1 ? 'once' : number === 2 ? 'twice' : number + ' times';
 }
 
+// A long name, that may be broken after each such sign.
+export function breakable(name, sign) {
+  return name.split(sign).flatMap((part, index) => (index ? [sign, h('wbr', {}), part] : [part]));
+}
+
 // Of a traceback that is the line that says what happened.
 export function lastLine(text) {
   return text.trim().split('\n').pop().slice(-300);

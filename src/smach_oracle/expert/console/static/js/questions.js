@@ -1,6 +1,6 @@
 // The queue of all robots' open questions, and the one that is worked on.
 import { h, replace, setText, typing } from './dom.js';
-import { chip, duration, rateBar } from './format.js';
+import { breakable, chip, duration, percent, rateBar } from './format.js';
 import { Detail } from './question_detail.js';
 
 export const questions = { id: 'questions', title: 'Questions', create: (app) => new Questions(app) };
@@ -69,11 +69,11 @@ class Questions {
     const age = h('span', { class: 'dim' });
     const left = h('span', { class: 'left' });
     const mine = question.holder && question.holder === this.app.expert;
-    const who = question.status === 'interface' ? chip('interface ' + question.interface + ' runs', 'accent')
+    const who = question.status === 'interface' ? chip(question.interface + ' runs', 'accent', 'The interface that somebody started for it')
       : question.holder ? chip(mine ? 'yours' : question.holder, mine ? 'good' : 'warn') : chip('waiting', 'bad');
     const root = h('button', { class: 'question-row ' + question.status, 'data-key': question.key, 'aria-current': Boolean(this.detail && this.detail.key === question.key), onclick: () => this.choose(question.key) },
-      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, question.state), h('span', { class: 'spacer' }), who),
-      h('span', { class: 'row dim' }, h('span', { class: 'ellipsis' }, question.robot + ' · ' + question.path), h('span', { class: 'spacer' }), rateBar(question.rate)),
+      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(question.state, '_')), h('span', { class: 'spacer' }), who),
+      h('span', { class: 'row dim' }, h('span', { class: 'where' }, question.robot + ' · ' + question.path), h('span', { class: 'spacer' }), h('span', { title: 'How often it fails, as learned' }, rateBar(question.rate, undefined, percent(question.rate) + ' fail'))),
       h('span', { class: 'row' }, age, h('span', { class: 'spacer' }), left));
     return { root, age, left };
   }

@@ -3,6 +3,7 @@ import { remember, remembered } from './alerts.js';
 import { CameraView } from './camera_view.js';
 import { CloudView, RobotView } from './cloud_view.js';
 import { h, replace } from './dom.js';
+import { breakable } from './format.js';
 import { JointsView } from './joints_view.js';
 
 export const sensors = { id: 'sensors', title: 'Sensors', create: (app) => new Sensors(app) };
@@ -42,7 +43,7 @@ class Sensors {
   group(kind, found) {
     return found.length > 0 && h('div', { class: 'group' }, h('span', { class: 'robot' }, TITLES[kind]), found.map((sensor) =>
       h('button', { class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': String(this.wanted.includes(nameOf(sensor))), onclick: () => this.toggle(sensor) },
-        sensor.topic.replace(/^\//, ''))));
+        breakable(sensor.topic.replace(/^\//, ''), '/'))));
   }
 
   toggle(sensor) {
