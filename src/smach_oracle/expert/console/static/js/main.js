@@ -34,7 +34,7 @@ class App {
 
   buildTop() {
     this.status = h('span', { id: 'status', class: 'status' });
-    this.person = h('button', { id: 'person', class: 'icon-button', disabled: true, onclick: () => this.askName() });
+    this.person = h('button', { id: 'person', class: 'icon-button', disabled: true, title: 'Your name, as robots and records have it', onclick: () => this.askName() });
     this.theme = h('button', { class: 'icon-button', onclick: () => this.nextTheme() });
     this.setTheme(remembered('theme', 'auto'));
     replace(document.getElementById('top'),
@@ -137,8 +137,8 @@ class App {
   setTheme(theme) {
     document.documentElement.dataset.theme = ['light', 'dark'].includes(theme) ? theme : 'auto';
     remember('theme', document.documentElement.dataset.theme);
-    setText(this.theme, { auto: 'Auto', light: 'Light', dark: 'Dark' }[document.documentElement.dataset.theme]);
-    this.theme.title = 'Dark or light';
+    setText(this.theme, { auto: '◐ Auto', light: '○ Light', dark: '● Dark' }[document.documentElement.dataset.theme]);
+    this.theme.title = 'Colours: dark, light, or as the system has them';
   }
 
   say(text, kind) { toast(text, kind); }

@@ -17,7 +17,7 @@ class Trials {
     this.app = app;
     this.chosen = '';
     this.events = [];
-    this.table = h('div', { class: 'table-frame card' });
+    this.table = h('div', { class: 'table-frame card trial-counts' });
     this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
     this.filter = h('select', { class: 'trial-filter', 'aria-label': 'Which trials are listed', onchange: () => this.update(['trials']) }, Object.entries(FILTERS).map(([name, [title]]) => h('option', { value: name }, title)));
     this.replay = new Replay(app, (event) => this.mark(event.seq));
