@@ -74,7 +74,7 @@ class SituationAndHistory(unittest.TestCase):
         self.assertTrue(browser.says('hand_is_free does not hold', PICK))
         told = browser.text(PICK)
         self.assertIn("camera_answers unknown: raised RuntimeError('no <b>camera</b>')", told)
-        self.assertIn('DETECT unknown: only running DETECT would tell; its last visit succeeded', told)
+        self.assertIn('DETECT unknown: only running it would tell; its last visit succeeded', told)
         self.assertTrue(browser.says('has not come back for', '.choice.goto[data-name=PLACE]'), 'and holds nobody up')
         rospy.set_param('/alpha/hand_is_free', True)
         self.assertTrue(browser.says('hand_is_free holds', PICK), 'what changes is told while the question is open')
