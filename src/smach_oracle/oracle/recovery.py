@@ -68,7 +68,8 @@ class Recovery:
     def _decide(self) -> Tuple[Action, str]:
         record, policy = self.record, self.ledger.policy
         if record.recoveries >= record.settings.max_recoveries:
-            self.reason = '{} recoveries of this trial are spent on it'.format(record.recoveries)
+            self.reason = ('1 recovery of this trial is spent on it' if record.recoveries == 1 else
+                           '{} recoveries of this trial are spent on it'.format(record.recoveries))
             return Action.ASK, ''
         failure_class = record.failure_class
         preconditions = self._run_preconditions(failure_class)

@@ -134,6 +134,17 @@ def test_the_log_is_bounded_and_forgets_details_first(monkeypatch):
     assert len(log.events('8', 2).events) == 1 and log.events('unknown', 0).events == []
 
 
+def test_a_trial_that_runs_keeps_its_events_longer_than_those_that_are_over(monkeypatch):
+    monkeypatch.setattr(trial_log, 'MOST_DETAILED', 2)
+    log = TrialLog()
+    log.add('/slow', event(EventKind.STATE_START, trial='waits'))
+    for number in range(4):
+        for kind in (EventKind.STATE_START, EventKind.TRIAL_END):
+            log.add('/fast', event(kind, trial=str(number), outcome='succeeded'))
+    assert [each['detailed'] for each in log.overview()['trials']] == [True, False, False, False, True]
+    assert len(log.events('waits', 0).events) == 1
+
+
 def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeypatch):
     monkeypatch.setattr(trial_log, 'MOST_DETAILED', 1)
     log = TrialLog()

@@ -10,7 +10,7 @@ from .tally import Tally, table
 from .views import event_view
 
 MOST_TRIALS = 1000
-MOST_DETAILED = 60  # of so many trials the events are kept, of the others the counts
+MOST_DETAILED = 60  # of so many trials the events are kept, of the others the counts; those that run come first
 MOST_EVENTS = 4000  # of a trial: the first ones
 SHOWN_TRIALS = 300
 _FAILING = FailingNames()
@@ -83,10 +83,11 @@ class TrialLog:
     def _forget(self) -> None:
         while len(self._trials) > MOST_TRIALS:
             self._trials.popitem(last=False)
-        if len(self._trials) > MOST_DETAILED:
-            oldest = list(self._trials.values())[-MOST_DETAILED - 1]
-            oldest.detailed = False
-            oldest.events.clear()
+        detailed = [trial for trial in self._trials.values() if trial.detailed]
+        if len(detailed) > MOST_DETAILED:
+            over = next((trial for trial in detailed if trial.tally.ending), detailed[0])
+            over.detailed = False
+            over.events.clear()
 
 
 def _row(trial_id: str, trial: _Trial) -> Dict[str, Any]:
