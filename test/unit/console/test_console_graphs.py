@@ -56,6 +56,17 @@ def test_a_graph_is_laid_out_once_and_drawn_from_top_to_bottom():
     assert all(0 <= state['at'][0] <= data['size'][0] for state in data['states'])
 
 
+def test_sixty_states_that_all_can_fail_and_go_back_are_drawn_too_with_a_place_for_every_label():
+    states = ['STATE_{}'.format(number) for number in range(60)]
+    made = [Edge(one, 'succeeded', two) for one, two in zip(states, states[1:] + ['succeeded'])]
+    made += [Edge(state, outcome, outcome) for state in states for outcome in ('aborted', 'preempted')]
+    made += [Edge(state, 'retry', states[(7 * number) % (number + 1)]) for number, state in enumerate(states)]
+    large = make_structure('TASK', states, made, OUTCOMES + ['preempted'])
+    data = drawing(large, lay_out(dot_text(large)), nested=[])
+    assert data['drawn'] and all(state['at'] for state in data['states'])
+    assert all(edge['points'] and edge['label'] for edge in data['edges'])
+
+
 @pytest.mark.parametrize('command', ['no_such_dot', 'true', 'false'])
 def test_without_a_working_dot_there_is_a_list(command):
     layouter, done = Layouter(command), threading.Event()

@@ -9,6 +9,8 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 MOST_STATES = 500  # of a container; more are not drawn
 MOST_EDGES = 3000
+MOST_LABELLED = 100  # edges up to which dot keeps room for their labels; beyond, it would take minutes
+_HASTE = ' nslimit=2; nslimit1=2; mclimit=0.3;'  # of a large graph: fewer rounds of making it prettier
 _CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 8.7, 28.0, 118.0, 300.0, 46.0  # of a state's box, in pixels
 _PIXELS_PER_INCH = 72.0
 
@@ -70,8 +72,9 @@ def find_oracle(labels: List[str], edges: List[Edge]) -> str:
 def dot_text(structure: Structure) -> str:
     """The graph for dot. No text of a robot is in it: nodes and edges are numbered, labels are runs of x."""
     names = _names(structure)
+    large = len(structure.edges) > MOST_LABELLED
     lines = ['digraph {', 'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
-             ' edge [fontsize=11];']
+             ' edge [fontsize=11];' + (_HASTE if large else '')]
     for label, name in names.items():
         width, height = box(label) if label in structure.states else (box(label)[0] * 0.9, 30.0)
         lines.append('{} [width={:.3f}, height={:.3f}];'.format(
@@ -79,8 +82,8 @@ def dot_text(structure: Structure) -> str:
     if structure.outcomes:
         lines.append('{{rank=sink; {}}}'.format('; '.join(names[outcome] for outcome in structure.outcomes)))
     for number, edge in enumerate(structure.edges):
-        lines.append('{} -> {} [id=e{}, label="{}"];'.format(
-            names[edge.source], names[edge.target], number, 'x' * min(24, len(edge.outcome) + 5)))
+        label = '' if large else ', label="{}"'.format('x' * min(24, len(edge.outcome) + 5))
+        lines.append('{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number, label))
     return '\n'.join(lines + ['}'])
 
 
@@ -148,7 +151,7 @@ def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Tuple[float, float]], 
             tip = [_point(part[2:], top)]
         elif not part.startswith('s,'):
             points.append(_point(part, top))
-    return points + tip, _point(data['lp'], top) if 'lp' in data else None
+    return points + tip, _point(data['lp'], top) if 'lp' in data else points[len(points) // 3] if points else None
 
 
 def _point(text: str, top: float) -> Tuple[float, float]:
