@@ -14,7 +14,7 @@ import sys
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from ..oracle.errors import OracleError
-from ..oracle.events import Event, EventKind
+from ..oracle.events import SPENT, Event, EventKind
 from ..oracle.failure_rate import FailureClass, classify, make_estimator
 from ..oracle.history import History
 from ..oracle.naming import is_preempted
@@ -144,7 +144,7 @@ class Replay:
 
 def _is_spent(event: Event) -> bool:
     """Whether max_recoveries decided, outside every policy."""
-    return 'are spent on it' in event.text
+    return event.text.endswith(SPENT)
 
 
 def _conditioned(events: Iterable[Event]) -> Dict[Key, bool]:

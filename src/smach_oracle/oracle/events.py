@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 NAN = float('nan')
 # Text of the TRIAL_END and CONTAINER_END of an execute() that returned None.
 NO_OUTCOME = 'ended without an outcome: inconsistent, or shut down'
+SPENT = ' spent on it'  # how a decision's text ends where max_recoveries decided, outside every policy
 
 
 class EventKind(IntEnum):

@@ -4,7 +4,7 @@ from typing import Any, List, Tuple
 
 import smach
 
-from .events import EventKind
+from .events import SPENT, EventKind
 from .failure import Ending, Failure, natural_ending
 from .failure_rate import FailureClass
 from .naming import PREEMPTED
@@ -68,8 +68,8 @@ class Recovery:
     def _decide(self) -> Tuple[Action, str]:
         record, policy = self.record, self.ledger.policy
         if record.recoveries >= record.settings.max_recoveries:
-            self.reason = ('1 recovery of this trial is spent on it' if record.recoveries == 1 else
-                           '{} recoveries of this trial are spent on it'.format(record.recoveries))
+            self.reason = ('1 recovery of this trial is' if record.recoveries == 1 else
+                           '{} recoveries of this trial are'.format(record.recoveries)) + SPENT
             return Action.ASK, ''
         failure_class = record.failure_class
         preconditions = self._run_preconditions(failure_class)
