@@ -132,14 +132,18 @@ def test_what_somebody_should_know_is_said_once_and_at_once() -> None:
 @pytest.mark.parametrize('signum', Interrupts.SIGNALS)
 def test_signals_are_kept_for_a_moment_at_which_they_can_do_no_harm(signum: int) -> None:
     before = signal.getsignal(signum)
-    with Interrupts() as interrupts:
-        interrupts.check()
-        for again in (signum, signal.SIGINT):
-            os.kill(os.getpid(), again)
-        with pytest.raises(Interrupted) as caught:
+    signal.signal(signum, signal.SIG_DFL)  # a hangup is ignored under nohup
+    try:
+        with Interrupts() as interrupts:
             interrupts.check()
-    assert caught.value.signum == signum
-    assert signal.getsignal(signum) == before
+            for again in (signum, signal.SIGINT):
+                os.kill(os.getpid(), again)
+            with pytest.raises(Interrupted) as caught:
+                interrupts.check()
+        assert caught.value.signum == signum
+        assert signal.getsignal(signum) == signal.SIG_DFL
+    finally:
+        signal.signal(signum, before)
 
 
 def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:
