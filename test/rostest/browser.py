@@ -45,14 +45,14 @@ class Browser:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 
-    def find(self, selector, limit_s=20.0):
+    def find(self, selector, limit_s=40.0):
         """The first element that is there and shown; raises where none comes in time."""
         found = wait_for(lambda: self._shown(selector), limit_s)
         if not found:
             raise AssertionError('nothing on the page for {!r}; it says:\n{}'.format(selector, self.text()[:2000]))
         return found
 
-    def click(self, selector, limit_s=20.0):
+    def click(self, selector, limit_s=40.0):
         """Click what is there, shown and enabled; the page may replace it in between."""
         def clicked():
             try:
@@ -66,7 +66,7 @@ class Browser:
         if not wait_for(clicked, limit_s):
             raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000]))
 
-    def says(self, text, selector='body', limit_s=20.0):
+    def says(self, text, selector='body', limit_s=40.0):
         """Whether an element comes to hold a text."""
         return bool(wait_for(lambda: text in self.text(selector), limit_s))
 

@@ -3,7 +3,7 @@ import time
 from typing import Any, Callable
 
 
-def wait_for(condition: Callable[[], Any], limit_s: float = 15.0) -> Any:
+def wait_for(condition: Callable[[], Any], limit_s: float = 40.0) -> Any:
     """Poll until the condition holds, at most so many seconds; its last value."""
     until = time.monotonic() + limit_s
     while time.monotonic() < until:
