@@ -172,16 +172,22 @@ class ConsoleInABrowser(unittest.TestCase):
         self.assertTrue(wait_for(lambda: 'take_over' in told()))
         self.assertEqual(told()[:2], ['claim', 'answer'])
 
+    def signs_in(self, token, told):
+        """Whether the page says so of a token."""
+        field = self.browser.find('#token')
+        field.clear()
+        field.send_keys(token)
+        self.browser.click('#sign-in')
+        return self.browser.says(told, limit_s=8.0)
+
     def test_6_with_tokens_a_viewer_signs_in_and_only_watches(self):
         browser, tokens = self.browser, os.path.join(self.bags, 'tokens')
         type(self).console.stop()
         type(self).console = self.start_console('_token_file:=' + tokens)
         for token, told in (('no such token', 'There is no such token.'), (None, 'bob (viewer)')):
-            field = browser.find('#token', 40.0)
-            field.clear()
-            field.send_keys(token or self.token_of('viewer', tokens))
-            browser.click('#sign-in')
-            self.assertTrue(browser.says(told), told)
+            tries = (self.signs_in(token or self.token_of('viewer', tokens), told) for _ in range(3))
+            # a page may have sent a token to a console that was about to go
+            self.assertTrue(any(tries), '{}: {}'.format(told, browser.text('body')))
         browser.click('#tab-questions')
         browser.click(QUESTION)
         self.assertTrue(browser.says('You are signed in as a viewer'))

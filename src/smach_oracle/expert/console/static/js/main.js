@@ -96,6 +96,7 @@ class App {
   }
 
   askToken() {
+    if (document.getElementById('token')) return; // what is being typed stays
     const token = h('input', { type: 'password', id: 'token', autocomplete: 'current-password', required: true });
     const problem = h('p', { class: 'problem', role: 'alert' });
     const form = h('form', { class: 'card sign-in', onsubmit: async (event) => {
