@@ -6,12 +6,12 @@ import json
 import re
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Optional, Tuple
+from typing import Optional, Tuple
 
 import tornado.web
 
 from .access import Buckets
-from .handlers import Gate, Guarded
+from .handlers import ForPages
 from .images import WIDTHS
 from .robot_sensor import RobotSensor
 from .sensors import Frame, Sensor, Sensors
@@ -34,34 +34,15 @@ class FrameRoom:
         self.workers = ThreadPoolExecutor(3, 'encode')
 
 
-class SensorHandler(Guarded):
+class SensorHandler(ForPages):
     """What both have in common that are asked about sensors."""
 
-    def initialize(self, gate: Gate, room: FrameRoom, **_: Any) -> None:  # type: ignore[override]
-        """Called by Tornado."""
-        super().initialize(gate)
-        self._room = room
-        self._gone = False
-
-    def prepare(self) -> None:
-        """The gate, with limits of its own; then who it is, and that a page of ours asks."""
-        status = self.gate.refusal(self, self._room.limits)
-        if status:
-            raise tornado.web.HTTPError(status)
-        session = self.gate.session(self)
-        if self.gate.identity(session) is None:
-            raise tornado.web.HTTPError(401)
-        self.demand_xsrf(session)
+    _room: FrameRoom
+    _gone = False
 
     def on_connection_close(self) -> None:
         """The page asks for it no longer."""
         self._gone = True
-
-    def tell_why(self, err: ValueError) -> None:
-        """What was asked for cannot be shown."""
-        self.set_status(422)
-        self.set_header('Content-Type', 'text/plain; charset=utf-8')
-        self.finish(str(err)[:500])
 
     def sensor(self, number: str) -> Sensor:
         """By its number."""
@@ -84,7 +65,6 @@ class ModelHandler(SensorHandler):
     async def get(self, number: str) -> None:
         """Answer when it has been read."""
         robot = self.robot(number)
-        self.set_header('Cache-Control', 'no-store')
         try:
             encoded = await asyncio.get_running_loop().run_in_executor(
                 self._room.workers, lambda: robot.model().encoded())
@@ -109,7 +89,6 @@ class FrameHandler(SensorHandler):
         sensor = self.sensor(number)
         beside = self.robot(robot) if robot else None
         frame = await self._wait(sensor, after)
-        self.set_header('Cache-Control', 'no-store')
         if frame is None:
             self.set_status(204)
             return

@@ -98,6 +98,32 @@ class Guarded(tornado.web.RequestHandler):
         self.finish('{} {}\n'.format(status_code, self._reason))
 
 
+class ForPages(Guarded):
+    """A handler for pages of ours, of people who are signed in; with limits of its own, those of its room."""
+
+    def initialize(self, gate: Gate, room: Any, **_: Any) -> None:  # type: ignore[override]
+        """Called by Tornado. `room`: what its requests share, `limits: Buckets` among it."""
+        super().initialize(gate)
+        self._room = room
+
+    def prepare(self) -> None:
+        """The gate; then who it is, and that a page of ours asks."""
+        status = self.gate.refusal(self, self._room.limits)
+        if status:
+            raise tornado.web.HTTPError(status)
+        session = self.gate.session(self)
+        if self.gate.identity(session) is None:
+            raise tornado.web.HTTPError(401)
+        self.demand_xsrf(session)
+        self.set_header('Cache-Control', 'no-store')
+
+    def tell_why(self, err: Exception) -> None:
+        """What was asked for cannot be shown."""
+        self.set_status(422)
+        self.set_header('Content-Type', 'text/plain; charset=utf-8')
+        self.finish(str(err)[:500])
+
+
 class NotThere(Guarded):
     """Everything else."""
 

@@ -1,13 +1,12 @@
 """What the web server answers of the past: a trial of a bag, and what a camera saw."""
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import tornado.web
 
 from .access import Buckets
 from .bags import NotRead
-from .handlers import Gate, Guarded
+from .handlers import ForPages
 from .recorded import RecordedTrials
 from .stills import StillFiles
 
@@ -22,26 +21,16 @@ class HistoryRoom:
         self.workers = ThreadPoolExecutor(1, 'bags')
 
 
-class _HistoryHandler(Guarded):
-    """For pages of ours, of people who are signed in."""
+class _HistoryHandler(ForPages):
+    """Has no arguments but the number."""
 
-    def initialize(self, gate: Gate, room: HistoryRoom, **_: Any) -> None:  # type: ignore[override]
-        """Called by Tornado."""
-        super().initialize(gate)
-        self._room = room
+    _room: HistoryRoom
 
     def prepare(self) -> None:
-        """The gate, with limits of its own; then who it is, and that a page of ours asks."""
-        status = self.gate.refusal(self, self._room.limits)
-        if status:
-            raise tornado.web.HTTPError(status)
-        session = self.gate.session(self)
-        if self.gate.identity(session) is None:
-            raise tornado.web.HTTPError(401)
-        self.demand_xsrf(session)
+        """The gate, who it is, and nothing besides."""
+        super().prepare()
         if self.request.query_arguments:
             raise tornado.web.HTTPError(400)
-        self.set_header('Cache-Control', 'no-store')
 
 
 class RecordedHandler(_HistoryHandler):
@@ -53,9 +42,7 @@ class RecordedHandler(_HistoryHandler):
             text = await asyncio.get_running_loop().run_in_executor(
                 self._room.workers, self._room.recorded.text, int(number))
         except NotRead as err:
-            self.set_status(422)
-            self.set_header('Content-Type', 'text/plain; charset=utf-8')
-            self.finish(str(err)[:500])
+            self.tell_why(err)
             return
         self.set_header('Content-Type', 'application/json')
         self.finish(text)
