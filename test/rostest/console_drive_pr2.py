@@ -18,12 +18,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node, free_port  # noqa: E402
+from console_browser import Node  # noqa: E402
 from thin_line import ThinLine  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.geometry.transforms import from_quaternion  # noqa: E402
 from smach_oracle.msg import CollisionBoxes, ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:

@@ -14,13 +14,13 @@ from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_browser import Node  # noqa: E402
-from ports import free_port  # noqa: E402
 from published_camera import OPTICAL, PublishedCamera  # noqa: E402
 from roslib.packages import find_node  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand  # noqa: E402
 from smach_oracle.ros.images import cloud_message  # noqa: E402
+from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 from smach_oracle.simulation.world.node.state_publisher import publish_description  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 

@@ -14,10 +14,10 @@ import rostest
 from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from ports import free_port  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, OpenQueries  # noqa: E402
+from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:

@@ -13,12 +13,13 @@ import rostest
 from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node, free_port  # noqa: E402
+from console_browser import Node  # noqa: E402
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:

@@ -13,11 +13,11 @@ from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_browser import YOURS, ConsoleInABrowser, Node  # noqa: E402
-from ports import free_port  # noqa: E402
 from published_camera import PublishedCamera  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, OpenQueries  # noqa: E402
+from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))

@@ -11,10 +11,10 @@ from typing import Any, Dict, List, Optional
 
 import rosbag
 import rospy
-from ports import free_port
 from waiting import wait_for
 
 from smach_oracle.msg import OpenQueries, OracleEvent
+from smach_oracle.simulation.experiment.launching import free_port
 from smach_oracle.srv import AnswerQuery, ClaimQuery
 
 RUNNER = 'from smach_oracle.ros.script_runner import main; main()'

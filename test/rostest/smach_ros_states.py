@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """ServiceState, MonitorState and ConditionState against real services and topics; the Ctrl-C handler."""
 import os
-import socket
 import subprocess
 import sys
 import threading
@@ -18,6 +17,8 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 from smach_ros import ConditionState, MonitorState, ServiceState
 from smach_ros_support import HERE, InBackground, LogWatch, userdata
 from waiting import wait_for
+
+from smach_oracle.simulation.experiment.launching import free_port
 
 
 def set_bool(request):
@@ -266,9 +267,7 @@ class CtrlCTest(unittest.TestCase):
 
 class NoMasterTest(unittest.TestCase):
     def test_ctrl_c_ends_states_that_began_while_the_master_was_away(self):
-        with socket.socket() as free:
-            free.bind(('localhost', 0))
-            port = free.getsockname()[1]
+        port = free_port()
         master = subprocess.Popen(['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL)
         self.addCleanup(master.kill)
         uri = 'http://localhost:%d' % port

@@ -1,6 +1,8 @@
 """One roslaunch with a master of its own, whose last descendant is found again, also by the next run after a crash."""
 import ctypes
+import errno
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -13,6 +15,7 @@ MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the j
 NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
 STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
 KILL_S = 10.0  # for the kernel to take away what was killed
+BELOW_EPHEMERAL = (20000, 32000)  # ports; what the system gives to others by itself begins above (Linux: 32768)
 _PR_SET_PDEATHSIG = 1
 
 
@@ -83,10 +86,18 @@ def end_with_parent() -> None:
 
 
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return int(probe.getsockname()[1])
+    """A TCP port of the loopback interface that nobody listens on, nor is given by chance before it is used."""
+    chance = random.SystemRandom()
+    while True:
+        port = chance.randrange(*BELOW_EPHEMERAL)
+        with socket.socket() as probe:
+            try:
+                probe.bind(('localhost', port))
+            except OSError as err:
+                if err.errno != errno.EADDRINUSE:
+                    raise
+                continue
+            return port
 
 
 def marked(mark: str) -> List[int]:
