@@ -2,7 +2,6 @@
 """The operator console in a real browser: real node, real master, a real machine under a real oracle."""
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -11,69 +10,35 @@ import unittest
 import rosbag
 import rospy
 import rostest
-from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
-WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
+    pass  # noqa: E402
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'
 
 
-class Node:
-    """A node of its own process."""
-
-    def __init__(self, *command):
-        self._process = subprocess.Popen(command)
-
-    def stop(self):
-        """Ctrl-C, as from a shell."""
-        if self._process.poll() is None:
-            self._process.terminate()
-            self._process.wait(20)
-
-
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
-class ConsoleInABrowser(unittest.TestCase):
+class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.port = free_port()
         cls.bags = tempfile.mkdtemp()
         rospy.set_param('/alpha/record', cls.bags)
         cls.audited, cls.events = [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
-        cls.console = cls.start_console()
-        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)), 'console_robot.py'),
-                         'PICK', '0.1', '0', '3', '__name:=alpha')
-        cls.browser = Browser()
-        cls.page = 'http://localhost:{}/'.format(cls.port)
-        wait_for(cls.page_is_served, 30.0)
-        cls.browser.driver.get(cls.page)
+        cls.begin('console_robot.py', 'PICK', '0.1', '0', '3')
 
     @classmethod
     def tearDownClass(cls):
-        cls.browser.close()
-        cls.robot.stop()
-        cls.console.stop()
+        super().tearDownClass()
         shutil.rmtree(cls.bags, ignore_errors=True)
-
-    @classmethod
-    def start_console(cls, *more):
-        return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
-                    '__name:=expert_console', *more)
-
-    @classmethod
-    def page_is_served(cls):
-        with socket.socket() as probe:
-            return probe.connect_ex(('127.0.0.1', cls.port)) == 0
 
     @staticmethod
     def token_of(role, path):

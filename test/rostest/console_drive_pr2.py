@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node  # noqa: E402
+from console_page import Node  # noqa: E402
 from thin_line import ThinLine  # noqa: E402
 from waiting import wait_for  # noqa: E402
 

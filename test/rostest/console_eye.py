@@ -2,7 +2,6 @@
 """The console's eye in a real browser: an object marked with the mouse in a real interface, sensors looked at, and a
 robot with its cloud in 3D."""
 import os
-import shutil
 import sys
 import unittest
 
@@ -13,20 +12,16 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
 from published_camera import OPTICAL, PublishedCamera  # noqa: E402
-from roslib.packages import find_node  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand  # noqa: E402
 from smach_oracle.ros.images import cloud_message  # noqa: E402
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 from smach_oracle.simulation.world.node.state_publisher import publish_description  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
-WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
     from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
     from selenium.webdriver.common.keys import Keys  # noqa: E402
 TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22))
@@ -46,7 +41,7 @@ PICTURE = ('const view = document.querySelector(arguments[0]);'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
-class TheEye(unittest.TestCase):
+class TheEye(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
@@ -56,28 +51,7 @@ class TheEye(unittest.TestCase):
         cls.cloud = rospy.Publisher('points', PointCloud2, queue_size=1, latch=True)
         cls.audited = []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
-        port = free_port()
-        cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
-                           '__name:=expert_console')
-        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
-                                                      'console_eye_robot.py'), '__name:=alpha')
-        cls.browser = Browser(1360, 1000)
-        cls.page = 'http://localhost:{}/'.format(port)
-        wait_for(cls.page_is_served, 40.0)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.close()
-        cls.robot.stop()
-        cls.console.stop()
-
-    @classmethod
-    def page_is_served(cls):
-        try:
-            cls.browser.driver.get(cls.page)
-            return cls.browser.driver.title
-        except Exception:  # whatever the driver says of a page that is not there yet
-            return False
+        cls.begin('console_eye_robot.py', size=(1360, 1000))
 
     def drag(self, *points):
         """With the mouse, over points of the frame in px."""

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A hand driven from a real browser, by held keys and buttons, through an interface that is started on demand."""
 import os
-import shutil
 import signal
 import sys
 import time
@@ -10,18 +9,15 @@ from functools import partial
 
 import rospy
 import rostest
-from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import Node  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
-WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
     from browser import Browser  # noqa: E402
     from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
@@ -31,7 +27,7 @@ QUESTION = '.question-row[data-key^="/alpha/"]'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
-class TheHand(unittest.TestCase):
+class TheHand(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
@@ -40,31 +36,11 @@ class TheHand(unittest.TestCase):
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/manipulation_interface/state', TeleopState, cls.states.append, tcp_nodelay=True)
         rospy.Subscriber('/manipulation_interface/command', TeleopCommand, cls.heard, tcp_nodelay=True)
-        port = free_port()
-        cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
-                           '__name:=expert_console')
-        cls.robot = Node(sys.executable, os.path.join(HERE, 'console_hand_robot.py'), '__name:=alpha')
-        cls.browser = Browser(1360, 1000)
-        cls.page = 'http://localhost:{}/'.format(port)
-        wait_for(cls.page_is_served, 40.0)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.close()
-        cls.robot.stop()
-        cls.console.stop()
+        cls.begin('console_hand_robot.py', size=(1360, 1000))
 
     @classmethod
     def heard(cls, command):
         cls.commands.append((time.monotonic(), command))
-
-    @classmethod
-    def page_is_served(cls):
-        try:
-            cls.browser.driver.get(cls.page)
-            return cls.browser.driver.title
-        except Exception:  # whatever the driver says of a page that is not there yet
-            return False
 
     def height(self):
         return self.states[-1].tool_pose.position.z

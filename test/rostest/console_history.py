@@ -9,10 +9,10 @@ import unittest
 import rosbag
 import rospy
 import rostest
-from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import YOURS, ConsoleInABrowser, Node  # noqa: E402
+from console_browser import YOURS  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage, Node  # noqa: E402
 from published_camera import PublishedCamera  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
@@ -20,7 +20,6 @@ from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, Op
 from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 from smach_oracle.simulation.world.scene import Body  # noqa: E402
 
-WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
     from browser import Browser  # noqa: E402
     from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
@@ -34,7 +33,7 @@ MIDDLE = ('const c = document.querySelector(arguments[0]); if (!c) return null; 
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
-class SituationAndHistory(unittest.TestCase):
+class SituationAndHistory(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
@@ -55,13 +54,14 @@ class SituationAndHistory(unittest.TestCase):
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get('http://localhost:{}/'.format(cls.port))
 
-    tearDownClass = classmethod(ConsoleInABrowser.tearDownClass.__func__)
-    page_is_served = classmethod(ConsoleInABrowser.page_is_served.__func__)
+    @classmethod
+    def tearDownClass(cls):
+        super().tearDownClass()
+        shutil.rmtree(cls.bags, ignore_errors=True)
 
     @classmethod
     def start_console(cls, *more):
-        return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
-                    '__name:=expert_console', '_bags:=' + cls.bags, *more)
+        return super().start_console('_bags:=' + cls.bags, *more)
 
     def question(self) -> ExpertQueryGoal:
         self.assertTrue(wait_for(lambda: self.open and self.open[-1].queries, 30.0))
