@@ -121,7 +121,7 @@ class TestPages(console_case.ConsoleCase):
     async def test_many_browsers_together_are_held_to_a_number(self):
         self.office.open |= {object.__new__(page_socket.Socket) for _ in range(page_socket.MOST_SOCKETS)}
         for each in self.office.open:
-            each._session = None
+            each.session = None
         assert await self.refused((await self.signed('operator'))[0]) == 503
 
     @tornado.testing.gen_test

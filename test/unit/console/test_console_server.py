@@ -6,7 +6,7 @@ import console_case
 import tornado.testing
 from console_case import TOKENS
 
-from smach_oracle.expert.console import handlers
+from smach_oracle.expert.console import handlers, page_socket
 
 
 class TestRequests(console_case.ConsoleCase):
@@ -99,6 +99,22 @@ class TestSignIn(console_case.ConsoleCase):
         cookie, said = self.sign_in('viewer')
         answer = self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=said['xsrf'])
         assert json.loads(answer.body)['signed_in'] is False
+        assert ('sign_out', True, 'viewer', '', None) in self.audit.told
+        assert self.begin(Cookie=cookie)[1]['signed_in'] is False, 'a copy of its cookie is good for nothing'
+
+    @tornado.testing.gen_test
+    async def test_signing_out_closes_the_pages_of_that_browser_alone(self):
+        cookie, said = await self.signed('operator')
+        pages = [await self.open_page(cookie, said) for _ in range(2)]
+        other = await self.open_page(*await self.signed('operator'))
+        await self.http_client.fetch(self.get_url('/session'), method='DELETE', headers={
+            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': said['xsrf']})
+        for page in pages:
+            while await page.read_message() is not None:
+                pass
+            assert page.close_code == page_socket.SIGNED_OUT
+        assert await self.refused(cookie) == 401
+        assert (await self.say(other, 9, do='watch', trial=''))['ok']
 
 
 class TestSocket(console_case.ConsoleCase):

@@ -1,6 +1,7 @@
 """What the web server answers: the page, the session, the socket. Every request passes the same gate first."""
+import collections
 import json
-from typing import Any, Dict, NamedTuple, Optional
+from typing import Any, Callable, Deque, Dict, NamedTuple, Optional
 
 import tornado.web
 
@@ -20,6 +21,7 @@ HEADERS = {
     'Cross-Origin-Resource-Policy': 'same-origin', 'Cache-Control': 'no-cache',
     'Permissions-Policy': 'camera=(), microphone=(), geolocation=()'}
 LONGEST_BODY = 4096
+MOST_ENDED = 10000  # sessions
 
 
 class Gate:
@@ -32,10 +34,16 @@ class Gate:
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = Buckets(rate=30.0, burst=150.0, for_all=5.0)
         self.sign_ins = Buckets(rate=0.2, burst=5.0, for_all=4.0)
+        self._ended: Deque[str] = collections.deque(maxlen=MOST_ENDED)
 
     def session(self, handler: tornado.web.RequestHandler) -> Optional[Session]:
         """The session of a request's cookie; None where it has none of ours."""
-        return sessions.from_text(handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
+        session = sessions.from_text(handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
+        return None if session is None or session.id in self._ended else session
+
+    def end(self, session: Session) -> None:
+        """Its cookie, of which somebody may have a copy, is good for nothing any more."""
+        self._ended.append(session.id)
 
     def identity(self, session: Optional[Session]) -> Optional[Identity]:
         """Who a session speaks for; None before signing in. Without tokens whoever gets here may do everything."""
@@ -164,6 +172,11 @@ class StaticFile(tornado.web.StaticFileHandler):
 class SessionHandler(Guarded):
     """GET: who am I; POST: a token for a session; DELETE: sign out."""
 
+    def initialize(self, gate: Gate, close: Callable[[Session], None]) -> None:  # type: ignore[override]
+        """Called by Tornado. `close`: the sockets of a session."""
+        super().initialize(gate)
+        self._close = close
+
     def get(self) -> None:
         """Say what the page needs to know before it opens the socket; begin a session where there is none."""
         session = self.gate.session(self)
@@ -188,8 +201,13 @@ class SessionHandler(Guarded):
         self._tell(session)
 
     def delete(self) -> None:
-        """Sign out."""
-        self._tell(self.demand_xsrf(self.gate.session(self)) and self._begin(None))
+        """Sign out: every page of this browser."""
+        session = self.demand_xsrf(self.gate.session(self))
+        self.gate.end(session)
+        self._close(session)
+        self.gate.audit.tell(Person(self.request.remote_ip or '', session.short, session.role, session.name),
+                             'sign_out', True, '')
+        self._tell(self._begin(None))
 
     def _begin(self, identity: Optional[Identity]) -> Session:
         session = sessions.new_session(identity)

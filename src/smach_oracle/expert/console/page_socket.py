@@ -27,9 +27,9 @@ HELLO_LIMIT_S = 10.0
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
-RENAMED = 4001
 TOO_FAST = 4008
 FORGED = 4003
+SIGNED_OUT = 4001
 
 
 class Office:
@@ -45,6 +45,12 @@ class Office:
         self.numbers = itertools.count(1)
         self.workers = ThreadPoolExecutor(8, 'command')
 
+    def close(self, session: sessions.Session) -> None:
+        """Close the pages of a session that has ended; what they hold is let go, a hand that they drive stands."""
+        for socket in list(self.open):
+            if socket.session is not None and socket.session.id == session.id:
+                socket.close(SIGNED_OUT, 'signed out')
+
     def push(self) -> None:
         """Let every page have what is new."""
         for socket in list(self.sockets):
@@ -59,7 +65,7 @@ class Socket(tornado.websocket.WebSocketHandler):
         self._gate = gate
         self._office = office
         self._person: Optional[Person] = None
-        self._session: Optional[sessions.Session] = None
+        self.session: Optional[sessions.Session] = None
         self._name = ''
         self._number = next(office.numbers)
         self._limits = Limits(Bucket(10.0, 40.0), Bucket(70.0, 70.0), Bucket(0.5, 20.0))
@@ -82,8 +88,8 @@ class Socket(tornado.websocket.WebSocketHandler):
         status = self._gate.refusal(self)
         if not status and not self._gate.from_own_page(self, must_say=True):
             status = 403
-        self._session = self._gate.session(self)
-        if not status and self._gate.identity(self._session) is None:
+        self.session = self._gate.session(self)
+        if not status and self._gate.identity(self.session) is None:
             status = 401
         if not status and not self._has_room():
             status = 503
@@ -91,8 +97,8 @@ class Socket(tornado.websocket.WebSocketHandler):
             raise tornado.web.HTTPError(status)
 
     def _has_room(self) -> bool:
-        session = self._session
-        own = [each for each in self._office.open if session and each._session and each._session.id == session.id]
+        session = self.session
+        own = [each for each in self._office.open if session and each.session and each.session.id == session.id]
         return len(self._office.open) < MOST_SOCKETS and len(own) < MOST_OF_A_SESSION
 
     def check_origin(self, origin: str) -> bool:
@@ -166,7 +172,7 @@ class Socket(tornado.websocket.WebSocketHandler):
                 self._office.hands.leave(self._number)
 
     def _hello(self, command: Command) -> Reply:
-        session, identity = self._session, self._gate.identity(self._session)
+        session, identity = self.session, self._gate.identity(self.session)
         if session is None or identity is None or not sessions.same(
                 command.arguments['xsrf'], sessions.xsrf_token(session, self._gate.secret)):
             self._note(None, Reply(False, 'forged'))
@@ -180,7 +186,7 @@ class Socket(tornado.websocket.WebSocketHandler):
 
     def _note(self, command: Optional[Command], reply: Reply) -> Reply:
         """Tell the audit of what the desk has not seen."""
-        session = self._session.short if self._session else ''
+        session = self.session.short if self.session else ''
         person = self._person or Person(self.request.remote_ip or '', session, '', '')
         arguments = {name: value for name, value in command.arguments.items() if name != 'xsrf'} if command else {}
         self._gate.audit.tell(person, command.name if command else 'unknown', reply.ok, reply.message, arguments)

@@ -52,7 +52,8 @@ def make_app(gate: Gate, office: Office, sensors: Sensors, history: HistoryRoom)
     shared = {'gate': gate}
     room = FrameRoom(sensors)
     return tornado.web.Application(
-        [(r'/session', SessionHandler, shared), (r'/socket', Socket, {'gate': gate, 'office': office}),
+        [(r'/session', SessionHandler, {'gate': gate, 'close': office.close}),
+         (r'/socket', Socket, {'gate': gate, 'office': office}),
          (r'/frame/([0-9]{1,9})', FrameHandler, {'gate': gate, 'room': room}),
          (r'/model/([0-9]{1,9})', ModelHandler, {'gate': gate, 'room': room}),
          (r'/recorded/([0-9]{1,9})', RecordedHandler, {'gate': gate, 'room': history}),

@@ -60,8 +60,8 @@ export class FrameFeed {
 
   async once(id, after, beside) {
     this.controller = new AbortController();
-    const answer = await fetch('frame/' + id + '?after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : ''),
-      { headers: { 'X-Xsrf': this.app.session.xsrf }, cache: 'no-store', signal: this.controller.signal });
+    const answer = await this.app.link.fetch('frame/' + id + '?after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : ''),
+      { signal: this.controller.signal });
     if (answer.status === 204) {
       this.say(after ? 'Nothing new comes.' : 'Nothing comes.');
       return after;

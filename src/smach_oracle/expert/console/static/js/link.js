@@ -46,7 +46,9 @@ export class Link {
     this.generation = 0;
     this.session = null;
     this.connected = false;
-    const hurry = () => { if (!this.connected && !document.hidden && this.timer) this.connect(); };
+    this.signedOut = false;
+    // signed out: another page of this browser may have signed in meanwhile
+    const hurry = () => { if (!this.connected && !document.hidden && (this.timer || this.signedOut)) this.connect(); };
     window.addEventListener('online', hurry);
     document.addEventListener('visibilitychange', hurry);
   }
@@ -58,17 +60,22 @@ export class Link {
     if (this.socket) this.socket.close();
     this.onState('connecting', this.session);
     try {
-      const answer = await fetch('session', { cache: 'no-store', signal: AbortSignal.timeout(8000) });
-      if (!answer.ok) throw new Lost();
-      const session = await answer.json();
+      const session = await this.whoAmI();
       if (generation !== this.generation) return;
       this.session = session;
     } catch (err) {
       if (generation === this.generation) this.again();
       return;
     }
-    if (!this.session.signed_in) this.onState('signed-out', this.session);
+    this.signedOut = !this.session.signed_in;
+    if (this.signedOut) this.onState('signed-out', this.session);
     else this.open(generation);
+  }
+
+  async whoAmI() {
+    const answer = await fetch('session', { cache: 'no-store', signal: AbortSignal.timeout(8000) });
+    if (!answer.ok) throw new Lost();
+    return answer.json();
   }
 
   open(generation) {
@@ -137,18 +144,25 @@ export class Link {
   }
 
   async signIn(token) {
-    const answer = await this.change('POST', JSON.stringify({ token }));
+    const answer = await this.fetch('session', { method: 'POST', body: JSON.stringify({ token }) });
     if (answer.ok) this.connect();
     return answer.status;
   }
 
   async signOut() {
-    await this.change('DELETE');
+    await this.fetch('session', { method: 'DELETE' });
     this.fail();
     this.connect();
   }
 
-  change(method, body) {
-    return fetch('session', { method, body, headers: { 'X-Xsrf': this.session.xsrf } });
+  // What this page alone may ask for. Where another page of this browser has begun a new session meanwhile (all of them share
+  // the cookie), it is asked for once more in the name of that.
+  async fetch(path, options) {
+    const { xsrf } = this.session;
+    const ask = () => fetch(path, Object.assign({ cache: 'no-store' }, options, { headers: { 'X-Xsrf': this.session.xsrf } }));
+    const answer = await ask();
+    if (answer.status !== 403) return answer;
+    if (this.session.xsrf === xsrf) Object.assign(this.session, await this.whoAmI());
+    return this.session.xsrf === xsrf ? answer : ask();
   }
 }

@@ -39,7 +39,7 @@ export class Recorded {
       return;
     }
     try {
-      const answer = await fetch('recorded/' + number, { headers: { 'X-Xsrf': this.app.session.xsrf }, cache: 'no-store' });
+      const answer = await this.app.link.fetch('recorded/' + number);
       const data = answer.ok ? await answer.json() : null;
       if (this.wanted !== number) return;
       if (data) this.opened = Object.assign(data, { number });

@@ -48,7 +48,7 @@ export class RobotFeed {
   }
 
   async fetchModel() {
-    const answer = await fetch('model/' + this.number, { headers: { 'X-Xsrf': this.app.session.xsrf }, cache: 'no-store' });
+    const answer = await this.app.link.fetch('model/' + this.number);
     if (!answer.ok) throw new Error(answer.status);
     return modelOf(await answer.arrayBuffer());
   }

@@ -28,7 +28,7 @@ export class StillView {
 
   async fetch(app, still) {
     try {
-      const answer = await fetch('still/' + still.id, { headers: { 'X-Xsrf': app.session.xsrf }, cache: 'no-store' });
+      const answer = await app.link.fetch('still/' + still.id);
       if (!answer.ok) throw new Error(answer.status === 404 ? 'It is not kept any more.' : 'It cannot be had (' + answer.status + ').');
       await drawPicture(this.canvas, answer);
       this.note.hidden = true;
