@@ -11,9 +11,10 @@ import smach
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
 
-from smach_oracle.msg import (MoveArmsAsideAction, MoveArmsAsideGoal, PickAction, PickGoal, PlaceAction, PlaceGoal,
-                              PointHeadAction, PointHeadGoal)
+from smach_oracle.msg import (CollisionBoxes, MoveArmsAsideAction, MoveArmsAsideGoal, PickAction, PickGoal, PlaceAction,
+                              PlaceGoal, PointHeadAction, PointHeadGoal)
 from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import pick_and_place
 
@@ -87,6 +88,18 @@ class PickAndPlaceTest(unittest.TestCase):
             self.assertEqual(machine.execute(), 'succeeded', seed)
             verdict = self.judge()
             self.assertTrue(verdict.success, verdict.why)
+
+    def test_4_what_was_planned_in_is_shown_to_those_who_come_late_and_to_rviz(self):
+        boxes = rospy.wait_for_message('collision_map', CollisionBoxes, 60.0)
+        gone, *cubes = rospy.wait_for_message('collision_map_markers', MarkerArray, 60.0).markers
+        self.assertEqual(gone.action, Marker.DELETEALL)
+        self.assertIn('table', boxes.names)
+        self.assertEqual([(cube.text, cube.pose, cube.scale, cube.header.frame_id) for cube in cubes],
+                         [(name, where, size, 'base_footprint')
+                          for name, where, size in zip(boxes.names, boxes.poses, boxes.sizes)])
+        self.assertEqual({(cube.type, cube.action, cube.ns) for cube in cubes},
+                         {(Marker.CUBE, Marker.ADD, 'collision_map')})
+        self.assertEqual(len({cube.id for cube in cubes}), len(cubes))
 
 
 if __name__ == '__main__':

@@ -14,6 +14,7 @@ from control_msgs.msg import (FollowJointTrajectoryAction, FollowJointTrajectory
                               SingleJointPositionAction, SingleJointPositionGoal)
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -147,13 +148,16 @@ class Pr2World(unittest.TestCase):
         self.assertFalse([each for each in topics[1].messages if each.header.stamp != second.stamp])
 
     def test_who_comes_late_learns_how_the_robot_stands_though_nothing_moves(self) -> None:
-        states = Heard('joint_states', JointState)
+        states, odometry = Heard('joint_states', JointState), Heard('base_odometry/odom', Odometry)
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
-        self.assertTrue(wait_for(lambda: states.messages, LIMIT_S))
+        self.assertTrue(wait_for(lambda: states.messages and odometry.messages, LIMIT_S))
         self.assertTrue(wait_for(lambda: buffer.can_transform('odom_combined', 'r_gripper_tool_frame', rospy.Time()),
                                  LIMIT_S))
+        place = odometry.messages[-1].pose.pose.position
+        self.assertTrue(np.allclose((place.x, place.y), self.robot.odom_from_base()[:2, 3]))
         states.subscriber.unregister()
+        odometry.subscriber.unregister()
         listener.unregister()
 
     def test_tf_takes_odometry_to_every_link_of_the_description(self) -> None:

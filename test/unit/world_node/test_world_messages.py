@@ -6,7 +6,7 @@ import pytest
 from rospy import Time
 from std_msgs.msg import Header
 
-from smach_oracle.geometry.transforms import from_quaternion, inverse
+from smach_oracle.geometry.transforms import from_quaternion, from_rpy, inverse
 from smach_oracle.simulation.robot.interface import ARM_JOINTS, BASE_FRAME, CAMERA_FRAME, TOOL_FRAME
 from smach_oracle.simulation.robot.kitchen import Kitchen
 from smach_oracle.simulation.robot.pr2_model import pr2_urdf
@@ -14,7 +14,7 @@ from smach_oracle.simulation.world.camera import INTRINSICS
 from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
 from smach_oracle.simulation.world.node.camera_publisher import camera_info
 from smach_oracle.simulation.world.node.reveal import reveal
-from smach_oracle.simulation.world.node.state_publisher import transforms
+from smach_oracle.simulation.world.node.state_publisher import odometry, transforms
 from smach_oracle.simulation.world.node.streamed import Streamed
 from smach_oracle.simulation.world.node.transform_tree import TransformTree
 from smach_oracle.simulation.world.node.trial import Trial, append_line
@@ -56,6 +56,25 @@ def test_the_transforms_take_every_link_to_where_the_physics_has_it(world):
         return base_from(fixed.parent) @ from_quaternion(fixed.position, fixed.turn)
     for link in (*TOOL_FRAME.values(), CAMERA_FRAME, 'base_link', 'l_gripper_l_finger_tip_link', 'laser_tilt_link'):
         assert np.allclose(base_from(link), inverse(world.true_base()) @ world.link_pose(link), atol=2e-4), link
+
+
+def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_its_own_axes():
+    driving = World(Scene('test', 7, (), Goal('stands_at', ''), RobotStart((), (0.5, -0.2, np.pi / 2))))
+    driving.belief_error = from_rpy((0.1, 0.0, 0.0))
+    for _ in range(30):  # forward, which is along y of the world, and turning
+        y, turn = driving.robot.target('base_y') + 0.3 / 60, driving.robot.target('base_theta') + 0.1 / 60
+        driving.robot.set_target('base_y', y, 0.3, None)
+        driving.robot.set_target('base_theta', turn, 0.1, None)
+        driving.step()
+    said = odometry(driving.odom_from_base(), driving.robot.base_velocity(), Time(3))
+    assert (said.header.frame_id, said.child_frame_id) == ('odom_combined', BASE_FRAME)
+    place, true = said.pose.pose.position, driving.true_base()[:3, 3]
+    assert np.hypot(place.x - true[0], place.y - true[1]) == pytest.approx(0.1, abs=1e-6)
+    moves = said.twist.twist
+    assert (moves.linear.x, moves.linear.y) == pytest.approx((0.3, -0.015), abs=0.005)  # a little to the right
+    assert moves.angular.z == pytest.approx(0.1, abs=0.02)
+    assert len(said.pose.covariance) == len(said.twist.covariance) == 36
+    driving.close()
 
 
 def test_camera_info_is_that_of_the_camera():

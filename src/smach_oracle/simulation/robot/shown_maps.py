@@ -1,9 +1,10 @@
-"""Collision maps for others to see: what is planned in is published, for teleoperation to slow near it."""
+"""Collision maps for others to see: teleoperation slows near them, RViz draws them."""
 from typing import Callable
 
 import rospy
 from geometry_msgs.msg import Vector3
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
 
 from smach_oracle.msg import BuildCollisionMapGoal, BuildCollisionMapResult, CollisionBoxes
 
@@ -13,21 +14,27 @@ from .frames import pose_message
 from .interface import BASE_FRAME
 from .skill_server import Say
 
+COLOUR = ColorRGBA(0.9, 0.6, 0.2, 0.5)
+
 Build = Callable[[BuildCollisionMapGoal, Say], BuildCollisionMapResult]
 
 
 class ShownMaps:
-    """Builds maps as `build` does, and publishes each on the latched topic `collision_map`."""
+    """Builds maps as `build` does, and publishes each on the latched topics `collision_map` and, as markers,
+    `collision_map_markers`."""
 
     def __init__(self, build: Build, maps: MapBook) -> None:
         self._build = build
         self._maps = maps
         self._publisher = rospy.Publisher('collision_map', CollisionBoxes, queue_size=2, latch=True)
+        self._markers = rospy.Publisher('collision_map_markers', MarkerArray, queue_size=2, latch=True)
 
     def __call__(self, goal: BuildCollisionMapGoal, say: Say) -> BuildCollisionMapResult:
         """A skill's handler."""
         result = self._build(goal, say)
-        self._publisher.publish(boxes_message(result.map_id, self._maps.find(result.map_id)))
+        boxes = boxes_message(result.map_id, self._maps.find(result.map_id))
+        self._publisher.publish(boxes)
+        self._markers.publish(markers_message(boxes))
         return result
 
 
@@ -38,3 +45,11 @@ def boxes_message(map_id: str, made: CollisionMap) -> CollisionBoxes:
     return CollisionBoxes(Header(frame_id=BASE_FRAME, stamp=rospy.get_rostime()), map_id, names,
                           [pose_message(from_rpy(box.centre, yaw=box.yaw)).pose for box in boxes],
                           [Vector3(*(2 * side for side in box.half)) for box in boxes])
+
+
+def markers_message(boxes: CollisionBoxes) -> MarkerArray:
+    """The same as RViz draws it; what it drew before goes."""
+    drawn = [Marker(header=boxes.header, ns='collision_map', id=number, type=Marker.CUBE, action=Marker.ADD, pose=pose,
+                    scale=size, color=COLOUR, text=name)
+             for number, (name, pose, size) in enumerate(zip(boxes.names, boxes.poses, boxes.sizes))]
+    return MarkerArray([Marker(header=boxes.header, ns='collision_map', action=Marker.DELETEALL)] + drawn)

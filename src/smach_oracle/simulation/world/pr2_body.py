@@ -105,6 +105,14 @@ class Pr2Body:
         x, y, theta = (self.position(name) for name in BASE_JOINTS)
         return from_rpy((x, y, 0.0), yaw=theta)
 
+    def base_velocity(self) -> np.ndarray:
+        """(3,) of base_footprint in its own axes: m/s forward and to the left, rad/s about the vertical."""
+        (_, _, theta), (x, y, turn) = (
+            [pybullet.getJointState(self.index, self.numbers[name], physicsClientId=self._client)[field]
+             for name in BASE_JOINTS] for field in (0, 1))
+        cos, sin = math.cos(theta), math.sin(theta)
+        return np.array([cos * x + sin * y, cos * y - sin * x, turn])
+
     def link_pose(self, link: str) -> np.ndarray:
         """4x4, the world from a link of the URDF. Raises ValueError for one that is not there."""
         if link not in self._frames:

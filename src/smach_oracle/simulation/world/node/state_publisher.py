@@ -1,9 +1,20 @@
-"""Joint states and transforms of the simulated PR2, and its description."""
+"""Joint states, transforms and odometry of the simulated PR2, and its description."""
 from typing import Any, List, Mapping
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
@@ -29,7 +40,7 @@ def publish_description() -> str:
 
 
 class StatePublisher:
-    """Topics joint_states, /tf and, once, /tf_static."""
+    """Topics joint_states, base_odometry/odom, /tf and, once, /tf_static."""
 
     def __init__(self, urdf: str, joints: List[str], latch: bool) -> None:
         """
@@ -38,6 +49,7 @@ class StatePublisher:
         """
         self._tree = TransformTree(urdf, joints)
         self._states = rospy.Publisher('joint_states', JointState, queue_size=100, tcp_nodelay=True, latch=latch)
+        self._odometry = rospy.Publisher('base_odometry/odom', Odometry, queue_size=100, tcp_nodelay=True, latch=latch)
         self._moving = rospy.Publisher('/tf', TFMessage, queue_size=100, tcp_nodelay=True, latch=latch)
         self._fixed = rospy.Publisher('/tf_static', TFMessage, queue_size=10, latch=True)
         self._fixed_told = False
@@ -49,6 +61,7 @@ class StatePublisher:
             self._fixed.publish(TFMessage([_stamped(link, stamp) for link in self._tree.fixed]))
         positions = world.joints()
         self._moving.publish(transforms(self._tree, positions, world.odom_from_base(), stamp))
+        self._odometry.publish(odometry(world.odom_from_base(), world.robot.base_velocity(), stamp))
         velocities, efforts = world.joint_velocities(), world.joint_efforts()
         names = sorted(positions)
         self._states.publish(JointState(Header(stamp=stamp), names, *(
@@ -60,6 +73,15 @@ def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_ba
     """What moves, as a message for /tf."""
     links = [link_of(ODOM_FRAME, BASE_FRAME, odom_from_base)] + tree.moving(positions)
     return TFMessage([_stamped(link, stamp) for link in links])
+
+
+def odometry(odom_from_base: np.ndarray, velocity: np.ndarray, stamp: rospy.Time) -> Odometry:
+    """Where the robot believes to stand, and how it moves (`Pr2Body.base_velocity`); no variance is known (zeros)."""
+    link = link_of(ODOM_FRAME, BASE_FRAME, odom_from_base)
+    forward, left, turn = velocity
+    return Odometry(Header(stamp=stamp, frame_id=link.parent), link.child,
+                    PoseWithCovariance(Pose(Point(*link.position), Quaternion(*link.turn)), [0.0] * 36),
+                    TwistWithCovariance(Twist(Vector3(forward, left, 0.0), Vector3(0.0, 0.0, turn)), [0.0] * 36))
 
 
 def _stamped(link: Link, stamp: rospy.Time) -> TransformStamped:
