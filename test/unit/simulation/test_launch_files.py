@@ -27,14 +27,14 @@ def test_the_whole_robot_is_made_of_pieces_that_can_be_launched_apart():
 
 @pytest.mark.parametrize('task', ['pick_and_place', 'drink_retrieval'])
 @pytest.mark.parametrize('arguments, factor, lock_step', [
-    ((), 0, True), (('scripted_expert:=false',), 1, False),
-    (('scripted_expert:=false', 'real_time_factor:=0'), 0, True), (('real_time_factor:=2',), 2, False)])
+    ((), 0, True), (('scripted_operator:=false',), 1, False),
+    (('scripted_operator:=false', 'real_time_factor:=0'), 0, True), (('real_time_factor:=2',), 2, False)])
 def test_where_people_answer_the_world_keeps_the_walls_time_unless_told_otherwise(task, arguments, factor, lock_step):
     config = launched(task, *arguments)
     assert config.params['/pr2_world/real_time_factor'].value == factor
     assert config.params['/pr2_world/task'].value == task
     assert config.params['/manipulation_interface/lock_step'].value is lock_step
-    assert ('scripted_operator' in nodes(config)) == ('scripted_expert:=false' not in arguments)
+    assert ('scripted_operator' in nodes(config)) == ('scripted_operator:=false' not in arguments)
 
 
 @pytest.mark.parametrize('factor', [0, 1])
