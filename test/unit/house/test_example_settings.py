@@ -1,0 +1,45 @@
+"""launch/oracle.yaml, from which settings are copied, has them all with their defaults; doc/executive.md names them."""
+import re
+
+import yaml
+from house import ROOT
+
+from smach_oracle.oracle import interface_config
+from smach_oracle.oracle.config import Settings, setting_names
+
+TEXT = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8')
+
+
+def uncommented():
+    """The settings of the file with the # of every line removed, as its first line says."""
+    lines = re.findall(r'^# ((?:[a-z_]+:|  ).*)$', TEXT, re.MULTILINE)
+    return yaml.safe_load('\n'.join(lines))
+
+
+def resolved(name):
+    assert name.startswith('python:')
+    return bool
+
+
+def test_every_setting_is_there_with_its_default():
+    given = uncommented()
+    assert set(given) == set(setting_names())
+    examples = {key: given.pop(key) for key in ('interfaces', 'states')}
+    assert Settings.from_dict(given) == Settings()
+    assert Settings.from_dict(examples, resolved).interfaces
+
+
+def test_every_key_of_an_interface_is_there():
+    offers = uncommented()['interfaces'].values()
+    assert {key for offer in offers for key in offer} == set(interface_config._KEYS)
+
+
+def test_nothing_is_set_unless_somebody_removes_a_comment_sign():
+    assert yaml.safe_load(TEXT) is None
+
+
+def test_the_page_of_the_executive_names_every_setting():
+    page = (ROOT / 'doc/executive.md').read_text(encoding='utf-8')
+    section = page[page.index('## Settings'):page.index('## Trials')]
+    named = set(re.findall(r'`([a-z_]+)', section))
+    assert set(setting_names()) | set(interface_config._KEYS) <= named | {'states'}
