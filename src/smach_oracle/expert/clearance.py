@@ -4,15 +4,15 @@ A PyBullet world of its own, without physics: it only measures distances between
 """
 import os
 import tempfile
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
-import pybullet
 
 from ..geometry.chain import Chain, read_joints
 from ..geometry.transforms import quaternion
 from .teleoperation import Clearance
 
+PYBULLET = 'pybullet==3.2.7'
 _ALWAYS_NEAR = 0.5  # pairs of links that are as near in more than this share of all postures say nothing
 _SAMPLES = 40
 _OVERLAP = -0.02  # m; deeper than a robot can be in itself: its convex shapes say more than there is
@@ -22,6 +22,18 @@ Pair = Tuple[int, int]  # links, by PyBullet's indices
 
 class ClearanceError(ValueError):
     """The robot's model cannot be used; the text says why."""
+
+
+def load_pybullet() -> Any:
+    """PyBullet, imported only where distances are wanted: not every robot has it.
+
+    :raises ClearanceError: where it cannot be imported, with what would bring it.
+    """
+    try:
+        import pybullet
+    except ImportError as err:
+        raise ClearanceError('needs PyBullet ({}): pip install {}'.format(err, PYBULLET)) from err
+    return pybullet
 
 
 class Box(NamedTuple):
@@ -38,15 +50,16 @@ class ClearanceModel:
     def __init__(self, urdf: str, base: str) -> None:
         """`urdf`: text of the model, with mesh file names that can be opened. `base`: frame in which boxes are given.
 
-        :raises ClearanceError: where PyBullet cannot load it, or the frame is not in it.
+        :raises ClearanceError: where PyBullet is missing or cannot load it, or the frame is not in it.
         """
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._bullet = load_pybullet()
+        self._client = self._bullet.connect(self._bullet.DIRECT)
         self._robot = self._load(urdf)
         self._joint_of_link = read_joints(urdf)
         self._links: Dict[str, int] = {}
         self._joints: Dict[str, int] = {}
-        for index in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client)):
-            info = pybullet.getJointInfo(self._robot, index, physicsClientId=self._client)
+        for index in range(self._bullet.getNumJoints(self._robot, physicsClientId=self._client)):
+            info = self._bullet.getJointInfo(self._robot, index, physicsClientId=self._client)
             self._joints[info[1].decode()] = index
             self._links[info[12].decode()] = index
         if base not in self._links and base not in {joint.parent for joint in self._joint_of_link.values()}:
@@ -60,12 +73,12 @@ class ClearanceModel:
         """Where the joints are (rad or m); names that the model does not have are left out."""
         known = [(self._joints[name], [position]) for name, position in positions.items() if name in self._joints]
         if known:
-            pybullet.resetJointStatesMultiDof(self._robot, *map(list, zip(*known)), physicsClientId=self._client)
+            self._bullet.resetJointStatesMultiDof(self._robot, *map(list, zip(*known)), physicsClientId=self._client)
 
     def set_boxes(self, boxes: Sequence[Box]) -> None:
         """Replace what stands around the robot."""
         for body, _ in self._boxes:
-            pybullet.removeBody(body, physicsClientId=self._client)
+            self._bullet.removeBody(body, physicsClientId=self._client)
         self._boxes = [(self._box(box), box.name) for box in boxes]
 
     def arm(self, chain: Chain, within: float) -> 'ArmClearance':
@@ -87,19 +100,19 @@ class ClearanceModel:
     def own_pairs(self, moving: Set[int]) -> List[Pair]:
         """Pairs of a moving link and another one of the robot that both have a shape."""
         shaped = [index for index in self._names
-                  if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)]
+                  if self._bullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)]
         return [(first, second) for first in shaped if first in moving for second in shaped if second not in moving]
 
     def apart(self, pair: Pair, within: float) -> float:
         """Distance (m) between two links, inf from `within` on."""
-        points = pybullet.getClosestPoints(self._robot, self._robot, within, *pair, physicsClientId=self._client)
+        points = self._bullet.getClosestPoints(self._robot, self._robot, within, *pair, physicsClientId=self._client)
         return min((point[8] for point in points), default=float('inf'))
 
     def near_boxes(self, moving: Set[int], within: float) -> Optional[Tuple[float, str]]:
         """The least distance (m) between a moving link and a box, with the names of both."""
         best: Optional[Tuple[float, str]] = None
         for body, name in self._boxes:
-            for point in pybullet.getClosestPoints(self._robot, body, within, physicsClientId=self._client):
+            for point in self._bullet.getClosestPoints(self._robot, body, within, physicsClientId=self._client):
                 if point[3] in moving and (best is None or point[8] < best[0]):
                     best = point[8], '{} and {}'.format(self._names[point[3]], name)
         return best
@@ -110,7 +123,7 @@ class ClearanceModel:
 
     def close(self) -> None:
         """Let go of the PyBullet world."""
-        pybullet.disconnect(self._client)
+        self._bullet.disconnect(self._client)
 
     def _load(self, urdf: str) -> int:
         with tempfile.TemporaryDirectory() as folder:
@@ -118,27 +131,27 @@ class ClearanceModel:
             with open(path, 'w', encoding='utf-8') as file:
                 file.write(urdf)
             try:
-                robot: int = pybullet.loadURDF(path, useFixedBase=True, physicsClientId=self._client)
-            except pybullet.error as err:
+                robot: int = self._bullet.loadURDF(path, useFixedBase=True, physicsClientId=self._client)
+            except self._bullet.error as err:
                 raise ClearanceError('robot description: PyBullet cannot load it ({}); are its meshes there?'.format(
                     err)) from err
         return robot
 
     def _box(self, box: Box) -> int:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[side / 2 for side in box.size],
-                                              physicsClientId=self._client)
+        shape = self._bullet.createCollisionShape(self._bullet.GEOM_BOX, halfExtents=[side / 2 for side in box.size],
+                                                  physicsClientId=self._client)
         world_from_box = self._world_from_base() @ box.base_from_box
-        body: int = pybullet.createMultiBody(0, shape, -1, world_from_box[:3, 3].tolist(),
-                                             quaternion(world_from_box).tolist(), physicsClientId=self._client)
+        body: int = self._bullet.createMultiBody(0, shape, -1, world_from_box[:3, 3].tolist(),
+                                                 quaternion(world_from_box).tolist(), physicsClientId=self._client)
         return body
 
     def _world_from_base(self) -> np.ndarray:
         result = np.eye(4)
         if self._base in self._links:
-            state = pybullet.getLinkState(self._robot, self._links[self._base], computeForwardKinematics=True,
-                                          physicsClientId=self._client)
+            state = self._bullet.getLinkState(self._robot, self._links[self._base], computeForwardKinematics=True,
+                                              physicsClientId=self._client)
             result[:3, 3] = state[4]
-            result[:3, :3] = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
+            result[:3, :3] = np.array(self._bullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
         return result
 
 

@@ -8,6 +8,7 @@ import rospy
 from ..oracle.errors import ConfigError
 from ..ros.parameters import checked_mapping, checked_number, flag_of, mapping_of, name_of, names_of, number_of
 from .arm_port import ArmNames, JointListener
+from .clearance import ClearanceError, load_pybullet
 from .hand import Hand, Robot
 from .surroundings import Surroundings
 from .teleoperation import DriveLimits
@@ -79,9 +80,11 @@ class TeleoperationSettings(NamedTuple):
     def build(self) -> Tuple[Dict[str, Hand], Optional[Surroundings]]:
         """The arms, and what they could hit.
 
-        :raises ConfigError: where no robot description is set within 60 s of wall time.
+        :raises ConfigError: where no robot description is set within 60 s of wall time, or `~clearance` lacks PyBullet.
         :raises ValueError: where it lacks a link that is named, or cannot be loaded.
         """
+        if self.clearance:
+            _need_pybullet()
         urdf = _description()
         if not isinstance(urdf, str) or not urdf:
             raise ConfigError(rospy.resolve_name('robot_description'), urdf, 'the text of a URDF')
@@ -92,6 +95,14 @@ class TeleoperationSettings(NamedTuple):
             for hand in hands.values():
                 surroundings.watch_over(hand)
         return hands, surroundings
+
+
+def _need_pybullet() -> None:
+    try:
+        load_pybullet()
+    except ClearanceError as err:
+        raise ConfigError(rospy.resolve_name('~clearance'), True, 'false, with which all works but slowing down near '
+                          'the robot\'s own body and the collision map; true {}'.format(err)) from err
 
 
 def _description() -> object:

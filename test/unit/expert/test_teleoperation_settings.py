@@ -1,9 +1,12 @@
 """Settings of the manipulation interface: what cannot be is refused by name, before anything moves."""
 import math
+import sys
+from pathlib import Path
 
 import pytest
 import rospy
 
+from smach_oracle.expert.clearance import PYBULLET
 from smach_oracle.expert.teleoperation_settings import TeleoperationSettings
 from smach_oracle.oracle.errors import ConfigError
 
@@ -61,3 +64,18 @@ def test_what_cannot_be_is_refused_by_name(read, given, says):
 def test_the_keys_of_refusals_are_whole_names(read):
     with pytest.raises(ConfigError, match='/node/limits/linear: -1'):
         read(limits={'linear': -1})
+
+
+def test_without_pybullet_the_clearance_is_refused_at_once_and_all_else_goes_on(read, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pybullet', None)
+    with pytest.raises(ConfigError, match='/node/clearance: True .* allowed: false, .*pip install pybullet=='):
+        read().build()
+    with pytest.raises(ConfigError, match='/node/robot_description'):  # the next thing that it needs
+        monkeypatch.setattr(rospy, 'has_param', lambda _name: True)
+        read(clearance=False).build()
+
+
+@pytest.mark.parametrize('file', ['requirements.txt', 'requirements-noetic.txt'])
+def test_the_pybullet_that_is_asked_for_is_the_pinned_one(file):
+    lines = (Path(__file__).resolve().parents[3] / file).read_text(encoding='utf-8').splitlines()
+    assert PYBULLET in [line.split()[0] for line in lines]
