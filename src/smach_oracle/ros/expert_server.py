@@ -6,9 +6,10 @@ in the node of the robot that asks, or as a node of its own that many robots sha
 import math
 import threading
 import time
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Tuple
 
 import actionlib
+import rosgraph.names
 import rospy
 
 from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQueryResult, OpenQueries,
@@ -16,10 +17,13 @@ from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQuer
 from smach_oracle.srv import (AnswerQuery, AnswerQueryRequest, AnswerQueryResponse, ClaimQuery, ClaimQueryRequest,
                               ClaimQueryResponse)
 
+from ..oracle.errors import ConfigError
 from .command_line import parameters_only
 from .master_watch import start_master_watch
-from .query_book import LEASE_S, BadQuestion, Notice, QueryBook, Settled
+from .parameters import name_of, number_of
+from .query_book import LEASE_S, LONGEST_LEASE_S, BadQuestion, Notice, QueryBook, Settled
 
+SERVER_NAME = '~expert_query'
 ASKER_GONE_S = 3.0
 _LIST_PERIOD_S = 1.0
 _WATCH_PERIOD_S = 0.25
@@ -49,7 +53,7 @@ class ExpertQueryServer:
     Every access is serialised by the action server's own lock, under which its callbacks come anyway.
     """
 
-    def __init__(self, name: str = '~expert_query', lease_s: float = LEASE_S,
+    def __init__(self, name: str = SERVER_NAME, lease_s: float = LEASE_S,
                  asker_gone_s: float = ASKER_GONE_S) -> None:
         """`name` is resolved relative to the node; a claim holds `lease_s` unless it asks for another lease.
 
@@ -212,13 +216,29 @@ def _sentence(notice: Notice) -> str:
     return 'interface {} runs'.format(notice.text)
 
 
+def settings_from_parameters() -> Tuple[str, float, float]:
+    """Name, lease (s) and patience with a missing asker (s) of a server of many robots.
+
+    :raises ConfigError: naming the parameter, its value and what is allowed.
+    """
+    name = name_of('~server_name', SERVER_NAME)
+    if not rosgraph.names.is_legal_name(name):
+        raise ConfigError(rospy.resolve_name('~server_name'), name, 'a ROS name: letters, digits, _ and /')
+    return (name, number_of('~lease_s', LEASE_S, 1.0, LONGEST_LEASE_S),
+            number_of('~asker_gone_s', ASKER_GONE_S, 0.5, LONGEST_LEASE_S))
+
+
 def main() -> None:
     """Entry point of the node `expert_query_server`: one server for many robots."""
     parameters_only('Node: one query server for many robots. Parameters: ~server_name, ~lease_s, ~asker_gone_s; '
                     'see doc/expert.md.')
     rospy.init_node('expert_query_server')
+    try:
+        settings = settings_from_parameters()
+    except ConfigError as err:
+        rospy.logfatal('expert_query_server: %s', err)
+        raise SystemExit(2) from err
     start_master_watch()
-    server = ExpertQueryServer(rospy.get_param('~server_name', '~expert_query'), rospy.get_param('~lease_s', LEASE_S),
-                               rospy.get_param('~asker_gone_s', ASKER_GONE_S))
+    server = ExpertQueryServer(*settings)
     rospy.loginfo('Experts are asked at %s', server.name)
     rospy.spin()
