@@ -2,16 +2,7 @@
 import json
 import math
 import os
-import sys
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
-
-try:
-    from rosbags.rosbag1 import Reader
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-except ImportError as err:
-    raise ImportError('Bags are read with the Python package rosbags, which {} does not have ({}). Install it (pip '
-                      "install rosbags), or run the command with the Python of this package's virtual environment."
-                      .format(sys.executable, err)) from err
 
 from ..oracle.errors import OracleError
 from ..oracle.events import Event, EventKind
@@ -27,7 +18,7 @@ class BagError(OracleError):
 
 
 class Skipped(NamedTuple):
-    """A bag that was not used."""
+    """A bag, or a folder of bags, that was not used."""
 
     path: str
     reason: str
@@ -48,7 +39,6 @@ class BagContent(NamedTuple):
     events: List[Event]  # in the order of their recording
     causes: Dict[str, Cause]  # by trial id
     nodes: Dict[str, str]  # by trial id: whose events they are, as their topic tells
-
 
 
 def find_bags(places: Sequence[str]) -> List[str]:
@@ -81,6 +71,9 @@ class MessageStores:
     """Reads messages; remembers the definitions it has met, so that many bags are quick."""
 
     def __init__(self) -> None:
+        """Raises ImportError where rosbags is missing."""
+        from rosbags import typesys  # only where bags are read: a command tells its options without it
+        self._typesys = typesys
         self._stores: Dict[str, Any] = {}  # by message definition: another release's events may have other fields
 
     def read(self, connection: Any, data: bytes) -> Any:
@@ -88,8 +81,8 @@ class MessageStores:
         definition = connection.msgdef
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
         if text not in self._stores:
-            store = get_typestore(Stores.EMPTY)
-            store.register(get_types_from_msg(text, connection.msgtype))
+            store = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
+            store.register(self._typesys.get_types_from_msg(text, connection.msgtype))
             self._stores[text] = store
         return self._stores[text].deserialize_ros1(data, connection.msgtype)
 
@@ -98,7 +91,9 @@ class EventReader:
     """Reads bags."""
 
     def __init__(self, most_events: float = math.inf) -> None:
-        """`most_events`: a bag with more is refused."""
+        """`most_events`: a bag with more is refused. Raises ImportError where rosbags is missing."""
+        from rosbags.rosbag1 import Reader
+        self._open = Reader
         self._stores = MessageStores()
         self._most_events = most_events
 
@@ -123,7 +118,7 @@ class EventReader:
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
         causes: List[Tuple[int, Cause]] = []
         nodes: Dict[str, str] = {}
-        with Reader(path) as reader:
+        with self._open(path) as reader:
             connections = [item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)]
             if not any(item.msgtype == EVENT_TYPE for item in connections):
                 raise BagError('no events of the executive in it')

@@ -10,10 +10,9 @@ from typing import List, Optional, Sequence
 
 from ..oracle.naming import DEFAULT_FAILING_OUTCOMES, FailingNames
 from . import groups as grouping, table
-from .bag_events import BagError, Skipped
+from .bag_events import BagError
+from .reading import complain, tell_skipped
 from .trials import Trials, TrialSummary, load_trials
-
-ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -23,15 +22,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         found = load_trials(args.folders, FailingNames(args.failing_outcomes))
         groups = grouping.make_groups(found.trials)
         sys.stdout.write(table.format_text(groups, found.trials))
-        _warn_of(found.skipped)
+        code = tell_skipped(found.skipped)
         _write_files(args, found, groups)
-    except BagError as err:
-        return _complain(str(err))
+    except (BagError, ImportError) as err:
+        return complain('bag_statistics', err)
     except OSError as err:
-        return _complain('{}: {}'.format(err.filename or 'output', err.strerror or err))
-    except ImportError as err:
-        return _complain('the figure needs matplotlib: {}'.format(err))
-    return SOME_SKIPPED if found.skipped else ALL_READ
+        return complain('bag_statistics', '{}: {}'.format(err.filename or 'output', err.strerror or err))
+    return code
 
 
 def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -71,14 +68,3 @@ def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> 
         for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
 
-
-def _warn_of(skipped: Sequence[Skipped]) -> None:
-    sys.stdout.flush()
-    for item in skipped:
-        sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
-
-
-def _complain(text: str) -> int:
-    sys.stdout.flush()
-    sys.stderr.write('bag_statistics: {}\n'.format(text))
-    return NOTHING_COUNTED

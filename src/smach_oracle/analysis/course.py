@@ -1,17 +1,18 @@
 """Compare what happened in trials that ought to be the same: states, outcomes and decisions, but no times and no names.
 
 Trials are compared that are of the same experiment, the same arm and the same seed. Exit code: 0, the same; 1, not the
-same; 2, nothing to compare.
+same, or some bags were skipped; 2, nothing to compare.
 """
 import argparse
 import sys
 from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from ..oracle.events import Event, EventKind
-from .bag_events import BagError, EventReader, find_bags
+from .bag_events import BagError, Skipped
+from .reading import complain, read_bags, tell_skipped
 from .trials import summarise
 
-SAME, NOT_THE_SAME, NOTHING = 0, 1, 2
+SAME, NOT_THE_SAME = 0, 1  # exit codes
 # Who takes a question, and when, is the expert's affair; a warning may be of the network.
 LEFT_OUT = (EventKind.QUERY_CLAIMED, EventKind.QUERY_RELEASED, EventKind.WARNING)
 
@@ -34,12 +35,10 @@ def course_of(events: Iterable[Event]) -> Tuple[Step, ...]:
                  for event in sorted(events, key=lambda event: event.seq) if event.kind not in LEFT_OUT)
 
 
-def load_courses(place: str) -> Dict[Key, Trial]:
-    """The trials in a folder by experiment, arm and seed. Raises BagError."""
-    reader = EventReader()
+def load_courses(place: str, skipped: List[Skipped]) -> Dict[Key, Trial]:
+    """The trials in a folder by experiment, arm and seed; bags that cannot be used go to `skipped`. Raises BagError."""
     found: Dict[Key, Trial] = {}
-    for path in find_bags([place]):
-        content = reader.read(path)
+    for path, content in read_bags([place], skipped):
         for trial_id, cause in content.causes.items():
             events = [event for event in content.events if event.trial_id == trial_id]
             summary = summarise(events, (path,))
@@ -72,18 +71,18 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folders', nargs=2, metavar='FOLDER', help='with bags in it or below it')
     args = parser.parse_args(argv)
+    skipped: List[Skipped] = []
     try:
-        first, second = (load_courses(folder) for folder in args.folders)
-    except BagError as err:
-        sys.stderr.write('same_trials: {}\n'.format(err))
-        return NOTHING
+        first, second = (load_courses(folder, skipped) for folder in args.folders)
+    except (BagError, ImportError) as err:
+        return complain('same_trials', err)
+    code = tell_skipped(skipped)
     common = set(first) & set(second)
     if not common:
-        sys.stderr.write('same_trials: no trial of the same experiment, arm and seed in both\n')
-        return NOTHING
+        return complain('same_trials', 'no trial of the same experiment, arm and seed in both')
     found = differences(first, second)
     for text in found:
         sys.stdout.write(text + '\n')
     sys.stdout.write('{} trials in both, {} of them the same in all states, outcomes and decisions\n'.format(
         len(common), len(common) - len(found)))
-    return NOT_THE_SAME if found else SAME
+    return NOT_THE_SAME if found else code

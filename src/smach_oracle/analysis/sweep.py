@@ -13,9 +13,8 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 from .bag_events import BagError
 from .groups import ENDED_IN_FAILURE, QUESTIONS, RECOVERIES, TRUE_SUCCESS, Arm, Count, find_arms, make_group
 from .table import over_replicates, percent
+from .reading import complain, tell_skipped
 from .trials import load_trials
-
-ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2
 
 
 class Point(NamedTuple):
@@ -109,6 +108,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser.parse_args(argv)
     try:
         found = load_trials(args.folders)
+        code = tell_skipped(found.skipped)
         points = find_points(find_arms(found.trials))
         if not points:
             raise BagError('no trials with an oracle in {}'.format(', '.join(args.folders)))
@@ -116,8 +116,5 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         for path in save_figure(points, args.figure) if args.figure else []:
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
     except (BagError, OSError, ImportError) as err:
-        sys.stderr.write('compare_oracles: {}\n'.format(err))
-        return NOTHING_COUNTED
-    for item in found.skipped:
-        sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
-    return SOME_SKIPPED if found.skipped else ALL_READ
+        return complain('compare_oracles', err)
+    return code

@@ -6,7 +6,8 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Seq
 
 from ..oracle.events import NO_OUTCOME, Event, EventKind
 from ..oracle.naming import PREEMPTED, FailingNames
-from .bag_events import BagError, Cause, EventReader, Skipped, find_bags
+from .bag_events import BagError, Cause, Skipped
+from .reading import read_bags
 from .truth import Truth, TruthFiles
 
 DEFAULT_FAILING = FailingNames()
@@ -67,22 +68,16 @@ def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) 
 
     Raises BagError where there is nothing to read: no such folder, no bags, or none with a trial in it.
     """
-    paths = find_bags(places)
-    if not paths:
-        raise BagError('{}: no bags'.format(', '.join(places)))
     gathered = _Gathered()
     skipped: List[Skipped] = []
-    reader = EventReader()
-    for path in paths:
-        try:
-            content = reader.read(path)
-        except BagError as err:
-            skipped.append(Skipped(path, str(err)))
-            continue
+    count = 0
+    for path, content in read_bags(places, skipped):
+        count += 1
         gathered.add(path, content.events, content.causes)
     if not gathered.events:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
-        raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(', '.join(places), len(paths), reasons))
+        raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(', '.join(places), count + len(skipped),
+                                                                         reasons))
     trials = gathered.summaries(failing)
     return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
 

@@ -6,7 +6,7 @@ forecast of how often such an oracle asks: after the first other decision the tr
 the rates with it; for that, run the trials under it (run_trials --memory ... --policy ...).
 
 The record is first replayed under its own settings. Where that does not give the recorded rates and decisions, nothing
-is said. Exit code: 0; 2 where nothing could be replayed.
+is said of that folder. Exit code: 0; 1, some bags or folders were skipped; 2, nothing could be replayed.
 """
 import argparse
 import itertools
@@ -20,13 +20,15 @@ from ..oracle.history import History
 from ..oracle.naming import is_preempted
 from ..oracle.policy import POLICIES, Action, Chain, Preconditions, Situation, policy_named
 from ..oracle.question import Visit, VisitResult
-from .bag_events import BagError, EventReader, find_bags
+from .bag_events import BagError, Skipped
+from .reading import complain, read_bags, tell_skipped
 from .trials import summarise
 
 ENOUGH_VISITS = 50
 SAME, NOT_KNOWN = 'same', 'not known'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
 RUN_FOR = (int(FailureClass.LOW), int(FailureClass.MODERATE))  # classes for which every policy runs preconditions
+NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 _ROUNDING = 1e-9
 
 Key = Tuple[str, str]  # path and state
@@ -165,8 +167,8 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     :param trials: the events of each trial, in order.
     :raises BagError: where the record cannot be replayed under its own settings.
     """
-    recorded = dict((trials[0][0].data or {}).get('settings') or {})
-    if not recorded:
+    recorded = dict(summarise(trials[0]).settings)
+    if not set(NEEDED) <= set(recorded):
         raise BagError('its trials do not tell the settings of their oracle')
     conditioned = _conditioned(event for trial in trials for event in trial)
     own, other = Replay(recorded, conditioned), Replay({**recorded, **settings}, conditioned)
@@ -210,13 +212,15 @@ def _outcome(recorded: str, tried: str) -> str:
     return 'would recover' if recorded == Action.ASK.value else 'recovers otherwise'
 
 
-def load_replicates(places: Sequence[str]) -> Dict[str, List[List[Event]]]:
-    """The trials with an oracle, by the folder they were recorded in, in order. Raises BagError."""
-    reader = EventReader()
+def load_replicates(places: Sequence[str], skipped: List[Skipped]) -> Dict[str, List[List[Event]]]:
+    """The trials with an oracle, by the folder they were recorded in, in order.
+
+    Bags that cannot be used go to `skipped`. Raises BagError.
+    """
     found: Dict[str, List[List[Event]]] = {}
-    for path in find_bags(places):
+    for path, content in read_bags(places, skipped):
         trials: Dict[str, List[Event]] = {}
-        for event in reader.read(path).events:
+        for event in content.events:
             trials.setdefault(event.trial_id, []).append(event)
         for events in trials.values():
             summary = summarise(events, (path,))
@@ -249,14 +253,22 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try')
     args = parser.parse_args(argv)
     varied = {name: values for name, values in vars(args).items() if name != 'folders' and values}
+    skipped: List[Skipped] = []
     try:
-        replicates = load_replicates(args.folders)
-        if not replicates:
-            raise BagError('no trials with an oracle in {}'.format(', '.join(args.folders)))
-        for folder, trials in sorted(replicates.items()):
+        replicates = load_replicates(args.folders, skipped)
+    except (BagError, ImportError) as err:
+        return complain('what_if', err)
+    replayed = 0
+    for folder, trials in sorted(replicates.items()):
+        try:
             rows = [compare(trials, dict(zip(varied, values))) for values in itertools.product(*varied.values())]
+        except OracleError as err:
+            skipped.append(Skipped(folder, str(err)))
+        else:
             sys.stdout.write('{}\n{}'.format(folder, format_tried(rows)))
-    except OracleError as err:
-        sys.stderr.write('what_if: {}\n'.format(err))
-        return 2
-    return 0
+            replayed += 1
+    code = tell_skipped(skipped)
+    if not replayed:
+        return complain('what_if', '{}: no trials with an oracle that could be replayed'.format(
+            ', '.join(args.folders)))
+    return code

@@ -1,8 +1,10 @@
 """Trials that ought to be the same are compared by what happened, not by when."""
+from pathlib import Path
+
 import pytest
 from fake_trials import FakeMachine
 
-from smach_oracle.analysis import course
+from smach_oracle.analysis import course, reading
 from smach_oracle.msg import TrialCause
 from smach_oracle.ros.recorder import TrialRecorder
 
@@ -20,13 +22,13 @@ def record(folder, seeds, start_time=1_700_000_000.0, recovers=True, plays=None)
 @pytest.fixture(autouse=True)
 def causes(monkeypatch):
     """The fake machine has no world: the seed is in the name of the trial."""
-    read = course.EventReader.read
+    read = reading.EventReader.read
 
     def with_causes(reader, path):
         content = read(reader, path)
         seeds = {event.trial_id: int(event.trial_id.split('-')[1]) for event in content.events}
         return content._replace(causes={trial_id: TrialCause(seed=seed) for trial_id, seed in seeds.items()})
-    monkeypatch.setattr(course.EventReader, 'read', with_causes)
+    monkeypatch.setattr(reading.EventReader, 'read', with_causes)
 
 
 def test_the_same_trials_at_other_times_are_the_same(tmp_path, capsys):
@@ -48,6 +50,16 @@ def test_a_trial_that_went_another_way_is_named_with_its_first_difference(tmp_pa
 
 def test_other_seeds_and_other_arms_are_not_compared(tmp_path, capsys):
     folders = [record(tmp_path / 'a', [1]), record(tmp_path / 'b', [2]), record(tmp_path / 'c', [1], recovers=False)]
-    assert course.main(folders[:2]) == course.main(folders[::2]) == course.NOTHING
+    assert course.main(folders[:2]) == course.main(folders[::2]) == reading.NOTHING_COUNTED
     assert 'no trial of the same experiment, arm and seed in both' in capsys.readouterr().err
-    assert course.main([folders[0], str(tmp_path / 'nowhere')]) == course.NOTHING
+    assert course.main([folders[0], str(tmp_path / 'nowhere')]) == reading.NOTHING_COUNTED
+
+
+def test_a_bag_that_cannot_be_used_is_named_and_the_others_are_compared(tmp_path, capsys):
+    folders = [record(tmp_path / name, range(3)) for name in ('a', 'b')]
+    unfinished = Path(folders[1], 'trial.bag.active')
+    unfinished.write_bytes(b'')
+    assert course.main(folders) == reading.SOME_SKIPPED
+    out, err = capsys.readouterr()
+    assert '3 trials in both, 3 of them the same' in out
+    assert 'Skipped {}: still being recorded'.format(unfinished) in err and len(err.splitlines()) == 1

@@ -5,6 +5,7 @@ from test_table import trial
 
 from smach_oracle.analysis import sweep
 from smach_oracle.analysis.groups import find_arms
+from smach_oracle.analysis.reading import ALL_READ, NOTHING_COUNTED
 from smach_oracle.oracle.events import EventKind
 from smach_oracle.ros.recorder import TrialRecorder
 
@@ -67,6 +68,6 @@ def test_the_command(tmp_path, capsys, recovers):
     code = sweep.main([str(tmp_path / 'bags'), '--figure', str(tmp_path / 'sweep')])
     out, err = capsys.readouterr()
     if recovers:
-        assert code == sweep.ALL_READ and 'PICK_AND_PLACE, prose' in out and (tmp_path / 'sweep.svg').exists()
+        assert code == ALL_READ and 'PICK_AND_PLACE, prose' in out and (tmp_path / 'sweep.svg').exists()
     else:
-        assert code == sweep.NOTHING_COUNTED and 'no trials with an oracle' in err
+        assert code == NOTHING_COUNTED and 'no trials with an oracle' in err

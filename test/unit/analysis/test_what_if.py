@@ -7,6 +7,7 @@ import smach
 from smach_oracle.analysis import what_if
 from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.events import EventKind
 from smach_oracle.oracle.question import Answer, AnswerKind, Expert
 from smach_oracle.ros.recorder import TrialRecorder
 
@@ -93,12 +94,35 @@ def test_a_record_that_does_not_replay_is_refused():
         what_if.compare(run(60)[5:], {'memory': 5})
 
 
-def test_the_command(tmp_path, capsys):
-    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
-    for trial in run(40):
+def record(folder, trials):
+    recorder = TrialRecorder(str(folder), warn=pytest.fail)
+    for trial in trials:
         for event in trial:
             recorder(event)
     assert recorder.close(20.0)
+
+
+def test_what_cannot_be_replayed_is_named_and_the_rest_is(tmp_path, capsys):
+    told = run(3)
+    untold = [[event._replace(data={'recovers': True}) if event.kind == EventKind.TRIAL_START else event
+               for event in trial] for trial in run(3, seed=2)]
+    record(tmp_path / 'a', untold)
+    record(tmp_path / 'b', told)
+    (tmp_path / 'b' / 'trial.bag.active').write_bytes(b'')
+    capsys.readouterr()
+    assert what_if.main([str(tmp_path), '--memory', '5']) == 1
+    out, err = capsys.readouterr()
+    assert out.startswith(str(tmp_path / 'b') + '\n') and ' of 3\n' in out and str(tmp_path / 'a') not in out
+    assert 'Skipped {}: its trials do not tell the settings'.format(tmp_path / 'a') in err
+    assert 'Skipped {}: still being'.format(tmp_path / 'b' / 'trial.bag.active') in err
+    assert what_if.main([str(tmp_path / 'a')]) == 2
+    assert 'no trials with an oracle that could be replayed' in capsys.readouterr().err
+    assert what_if.main([str(tmp_path / 'b'), '--memory', '0']) == 2
+    assert 'memory' in capsys.readouterr().err
+
+
+def test_the_command(tmp_path, capsys):
+    record(tmp_path, run(40))
     capsys.readouterr()
     assert what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose', 'algorithm1']) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -124,7 +124,7 @@ def test_number_and_size_are_bounded(folder, monkeypatch):
 
 
 def test_without_the_package_that_reads_bags_a_sentence_says_so(folder, monkeypatch):
-    monkeypatch.setitem(sys.modules, 'smach_oracle.analysis.bag_events', None)
+    monkeypatch.setitem(sys.modules, 'rosbags', None)
     sections = Sections()
     BagShelf([folder], sections).run()
     assert sections.get('bags')['note']

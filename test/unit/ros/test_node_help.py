@@ -27,10 +27,10 @@ def set_by_parameters() -> List[str]:
     """Every node whose command line is `parameters_only`."""
     found = []
     for script in sorted((ROOT / 'scripts').iterdir()):
-        module = re.search(r'^from (smach_oracle\S+) import main$', script.read_text(encoding='utf-8'), re.M)
+        module = re.search(r"^    run\('(\S+)'\)$", script.read_text(encoding='utf-8'), re.M)
         if module is None:
             continue
-        source = ROOT / 'src' / (module.group(1).replace('.', '/') + '.py')
+        source = ROOT / 'src/smach_oracle' / (module.group(1).replace('.', '/') + '.py')
         if re.search(r'^    parameters_only\(', source.read_text(encoding='utf-8'), re.M):
             found.append(script.name)
     return found

@@ -12,8 +12,10 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tu
 
 import rospy
 
+from ...analysis.bag_events import EventReader
 from ...oracle.events import Event
 from ...oracle.errors import OracleError
+from ...oracle.packages import lacking
 from .sections import Sections
 
 SECTION = 'bags'
@@ -62,12 +64,11 @@ class BagShelf:
         if not self._folders:
             return
         try:
-            from ...analysis.bag_events import EventReader  # it needs rosbags, which not every robot has
-        except ImportError as err:
-            self._notes = [str(err)]
+            self._reader = EventReader(MOST_EVENTS)
+        except ImportError as err:  # it needs rosbags, which not every robot has
+            self._notes = [lacking(err)]
             self.draw(0)
             return
-        self._reader = EventReader(MOST_EVENTS)
         while not rospy.is_shutdown():
             try:
                 self.look()

@@ -18,6 +18,7 @@ from smach_oracle.analysis import bag_statistics
 from smach_oracle.oracle.config import Settings
 from smach_oracle.oracle.errors import ConfigError
 from smach_oracle.oracle.failure_rate import ESTIMATORS
+from smach_oracle.oracle.packages import lacking
 from smach_oracle.oracle.policy import POLICIES
 
 from .interrupts import Interrupted, Interrupts
@@ -26,7 +27,7 @@ from .plan import CONFIGURED, TASKS, ExperimentError, Plan, enter_folder, make_a
 from .progress import ProgressLine
 
 POLL_S = 0.5
-FAILED, LOST = 1, 3  # exit codes
+FAILED, LACKING, LOST = 1, 2, 3  # exit codes
 # Settings of the oracle that go over those of the task: option, type, what it is.
 OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
              ('high_from', float, 'failure rate from which a state is HIGH'),
@@ -172,6 +173,9 @@ def main(argv: Optional[List[str]] = None) -> int:
             if enter_folder(output, args.plan):
                 print('Going on in {}'.format(output))
             jobs = run(args.plan, output, args.jobs, args.hung_after)
+    except ImportError as err:  # bags are read with a package that not every robot has
+        print('run_trials: {}'.format(lacking(err)), file=sys.stderr)
+        return LACKING
     except (ExperimentError, OSError) as err:
         print('run_trials: {}'.format(err), file=sys.stderr)
         return FAILED

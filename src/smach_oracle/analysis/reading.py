@@ -1,0 +1,42 @@
+"""How every command here reads folders of bags: one that cannot be used is skipped and named, and told by exit code 1."""
+import sys
+from typing import Iterator, List, Sequence, Tuple, Union
+
+from ..oracle.packages import lacking
+from .bag_events import BagContent, BagError, EventReader, Skipped, find_bags
+
+ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
+
+
+def read_bags(places: Sequence[str], skipped: List[Skipped]) -> Iterator[Tuple[str, BagContent]]:
+    """Path and content of every bag in folders and below that can be used; the others are added to `skipped`.
+
+    Raises BagError where a place does not exist, or there are no bags.
+    """
+    paths = find_bags(places)
+    if not paths:
+        raise BagError('{}: no bags'.format(', '.join(places)))
+    reader = EventReader()
+    for path in paths:
+        try:
+            content = reader.read(path)
+        except BagError as err:
+            skipped.append(Skipped(path, str(err)))
+        else:
+            yield path, content
+
+
+def tell_skipped(skipped: Sequence[Skipped]) -> int:
+    """Name on standard error what was skipped, with the reasons; returns the exit code."""
+    sys.stdout.flush()
+    for item in skipped:
+        sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
+    return SOME_SKIPPED if skipped else ALL_READ
+
+
+def complain(command: str, why: Union[str, Exception]) -> int:
+    """Tell on standard error why a command has nothing to say; returns the exit code."""
+    text = lacking(why) if isinstance(why, ImportError) else str(why)
+    sys.stdout.flush()
+    sys.stderr.write('{}: {}\n'.format(command, text))
+    return NOTHING_COUNTED

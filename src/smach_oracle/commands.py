@@ -1,0 +1,22 @@
+"""How the commands in scripts/ start."""
+import os
+import sys
+from importlib import import_module
+
+LACKING = 2  # exit code where a package is missing
+
+
+def run(module: str) -> None:
+    """Run `main` of a module, named relative to smach_oracle; ends the process with the code that it returns.
+
+    Where a package is missing that the module imports, one line says which, and what installs it.
+    """
+    try:
+        main = import_module('smach_oracle.' + module).main
+    except ImportError as err:
+        from smach_oracle.oracle.packages import lacking
+        sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), lacking(err)))
+        sys.exit(LACKING)
+    code = main()
+    if code:
+        sys.exit(code)

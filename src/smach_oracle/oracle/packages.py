@@ -1,0 +1,24 @@
+"""What is told where a Python package is missing. Pure."""
+import re
+import sys
+
+# module: package, where it has another name
+_PACKAGES = {'cv2': 'opencv-python-headless', 'yaml': 'PyYAML', 'ruamel': 'ruamel.yaml', 'backports': 'backports.zstd'}
+_OF_ROS = re.compile(r'(ros(?!bags)|smach|actionlib|genpy|tf2_)\w*|\w+_(msgs|srvs)')
+_BUILT = ('smach_oracle.msg', 'smach_oracle.srv')  # of our own, by catkin
+
+
+def lacking(err: ImportError) -> str:
+    """The package that an import failed for, and the command that installs it, in one line.
+
+    Raises the error itself where no package of others is missing.
+    """
+    name = err.name or ''
+    package = name.split('.')[0]
+    if not package or (package == 'smach_oracle' and name not in _BUILT):
+        raise err
+    if _OF_ROS.fullmatch(package):
+        return ('the ROS package {} cannot be imported ({}); build the workspace and source its setup.bash (in a '
+                'checkout: scripts/setup && source scripts/ros_env)'.format(package, err))
+    return ('the Python package {} cannot be imported ({}); install it: {} -m pip install {} (in a checkout: '
+            'scripts/setup)'.format(package, err, sys.executable, _PACKAGES.get(package, package)))
