@@ -8,7 +8,7 @@ from typing import Dict, List, Optional, Sequence
 import rosgraph
 import rospy
 
-from smach_oracle.msg import ExpertDecision, OpenQueries
+from smach_oracle.msg import ExpertDecision, OpenQueries, OpenQuery
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
 
 from .followed_server import FollowedServer, Listed, ServerGoneError
@@ -179,9 +179,13 @@ class FrontEnd:
 
 
 def wait_for_question(front_end: FrontEnd, timeout_s: float) -> Optional[Listed]:
-    """The oldest open question, waiting for one for some time; None where none came."""
+    """The oldest question that nobody works on (PENDING), waiting for one for some time; None where none came."""
     until_s = time.monotonic() + timeout_s
     version = 0
-    while not front_end.questions() and time.monotonic() < until_s and not rospy.is_shutdown():
-        version = front_end.wait_for_change(version, min(0.5, max(0.0, until_s - time.monotonic())))
-    return next(iter(front_end.questions()), None)
+    while not rospy.is_shutdown():
+        pending = next((each for each in front_end.questions() if each.status == OpenQuery.PENDING), None)
+        left_s = until_s - time.monotonic()
+        if pending is not None or left_s <= 0.0:
+            return pending
+        version = front_end.wait_for_change(version, min(0.5, left_s))
+    return None

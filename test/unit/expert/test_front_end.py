@@ -1,10 +1,14 @@
 """Servers come and go: a front end that finds them forgets those that are gone for good; no master."""
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
 import pytest
 
 from smach_oracle.expert import front_end as module
 from smach_oracle.expert.followed_server import Listed, ServerGoneError
-from smach_oracle.expert.front_end import FrontEnd
-from smach_oracle.msg import OpenQueries
+from smach_oracle.expert.front_end import FrontEnd, wait_for_question
+from smach_oracle.msg import OpenQueries, OpenQuery
 
 LIST = ['/robot/expert_query/open', OpenQueries._type]
 
@@ -76,3 +80,69 @@ def test_one_that_was_named_is_followed_for_ever(clock):
     for _ in range(3):
         look_after(front_end, clock, 2 * module._FORGET_S)
     assert front_end.servers == ['/robot/expert_query']
+
+
+def listed(key, status, holder=''):
+    goal = SimpleNamespace(query_id=key, failed_state='PICK', choices=[SimpleNamespace(state='DETECT')])
+    return Listed('/robot/expert_query', goal, status, holder, 0.0, float('inf'))
+
+
+OTHERS = [listed('held', OpenQuery.CLAIMED, 'bob'), listed('by hand', OpenQuery.INTERFACE_RUNNING)]
+
+
+class Asking:
+    """A front end with questions that others work on, and some that nobody does."""
+
+    def __init__(self, *free, fails=0):
+        self.free = list(free)
+        self.claimed, self.answers, self.released = [], [], []
+        self._fails = fails
+
+    def questions(self):
+        return OTHERS + [listed(key, OpenQuery.PENDING) for key in self.free]
+
+    def wait_for_change(self, version, _timeout_s):
+        return version
+
+    def claim(self, question):
+        if self._fails:
+            self._fails -= 1
+            raise ServerGoneError('it does not answer')
+        self.claimed.append(question.goal.query_id)
+        return SimpleNamespace(ok=True)
+
+    def answer(self, question, decision):
+        self.answers.append((question.goal.query_id, decision.state))
+        self.free.remove(question.goal.query_id)
+        return SimpleNamespace(ok=True)
+
+    def release(self, question):
+        self.released.append(question.goal.query_id)
+
+
+@pytest.mark.parametrize('free, found', [(['first', 'second'], 'first'), ([], None)])
+def test_a_question_that_somebody_works_on_is_not_waited_for(free, found):
+    question = wait_for_question(Asking(*free), 0.02)
+    assert (question.goal.query_id if question else None) == found
+
+
+def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_outlives_a_server(monkeypatch):
+    page = (Path(__file__).resolve().parents[3] / 'doc' / 'expert.md').read_text(encoding='utf-8')
+    program, = re.findall(r'```python\n(.*?FrontEnd\(.*?)```', page, re.S)
+    front_end = Asking('first', 'second', 'third', fails=1)
+    typed = iter(['DETECT', 'DETECT'])
+
+    def type_in(_prompt):
+        answer = next(typed, None)
+        if answer is None:
+            raise KeyboardInterrupt
+        return answer
+    monkeypatch.setattr(module, 'FrontEnd', lambda _expert: front_end)
+    monkeypatch.setattr(module, 'wait_for_question',
+                        lambda each, timeout_s: wait_for_question(each, 0.0) or type_in(''))
+    monkeypatch.setattr(module.rospy, 'init_node', lambda *_, **__: None)
+    monkeypatch.setattr(module.rospy.rostime, 'wallsleep', lambda _s: None)
+    with pytest.raises(KeyboardInterrupt):
+        exec(compile(program, 'expert.md', 'exec'), {'input': type_in})
+    assert front_end.answers == [('first', 'DETECT'), ('second', 'DETECT')]
+    assert front_end.claimed == ['first', 'second', 'third'] and front_end.released[-1] == 'third', 'left by Ctrl-C'
