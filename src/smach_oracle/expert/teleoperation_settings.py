@@ -16,6 +16,7 @@ from .teleoperation import DriveLimits
 NO_SNAPSHOT = 'none'
 GRASP_POSE = 'grasp_pose'  # of the tool, when the gripper last closed on something; else where it is now
 TOOL_POSE = 'tool_pose'  # of the tool, now
+_WORLD_HZ = 60.0  # control periods in a second of a world in lock-step
 _DESCRIPTION_S = 60.0
 _OUTPUTS = (GRASP_POSE, TOOL_POSE)
 _NEVER_ZERO = ('linear', 'angular', 'joint_share')  # of the limits: what is divided by
@@ -51,7 +52,7 @@ class TeleoperationSettings(NamedTuple):
         names = {name: ArmNames.parse('~arms/' + name, value) for name, value in arms.items()}
         states = {state: _state(state, value, names) for state, value in mapping_of('~states').items()}
         return cls(names, name_of('~base_frame', 'base_footprint'), _limits(), states, names_of('~arm_keys', ['arm']),
-                   names_of('~success', ['succeeded']), number_of('~rate_hz', 60.0, 30.0, 500.0),
+                   names_of('~success', ['succeeded']), _rate_hz(),
                    number_of('~watchdog_s', 0.06, 0.01, 0.5), number_of('~lease_s', 3.0, 0.5, 60.0),
                    number_of('~lead', 0.12, 0.01, 1.0),
                    number_of('~gripper_effort', 60.0, 1.0, 500.0), flag_of('~lock_step', False),
@@ -111,6 +112,14 @@ def _description() -> object:
     while time.monotonic() < until_s and not rospy.is_shutdown() and not rospy.has_param('robot_description'):
         time.sleep(0.1)
     return rospy.get_param('robot_description', '')
+
+
+def _rate_hz() -> float:
+    rate_hz = number_of('~rate_hz', _WORLD_HZ, 30.0, 500.0)
+    if flag_of('~lock_step', False) and _WORLD_HZ % rate_hz:
+        raise ConfigError(rospy.resolve_name('~rate_hz'), rate_hz,
+                          '30 or 60 in lock-step: a period is a whole number of the world\'s, of which a second has 60')
+    return rate_hz
 
 
 def _limits() -> DriveLimits:

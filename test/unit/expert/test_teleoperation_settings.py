@@ -47,7 +47,9 @@ def test_the_arm_is_the_one_that_the_userdata_names_else_the_state_s(read, userd
     ({'arms': {'right': dict(ARMS['right'], tool='')}}, 'arms/right.tool'),
     ({'arms': {'right': dict(ARMS['right'], posture=[0.0, math.nan])}}, 'posture'),
     ({'arm_keys': 'arm'}, 'arm_keys'), ({'lease_s': 0.0}, 'lease_s'),
-    ({'rate_hz': 10}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'), ({'watchdog_s': 3.0}, 'watchdog_s'),
+    ({'rate_hz': 10}, 'rate_hz'), ({'rate_hz': 50, 'lock_step': True}, 'rate_hz: 50.0 .* 30 or 60'),
+    ({'rate_hz': 120, 'lock_step': True}, 'rate_hz'), ({'watchdog_s': math.nan}, 'watchdog_s'),
+    ({'watchdog_s': 3.0}, 'watchdog_s'),
     ({'lead': True}, 'lead'), ({'lock_step': 'yes'}, 'lock_step'), ({'success': 'succeeded'}, 'success'),
     ({'limits': {'speed': 1.0}}, 'limits/speed'), ({'limits': {'linear': 0.0}}, 'limits/linear'),
     ({'limits': {'joint_share': 0.0}}, 'limits/joint_share'), ({'limits': {'angular': 0}}, 'limits/angular'),
@@ -64,6 +66,11 @@ def test_what_cannot_be_is_refused_by_name(read, given, says):
 def test_the_keys_of_refusals_are_whole_names(read):
     with pytest.raises(ConfigError, match='/node/limits/linear: -1'):
         read(limits={'linear': -1})
+
+
+@pytest.mark.parametrize('rate_hz, lock_step', [(30, True), (60, True), (50, False), (120, False)])
+def test_rates_that_can_be_are_taken(read, rate_hz, lock_step):
+    assert read(rate_hz=rate_hz, lock_step=lock_step).rate_hz == rate_hz
 
 
 def test_without_pybullet_the_clearance_is_refused_at_once_and_all_else_goes_on(read, monkeypatch):
