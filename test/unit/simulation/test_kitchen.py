@@ -103,7 +103,7 @@ def test_the_door_is_seen_at_its_angle_though_the_map_is_a_little_wrong(degrees)
     truth = base_from_fridge(Kitchen(), world.true_base())
     assert abs(view.angle - world.body_joint('fridge', DOOR_JOINT)) < np.radians(3.0)
     seen, real = (apply(frame, handle_point(Kitchen(), view.angle, 1.0)) for frame in (view.base_from_fridge, truth))
-    assert view.handle_seen and np.linalg.norm(seen - real) < (0.015 if degrees == 0 else 0.03)
+    assert np.linalg.norm(seen - real) < (0.015 if degrees == 0 else 0.025)
     world.close()
 
 

@@ -26,7 +26,6 @@ class DoorView(NamedTuple):
 
     angle: float  # rad, against the front of the fridge as the map has it; 0: closed
     base_from_fridge: np.ndarray  # 4x4, the map's, moved so that the door lies where it was seen
-    handle_seen: bool  # the correction along the door is measured, too
 
 
 def find_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> DoorView:
@@ -44,7 +43,7 @@ def find_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> D
     along = _handle_shift(apply(inverse(door_frame(kitchen, angle)), points), kitchen, offset)
     fridge_from_door = door_frame(kitchen, angle)
     shift = fridge_from_door[:3, :3] @ np.array([offset, along or 0.0, 0.0])
-    return DoorView(angle, base_from_fridge @ from_rpy(shift), along is not None)
+    return DoorView(angle, base_from_fridge @ from_rpy(shift))
 
 
 def _points_of_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:

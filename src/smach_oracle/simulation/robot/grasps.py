@@ -1,5 +1,5 @@
 """From where a hand may take an upright thing: headings all round, and the hand level, inclined or from above."""
-from typing import Iterator, List, NamedTuple
+from typing import Iterator, List
 
 import numpy as np
 
@@ -18,17 +18,12 @@ LOWEST = 0.035  # m of the tips above what the thing stands on, hand level
 BELOW_TOP = 0.02  # m, hand level
 
 
-class Grasp(NamedTuple):
-    """One way to take it."""
+def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
+    """Ways to take a thing, the most natural first; [] where it is too wide from everywhere.
 
-    pose: np.ndarray  # 4x4, base_footprint from tool, when the gripper closes
-    heading: float  # rad, of the hand
-    pitch: float  # rad, downwards
-    width: float  # m between the tips that the thing takes up
-
-
-def grasps(box: UprightBox, arm: str) -> List[Grasp]:
-    """Ways to take a thing, the most natural first; [] where it is too wide from everywhere."""
+    :param box: in base_footprint.
+    :returns: poses of the tool (4x4, in base_footprint) when the gripper closes.
+    """
     straight = float(np.arctan2(*(box.centre[:2] - SHOULDER[arm])[::-1]))
     found = [(cost, order, grasp) for order, (cost, grasp) in enumerate(_all(box, straight))]
     return [grasp for _, _, grasp in sorted(found, key=lambda item: item[:2])]
@@ -42,11 +37,11 @@ def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
             if width <= WIDEST:
                 pose = from_rpy(_middle(box, heading, pitch), pitch=pitch, yaw=heading)
                 corners = CORNERS if _projected(box, heading) > GRIPPER_OPEN - SPARE else 0.0
-                yield abs(turn) + 0.8 * pitch + 8.0 * width + corners, Grasp(pose, float(heading), float(pitch), width)
+                yield abs(turn) + 0.8 * pitch + 8.0 * width + corners, pose
 
 
 def width_across(box: UprightBox, heading: float) -> float:
-    """How much (m) of the gap between the tips a thing takes up, for a hand that comes along `heading`."""
+    """How much (m) of the gap between the tips a thing takes up, for a hand that comes along `heading` (rad)."""
     if box.wide - box.narrow < 0.012:  # as good as round, or square: its corners turn in between the tips
         return box.wide
     return _projected(box, heading)

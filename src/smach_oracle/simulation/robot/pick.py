@@ -6,7 +6,7 @@ import numpy as np
 from ...geometry.box import UprightBox
 from ...geometry.transforms import inverse
 from .arm import FAST, FEEL_EFFORT, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
-from .grasps import Grasp, grasps
+from .grasps import grasps
 from .interface import GRIPPER_OPEN
 from .kitchen import MapBox
 from .planner import PlanningError
@@ -35,7 +35,6 @@ class Held(NamedTuple):
 class _Way(NamedTuple):
     """How to get at a grasp."""
 
-    grasp: Grasp
     there: np.ndarray  # (m, 7) to the place in front of the object
     approach: np.ndarray  # (k, 7) from there
 
@@ -61,7 +60,7 @@ def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox]
         return _pick(hand, target, ways, effort)
 
 
-def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp], effort: float) -> Held:
+def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float) -> Held:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
@@ -82,10 +81,10 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[Grasp], effort: float)
     raise SkillError('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
 
 
-def _way_to(hand: Arm, grasp: Grasp, reasons: List[str]) -> Optional[_Way]:
-    """A way to a grasp; None, with a reason more, where there is none."""
+def _way_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Way]:
+    """A way to a grasp (4x4); None, with a reason more, where there is none."""
     try:
-        starts = hand.reach(backed_off(grasp.pose, APPROACH))
+        starts = hand.reach(backed_off(grasp, APPROACH))
     except Unreachable:
         reasons.append('out of reach')
         return None
@@ -94,12 +93,12 @@ def _way_to(hand: Arm, grasp: Grasp, reasons: List[str]) -> Optional[_Way]:
         return None
     for start in starts:
         with hand.space.touchable([TARGET]):
-            approach = hand.line(start, grasp.pose)
+            approach = hand.line(start, grasp)
         if approach is None:
             reasons.append('no straight way to the object')
             continue
         try:
-            return _Way(grasp, hand.way(start), approach)
+            return _Way(hand.way(start), approach)
         except PlanningError as err:
             reasons.append(str(err))
     return None

@@ -19,7 +19,6 @@ class Swing(NamedTuple):
 
     path: np.ndarray  # (n, 7) rad
     angles: np.ndarray  # (n,) rad, of the door at these points
-    turns: np.ndarray  # (n,) rad, of the hand against the door
     share: float  # of the way that was asked for
 
 
@@ -59,7 +58,7 @@ def _follow(chain: Chain, tool_at: ToolAt, angles: Sequence[float], limits: Tupl
             break
         path.append(step[0])
         turns.append(step[1])
-    return Swing(np.array(path), np.array(angles[:len(path)]), np.array(turns), len(path) / len(angles))
+    return Swing(np.array(path), np.array(angles[:len(path)]), len(path) / len(angles))
 
 
 def _next(chain: Chain, tool_at: ToolAt, angle: float, turns: Sequence[float], q: np.ndarray,

@@ -1,6 +1,6 @@
 """The head camera: colour and depth from PyBullet's software renderer, with the errors of a depth camera."""
 import math
-from typing import Dict, List, Tuple
+from typing import List, Tuple
 
 import numpy as np
 import pybullet
@@ -78,18 +78,6 @@ def shoot(world: World, counted: bool = True) -> Frame:
         world.disturbances.frame_taken()
         world.happened('see')
     return frame
-
-
-def regions(world: World) -> Dict[str, Tuple[int, int, int, int]]:
-    """Of every body of the scene that the head camera sees now: left, top, width, height of its visible pixels."""
-    bodies = View(world, world.link_pose(CAMERA_FRAME)).bodies
-    found = {}
-    for index in np.unique(bodies[bodies >= 0]):
-        name = world.seen_as(int(index))
-        rows, columns = np.nonzero(bodies == index)
-        if name in world.body_names:
-            found[name] = (int(columns.min()), int(rows.min()), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1)
-    return found
 
 
 def noisy_colour(colour: np.ndarray, sensor: Sensor, generator: np.random.Generator) -> np.ndarray:

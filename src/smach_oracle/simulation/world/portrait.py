@@ -26,7 +26,6 @@ class Viewpoint(NamedTuple):
 
 AT_TABLE = Viewpoint((2.5, -1.75, 1.85), (0.36, -0.02, 0.82), 34.0)
 AT_FRIDGE = Viewpoint((-0.15, -2.6, 1.85), (0.95, 0.1, 0.74), 40.0)
-AT_HOME = Viewpoint((2.5, -2.9, 2.0), (0.45, -0.15, 0.8), 42.0)  # with the person and the fridge
 USUAL = {'drink_retrieval': AT_FRIDGE}  # by task; others: AT_TABLE
 
 

@@ -1,5 +1,5 @@
 """What a trial's world is made of: plain data, drawn from the trial's seed by the scenes, built by the world."""
-from typing import Dict, NamedTuple, Tuple
+from typing import NamedTuple, Tuple
 
 Vector = Tuple[float, float, float]
 
@@ -74,4 +74,3 @@ class Scene(NamedTuple):
     sensor: Sensor = Sensor()
     disturbances: Tuple[Disturbance, ...] = ()
     causes: Tuple[Cause, ...] = ()
-    notes: Dict[str, float] = {}
