@@ -116,10 +116,6 @@ class Chain:
         """The nearest joint positions within the limits."""
         return np.clip(q, self.lower, self.upper)
 
-    def within(self, q: np.ndarray, slack: float = 1e-6) -> bool:
-        """Whether every joint is inside its limits."""
-        return bool(np.all(q >= self.lower - slack) and np.all(q <= self.upper + slack))
-
     def nearest_turn(self, q: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """`q` with continuous joints taken to within half a turn of `reference`."""
         turned = reference + (q - reference + np.pi) % (2 * np.pi) - np.pi
