@@ -97,7 +97,6 @@ class MasterWatch:
         self._known_pid: Optional[int] = None
         self._lost = False
         self._stop = threading.Event()
-        self.restarts_seen = 0
         self._thread = threading.Thread(target=self._run, name='master_watch', daemon=True)
 
     def start(self) -> None:
@@ -124,7 +123,6 @@ class MasterWatch:
         for topic, uris in self._link.register(items):
             self._found_publishers(topic, uris)
         self._known_pid, self._lost = pid, False
-        self.restarts_seen += 1
         rospy.logwarn('The ROS master was restarted: registered %d publishers, %d subscribers and %d services again.',
                       len(items.publications), len(items.subscriptions), len(items.services))
 
