@@ -6,7 +6,6 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 import smach
 from smach.container import Container, Edge
 from smach.state import State
-from smach.user_data import Remapper
 from smach.visit import Visit
 
 __all__ = ['StateMachine']
@@ -252,14 +251,6 @@ class StateMachine(Container):
         if visit.may_be_kept:
             self._visits[label] = visit
         return visit
-
-    def _remapper_of(self, label: str) -> Remapper:
-        """What the state of this label is given to read and write, for subclasses that execute states themselves."""
-        visit = self._visits.get(label)
-        state = self._states[label]
-        if visit is None or not visit.is_up_to_date(state, self.userdata, self._remappings[label]):
-            visit = self._prepare_visit(label, state)
-        return visit.remapper
 
     def _search_target(self, label: str, state: Any, outcome: Any) -> Optional[str]:
         """Where an outcome leads that was not found the quick way; InvalidTransitionError if nowhere."""
