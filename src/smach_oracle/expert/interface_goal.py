@@ -3,7 +3,7 @@
 A second goal is refused with a text; a preempt, and the loss of the node that asked, end the goal.
 """
 import time
-from typing import Any, Callable, Collection, Dict, Mapping, Optional, Sequence
+from typing import Any, Callable, Collection, Mapping, Optional, Sequence
 
 import actionlib
 import rospy
@@ -15,7 +15,7 @@ from smach_oracle.srv import (FinishInterface, FinishInterfaceRequest, FinishInt
 
 from ..oracle.errors import OracleError
 from ..oracle.question import names
-from ..ros.userdata_codec import UserdataCodecError, decode, decode_all, encode_all
+from ..ros.userdata_codec import UserdataCodecError, decode, encode_all
 
 ASKER_GONE_S = 3.0
 NO_GOAL = 'no goal is active: the oracle has not started this interface, or it has ended'
@@ -52,19 +52,6 @@ class InterfaceGoal:
         """The goal that is worked on."""
         handle = self._handle
         return handle.get_goal() if handle is not None else None
-
-    def inputs(self) -> Dict[str, Any]:
-        """The failed state's input userdata, as far as it could be sent.
-
-        :raises InterfaceGoalError: where no goal is active or an input is malformed.
-        """
-        goal = self.goal
-        if goal is None:
-            raise InterfaceGoalError(NO_GOAL)
-        try:
-            return decode_all(goal.userdata, skip_unsent=True)
-        except UserdataCodecError as err:
-            raise InterfaceGoalError(str(err)) from err
 
     def tell(self, progress: float, text: str) -> None:
         """Feedback to the oracle: progress 0 to 1, -1 where unknown."""
