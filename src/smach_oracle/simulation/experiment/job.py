@@ -26,8 +26,6 @@ class Job:
         self.trials = plan.trials
         self.summaries: Dict[str, TrialSummary] = {}  # of the trials that are over, by the path of their bags
         self.messages: List[str] = []  # what somebody should be told
-        self.ran_s = 0.0  # time that this run spent on it
-        self.ran = 0  # trials that this run has added
         self._plan = plan
         self._seed = plan.first_seed(replicate)
         self._hung_after_s = hung_after_s
@@ -36,7 +34,6 @@ class Job:
         self._attempts: Dict[int, int] = {}
         self._ended_at = self._sign_at = 0.0  # the latest trial's end, the latest line that the log grew by
         self._logged = 0  # bytes
-        self._started_at = 0.0
         left = end_marked(str(self._records.folder), LEFTOVER_GRACE_S)
         if left:
             self.messages.append('{}: ended {} processes that an earlier run had left'.format(self.name, left))
@@ -66,8 +63,7 @@ class Job:
 
     def start(self) -> None:
         """Launch the trials that are missing. Raises OSError."""
-        self._started_at = self._ended_at = self._sign_at = time.monotonic()
-        self._done_at_start = len(self.summaries)
+        self._ended_at = self._sign_at = time.monotonic()
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
@@ -145,5 +141,3 @@ class Job:
         self._launch.stop()
         self._launch = None
         self._settle()
-        self.ran_s += time.monotonic() - self._started_at
-        self.ran += len(self.summaries) - self._done_at_start
