@@ -1,7 +1,7 @@
 // What a machine was doing at a moment of a trial, told from its events alone. Pure.
 
 // Events that are worth a stop: page keys go from one to the next.
-export const LANDMARKS = new Set(['trial_start', 'failure', 'query_opened', 'query_answered', 'give_up', 'supersede', 'trial_end']);
+const LANDMARKS = new Set(['trial_start', 'failure', 'query_opened', 'query_answered', 'give_up', 'supersede', 'trial_end']);
 const CLOSED = { query_expired: 'nobody answered in time', query_cancelled: 'taken back' };
 
 export class Course {

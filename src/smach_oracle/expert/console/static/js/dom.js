@@ -4,7 +4,7 @@ const SVG = 'http://www.w3.org/2000/svg';
 // what steers a terminal, turns the reading direction, or cannot be seen
 const UNSEEN = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]/g;
 
-export function clean(text) {
+function clean(text) {
   return String(text).replace(UNSEEN, '\ufffd');
 }
 

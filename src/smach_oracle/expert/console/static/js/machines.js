@@ -7,7 +7,7 @@ import { remember, remembered } from './alerts.js';
 export const machines = { id: 'machines', title: 'Machines', create: (app) => new Machines(app) };
 
 // What a robot's section says, and what its open questions tell: a page that came late has not heard of the failure.
-export function liveOf(store, robot) {
+function liveOf(store, robot) {
   const live = store.get('live ' + robot);
   if (!live) return { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
   const failed = Object.assign({}, live.failed);

@@ -11,7 +11,7 @@ const KINDS = {
 };
 
 // What kind of value an item of the userdata has now.
-export function kindOf(item) {
+function kindOf(item) {
   if (!item || item.note) return 'any';
   if (item.type.includes('/')) return item.type.endsWith('[]') ? 'messages' : 'message';
   let value;

@@ -55,7 +55,7 @@ export class RobotFeed {
 }
 
 // A robot as the console sends it.
-export function modelOf(data) {
+function modelOf(data) {
   const length = new DataView(data).getUint32(0, true);
   const model = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   let at = 4 + length;

@@ -4,12 +4,12 @@
 const GRID = 3; // m to each side
 
 // A point of one frame in another; `place` is 3 x 4, by rows.
-export function placed(place, [x, y, z]) {
+function placed(place, [x, y, z]) {
   return [0, 4, 8].map((row) => place[row] * x + place[row + 1] * y + place[row + 2] * z + place[row + 3]);
 }
 
 // 3 x 4, by rows: one after the other.
-export function chained(one, other) {
+function chained(one, other) {
   const found = new Float32Array(12);
   for (let row = 0; row < 12; row += 4) {
     for (let column = 0; column < 4; column += 1) {

@@ -8,7 +8,7 @@ import { duration } from './format.js';
 const RANK = [/\/(rgb|color|colour)\//, /image_(raw|rect|color)/, /./];
 
 // The cameras of a robot: those of its namespace, or all that there are.
-export function camerasOf(app, robot) {
+function camerasOf(app, robot) {
   const space = robot.slice(0, robot.lastIndexOf('/') + 1);
   const sensors = ((app.store.get('eye') || {}).sensors || []).filter((each) => each.kind === 'image' && !/depth|disparity/.test(each.topic));
   const own = sensors.filter((each) => each.topic.startsWith(space));
