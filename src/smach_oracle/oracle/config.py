@@ -4,7 +4,7 @@
 names the dotted key, the value and what is allowed.
 """
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from . import config_values as values
@@ -154,11 +154,6 @@ def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, 
                               'at least moderate_from, which is {}'.format(settings.moderate_from))
         raise ConfigError(prefix + 'moderate_from', settings.moderate_from,
                           'at most high_from, which is {}'.format(settings.high_from))
-
-
-def setting_names() -> Tuple[str, ...]:
-    """Return every key that `Settings.from_dict` knows at its top level."""
-    return tuple(sorted([entry.name for entry in fields(Settings) if entry.name != 'defaults'] + list(_STATE_CHECKS)))
 
 
 SettingsLike = Union[Settings, Mapping[str, Any], None]

@@ -113,7 +113,7 @@ def _failed(machine: Any, ledger: Ledger, record: StateRecord, failure: Failure)
     if verdict.kind is VerdictKind.SUPERSEDE:
         record.take_back_failure()
         ledger.history.supersede(verdict.outcome)
-    return _leave_oracle(machine, ledger, record, failure, verdict)
+    return _leave_oracle(machine, ledger, record, verdict)
 
 
 def _enter_oracle(machine: Any, ledger: Ledger, record: StateRecord, failure: Failure) -> None:
@@ -144,8 +144,7 @@ def _recover(machine: Any, recovery: Recovery) -> Verdict:
     return verdict
 
 
-def _leave_oracle(machine: Any, ledger: Ledger, record: StateRecord, failure: Failure,
-                  verdict: Verdict) -> Optional[str]:
+def _leave_oracle(machine: Any, ledger: Ledger, record: StateRecord, verdict: Verdict) -> Optional[str]:
     if verdict.kind is VerdictKind.JUMP:
         _jump(machine, ledger, record, verdict)
         return None
