@@ -79,13 +79,18 @@ class JoyTeleoperation(unittest.TestCase):
             time.sleep(0.02)
         self.assertEqual(self.arm.moved_s, before_s)
 
-    def test_the_gripper_closes(self):
+    def test_the_second_button_closes_the_gripper_and_opens_it_again(self):
         self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
-        begun_s = time.monotonic()
-        while not self.ann.states[-1].gripper_stalled and time.monotonic() < begun_s + 15.0:
-            self.push([0, 0, 0, 0, 0, 0], [1, 1])
-            time.sleep(0.02)
-        self.assertTrue(self.ann.states[-1].gripper_stalled)
+        for stalled in (True, False):
+            begun_s = time.monotonic()
+            while self.ann.states[-1].gripper_stalled != stalled and time.monotonic() < begun_s + 15.0:
+                self.push([0, 0, 0, 0, 0, 0], [1, 1])
+                time.sleep(0.02)
+            self.assertEqual(self.ann.states[-1].gripper_stalled, stalled)
+            for _ in range(20):
+                self.push([0, 0, 0, 0, 0, 0], [1, 0])
+                time.sleep(0.02)
+        self.assertGreater(self.ann.states[-1].gripper, 0.08)
 
 
 if __name__ == '__main__':

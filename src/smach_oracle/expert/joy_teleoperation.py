@@ -14,7 +14,9 @@ from smach_oracle.msg import TeleopCommand, TeleopState
 from ..oracle.errors import ConfigError
 from ..ros.command_line import parameters_only
 from ..ros.master_watch import start_master_watch
+from .teleoperation import GRIPPER_OPEN
 
+BUTTONS = ('dead_man', 'open', 'close', 'toggle')
 AXES = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
 _MOST_INDEX = 63
 
@@ -26,6 +28,7 @@ class JoySettings(NamedTuple):
     dead_man: int  # index in Joy.buttons
     open: int  # -1: none
     close: int
+    toggle: int  # closes and opens by turns
     gripper_open: float  # m
     dead_zone: float
     silent_s: float  # without a message of the joystick for so long, its dead-man counts as let go
@@ -45,16 +48,22 @@ class JoySettings(NamedTuple):
             raise ConfigError('~axes', axes, 'a mapping of {} to [index, speed]'.format(', '.join(AXES)))
         buttons = given.get('buttons', {})
         if not isinstance(buttons, Mapping) or 'dead_man' not in buttons:
-            raise ConfigError('~buttons', buttons, 'a mapping with dead_man, and open and close where there are such')
+            raise ConfigError('~buttons', buttons, 'a mapping with dead_man, and open, close or toggle where there are '
+                                                   'such')
+        unknown = sorted(set(buttons) - set(BUTTONS), key=str)
+        if unknown:
+            raise ConfigError('~buttons/{}'.format(unknown[0]), buttons[unknown[0]], 'the keys ' + ', '.join(BUTTONS))
+        pressed = {name: _index('~buttons/' + name, buttons.get(name, -1), 0 if name == 'dead_man' else -1)
+                   for name in BUTTONS}
         return cls({name: _axis(name, value) for name, value in axes.items()},
-                   _index('~buttons/dead_man', buttons['dead_man'], 0),
-                   _index('~buttons/open', buttons.get('open', -1), -1),
-                   _index('~buttons/close', buttons.get('close', -1), -1),
-                   _number('~gripper_open', given.get('gripper_open', 0.08), 0.0, 1.0),
+                   pressed['dead_man'], pressed['open'], pressed['close'], pressed['toggle'],
+                   _number('~gripper_open', given.get('gripper_open', GRIPPER_OPEN), 0.0, 1.0),
                    _number('~dead_zone', given.get('dead_zone', 0.05), 0.0, 0.9),
                    _number('~silent_s', given.get('silent_s', 0.3), 0.02, 2.0),
-                   _number('~rate_hz', given.get('rate_hz', 50.0), 30.0, 200.0), _text('~frame', given.get('frame')),
-                   _text('~arm', given.get('arm', '')), _text('~operator', given.get('operator', 'joystick')))
+                   _number('~rate_hz', given.get('rate_hz', 50.0), 30.0, 200.0),
+                   _text('~frame', given.get('frame'), 'the name of a link of the robot'),
+                   _text('~arm', given.get('arm', ''), 'the name of an arm, or none', 0),
+                   _text('~operator', given.get('operator', 'joystick'), 'a name'))
 
 
 class Wish(NamedTuple):
@@ -86,12 +95,30 @@ def wish_of(settings: JoySettings, axes: Sequence[float], buttons: Sequence[int]
     return Wish(True, (speeds[0], speeds[1], speeds[2]), (speeds[3], speeds[4], speeds[5]), gripper)
 
 
+class Toggle:
+    """A button that closes the gripper, and opens it when it is pressed again."""
+
+    def __init__(self, settings: JoySettings) -> None:
+        self._settings = settings
+        self._down = False
+        self._closes = False
+
+    def applied(self, wish: Wish, buttons: Sequence[int]) -> Wish:
+        """A wish, with what the button has to say of the gripper; it counts only while the dead-man is held."""
+        was_down, self._down = self._down, wish.held and _pressed(buttons, self._settings.toggle)
+        if not self._down:
+            return wish
+        self._closes = self._closes if was_down else not self._closes
+        return wish._replace(gripper=0.0 if self._closes else self._settings.gripper_open)
+
+
 class JoyTeleoperation:
     """Sends commands while the dead-man button is held, and one that stops when it is let go."""
 
     def __init__(self, settings: JoySettings) -> None:
         self._settings = settings
         self._wish, self._came_s = STILL, -math.inf
+        self._toggle = Toggle(settings)
         self._arm = settings.arm
         self._seq = 0
         self._lock = threading.Lock()
@@ -120,7 +147,7 @@ class JoyTeleoperation:
             gripper=wish.gripper or 0.0))
 
     def _on_joy(self, message: Joy) -> None:
-        wish = wish_of(self._settings, message.axes, message.buttons)
+        wish = self._toggle.applied(wish_of(self._settings, message.axes, message.buttons), message.buttons)
         with self._lock:
             self._wish, self._came_s = wish, time.monotonic()
 
@@ -154,9 +181,9 @@ def _number(key: str, value: Any, least: float, most: float) -> float:
     return float(value)
 
 
-def _text(key: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise ConfigError(key, value, 'text')
+def _text(key: str, value: Any, allowed: str, least: int = 1) -> str:
+    if not isinstance(value, str) or len(value) < least:
+        raise ConfigError(key, value, allowed)
     return value
 
 

@@ -9,6 +9,7 @@ from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tup
 
 import numpy as np
 
+GRIPPER_OPEN = 0.085  # m between the finger tips of an open gripper, where front ends are told nothing else: a PR2's
 _ROOM = 1e-4  # rad; a joint with less room than this before its limit takes no part in a motion towards it
 _EASE_GAIN = 2.0  # 1/s, towards the arm's posture
 _EASE_SPEED = 0.8  # rad/s

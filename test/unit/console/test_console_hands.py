@@ -9,6 +9,7 @@ from smach_oracle.expert.console.audit import Person
 from smach_oracle.expert.console.commands import Command
 from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.console.wheel import SILENT_S, Drive
+from smach_oracle.expert.teleoperation import GRIPPER_OPEN
 from smach_oracle.msg import TeleopState
 
 ARMS = {'left': {'tool': 'l_tool'}, 'right': {'tool': 'r_tool'}}
@@ -63,6 +64,12 @@ def test_the_arm_is_the_interface_s_own_choice_until_another_is_named(make):
     assert drive(made).ok and drive(made, arm='left').ok
     assert [(each.arm, each.header.frame_id, each.dead_man) for each in sent] == [
         ('right', 'r_tool', True), ('left', 'l_tool', True)]
+
+
+@pytest.mark.parametrize('parameters, gap', [({}, GRIPPER_OPEN), ({'gripper_open': 0.07}, 0.07)])
+def test_the_gripper_opens_as_far_as_the_interface_says(make, parameters, gap):
+    made, _, sent = make(**parameters)
+    assert drive(made, gripper='open').ok and sent[-1].move_gripper and sent[-1].gripper == gap
 
 
 def test_an_arm_that_is_not_there_stops_the_hand(make):

@@ -5,11 +5,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from smach_oracle.expert.joy_teleoperation import STILL, JoySettings, Wish, wish_of
+from smach_oracle.expert.joy_teleoperation import STILL, JoySettings, Toggle, Wish, wish_of
+from smach_oracle.expert.teleoperation import GRIPPER_OPEN
 from smach_oracle.oracle.errors import ConfigError
 
 GIVEN = {'axes': {'x': [1, 0.2], 'y': [0, -0.2], 'yaw': [3, 0.5]}, 'buttons': {'dead_man': 5, 'open': 1, 'close': 0},
          'frame': 'base_footprint'}
+LAUNCH = Path(__file__).resolve().parents[3] / 'launch'
 HELD = [0, 0, 0, 0, 0, 1]
 
 
@@ -39,12 +41,22 @@ def test_the_gripper():
     assert wish_of(settings, [], [1, 1, 0, 0, 0, 1]).gripper is None
 
 
+def test_one_button_closes_and_opens_the_gripper_by_turns_while_the_dead_man_is_held():
+    settings = JoySettings.from_dict(dict(GIVEN, buttons={'dead_man': 0, 'toggle': 1}, gripper_open=0.07))
+    toggle = Toggle(settings)
+    presses = [[1, 0], [1, 1], [1, 1], [1, 0], [1, 1], [1, 0], [0, 1], [0, 0], [1, 1]]
+    assert [toggle.applied(wish_of(settings, [], buttons), buttons).gripper for buttons in presses] == [
+        None, 0.0, 0.0, None, 0.07, None, None, None, 0.0]
+
+
 @pytest.mark.parametrize('key, changes', [
     ('~axes', {'axes': {}}), ('~axes/up', {'axes': {'up': [0, 1]}}), ('~axes/x', {'axes': {'x': 0}}),
     ('~axes/x', {'axes': {'x': [-1, 0.1]}}), ('~axes/x', {'axes': {'x': [0, 50.0]}}), ('~buttons', {'buttons': {}}),
     ('~buttons/dead_man', {'buttons': {'dead_man': -1}}), ('~buttons/open', {'buttons': {'dead_man': 0, 'open': 'A'}}),
     ('~dead_zone', {'dead_zone': 1.0}), ('~rate_hz', {'rate_hz': 10}), ('~silent_s', {'silent_s': True}),
-    ('~frame', {'frame': None})])
+    ('~buttons/closed', {'buttons': {'dead_man': 0, 'closed': 1}}),
+    ('~buttons/toggle', {'buttons': {'dead_man': 0, 'toggle': -2}}),
+    ('~frame', {'frame': None}), ('~frame', {'frame': ''}), ('~arm', {'arm': 1}), ('~operator', {'operator': ''})])
 def test_settings_that_are_refused_are_named(key, changes):
     with pytest.raises(ConfigError) as error:
         JoySettings.from_dict(dict(GIVEN, **changes))
@@ -54,12 +66,19 @@ def test_settings_that_are_refused_are_named(key, changes):
 @pytest.mark.parametrize('axis', range(6))
 def test_the_settings_that_come_along_are_a_spacenav_s(axis):
     """spacenav_node: x forward, y left, z up, then the turns about these; two buttons."""
-    path = Path(__file__).resolve().parents[3] / 'launch' / 'joy_teleoperation.yaml'
-    settings = JoySettings.from_dict(yaml.safe_load(path.read_text()))
+    settings = JoySettings.from_dict(yaml.safe_load((LAUNCH / 'joy_teleoperation.yaml').read_text()))
     pushed = [1.0 if index == axis else 0.03 for index in range(6)]  # the others are never quite still
     wish = wish_of(settings, pushed, [1, 0])
     assert wish.held and wish.gripper is None
     assert [value > 0 for value in wish.linear + wish.angular] == [index == axis for index in range(6)]
     assert all(value == 0.0 for index, value in enumerate(wish.linear + wish.angular) if index != axis)
     assert wish_of(settings, pushed, [0, 0]) == STILL and wish_of(settings, pushed, [0, 1]) == STILL
-    assert wish_of(settings, pushed, [1, 1]).gripper == 0.0
+    toggle = Toggle(settings)
+    assert {toggle.applied(wish, buttons).gripper for buttons in ([1, 1], [1, 0], [1, 1])} == {
+        0.0, None, settings.gripper_open}, 'its second button'
+
+
+@pytest.mark.parametrize('file', ['joy_teleoperation.yaml', 'manipulation_interface.yaml'])
+def test_what_counts_as_open_is_the_same_with_and_without_the_settings_that_come_along(file):
+    assert yaml.safe_load((LAUNCH / file).read_text())['gripper_open'] == GRIPPER_OPEN
+    assert JoySettings.from_dict(GIVEN).gripper_open == GRIPPER_OPEN

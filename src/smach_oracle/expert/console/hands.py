@@ -14,6 +14,7 @@ from smach_oracle.msg import CollisionBoxes, SharedAutonomyActionResult, TeleopC
 
 from ..followed_server import Listed
 from ..front_end import FrontEnd
+from ..teleoperation import GRIPPER_OPEN
 from .audit import Audit, Person
 from .checks import shown
 from .commands import Command
@@ -45,7 +46,7 @@ class Hand:
         self._tools = {name: str(arm.get('tool', '')) for name, arm in arms.items()}
         self._linear = float(rospy.get_param(action + '/limits/linear', 0.25))
         self._angular = float(rospy.get_param(action + '/limits/angular', 1.0))
-        self._open = float(rospy.get_param(action + '/gripper_open', 0.08))
+        self._open = float(rospy.get_param(action + '/gripper_open', GRIPPER_OPEN))
         self._publisher = rospy.Publisher(action + '/command', TeleopCommand, queue_size=2, tcp_nodelay=True)
         self.boxes: Optional[int] = None  # that the robot's collision map has; None: there is no map
         self._subscribers = [
