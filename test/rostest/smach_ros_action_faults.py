@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """SimpleActionState against servers that die, freeze, vanish or ignore what they are told."""
+import threading
 import time
 import unittest
 
@@ -10,8 +11,21 @@ from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus
 
 from smach_ros import SimpleActionState, goal_run, server_watch
+from smach_ros.action_link import link_to
 from smach_ros_action_node import Behaviour
 from smach_ros_support import ActionNodeProcess, InBackground, LogWatch, userdata
+from waiting import wait_for
+
+
+class TellingState(SimpleActionState):
+    """Says when its server has begun with the goal; until then nothing is to be seen of how it treats a cancel."""
+
+    def __init__(self, *arguments, **keywords):
+        SimpleActionState.__init__(self, *arguments, **keywords)
+        self.active = threading.Event()
+
+    def _goal_active_cb(self):
+        self.active.set()
 
 
 class ActionFaultsTest(unittest.TestCase):
@@ -23,24 +37,30 @@ class ActionFaultsTest(unittest.TestCase):
         self.addCleanup(self.server.stop)
 
     def state(self, number, **arguments):
-        return SimpleActionState(self.name, TestAction, goal=TestGoal(number), **arguments)
+        return TellingState(self.name, TestAction, goal=TestGoal(number), **arguments)
+
+    def start_server(self):
+        """Start it, and wait until a goal can be sent: a process takes its time to come up on a busy machine."""
+        self.server.start()
+        self.assertTrue(wait_for(link_to(self.name, TestAction).ready))
 
     def with_limit(self, module, name, value):
         self.addCleanup(setattr, module, name, getattr(module, name))
         setattr(module, name, value)
 
     def test_killed_server_is_noticed_and_its_successor_is_used(self):
-        self.server.start()
+        self.start_server()
         results = []
         state = self.state(Behaviour.DIE, result_cb=lambda ud, status, result: results.append((status, result)))
         with LogWatch() as log:
             run = InBackground(state, userdata())
+            self.server.process.wait(30)
+            died_s = time.monotonic()
             self.assertEqual(run.outcome(), 'aborted')
-        self.assertLess(run.took_s(), 8.0)
+        self.assertLess(time.monotonic() - died_s, 8.0)
         self.assertIn('nobody answers', log.text())
         self.assertIn(self.name, log.text())
         self.assertEqual(results, [(GoalStatus.LOST, None)])
-        self.server.process.wait(5)
         impatient = self.state(150, server_wait_timeout=rospy.Duration(0.3))
         self.assertEqual(impatient.execute(userdata()), 'aborted')
         waiting = InBackground(self.state(150), userdata())
@@ -56,12 +76,12 @@ class ActionFaultsTest(unittest.TestCase):
         self.assertEqual(InBackground(machine).outcome(), 'recovered')
 
     def test_frozen_server_is_given_up_after_its_time(self):
-        self.server.start()
+        self.start_server()
         state = self.state(Behaviour.FREEZE)
         state.server_frozen_timeout_s = 4.0
         with LogWatch() as log:
             run = InBackground(state, userdata())
-            self.assertEqual(run.outcome(20.0), 'aborted')
+            self.assertEqual(run.outcome(), 'aborted')
         self.assertIn('no sign of life', log.text())
         self.assertGreater(run.took_s(), 4.0)
 
@@ -85,15 +105,16 @@ class ActionFaultsTest(unittest.TestCase):
         state = self.state(Behaviour.IGNORE_CANCEL, preempt_timeout=rospy.Duration(0.5))
         for _ in range(2):
             with LogWatch() as log:
+                state.active.clear()
                 run = InBackground(state, userdata())
-                time.sleep(0.8)
+                self.assertTrue(state.active.wait(30))
                 state.request_preempt()
                 self.assertEqual(run.outcome(), 'preempted')
             self.assertIn('0.5 s after the cancel', log.text())
         self.assertEqual(self.state(150).execute(userdata()), 'succeeded')
 
     def test_both_timeouts_apply_to_a_server_that_never_answers(self):
-        self.server.start()
+        self.start_server()
         state = self.state(Behaviour.IGNORE_CANCEL, exec_timeout=rospy.Duration(0.5),
                            preempt_timeout=rospy.Duration(0.5))
         run = InBackground(state, userdata())
@@ -105,10 +126,10 @@ class ActionFaultsTest(unittest.TestCase):
         self.server.start()
         state = self.state(Behaviour.HANG)
         run = InBackground(state, userdata())
-        time.sleep(1.5)
+        self.assertTrue(state.active.wait(30))
         self.server.process.kill()
         state.request_preempt()
-        self.assertEqual(run.outcome(8.0), 'preempted')
+        self.assertEqual(run.outcome(20.0), 'preempted')  # not after the 60 s that a server has for a cancel
 
 
 if __name__ == '__main__':

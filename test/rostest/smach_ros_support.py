@@ -49,7 +49,7 @@ class InBackground(object):
         self.started_at = time.monotonic()
         self._thread.start()
 
-    def outcome(self, timeout_s=15.0):
+    def outcome(self, timeout_s=40.0):
         self._thread.join(timeout_s)
         return self._outcome[0] if self._outcome else 'still running'
 
