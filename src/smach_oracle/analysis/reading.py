@@ -1,4 +1,4 @@
-"""How every command here reads folders of bags: one that cannot be used is skipped and named, and told by exit code 1."""
+"""How every command here reads folders of bags: one that cannot be used is skipped, named, and told by exit code 1."""
 import sys
 from typing import Iterator, List, Sequence, Tuple, Union
 

@@ -44,6 +44,6 @@ def _template(where: str, value: Any) -> StateTemplate:
     if not isinstance(outputs, Mapping) or not outputs:
         raise ConfigError(where + '.outputs', outputs, 'a dictionary from output keys to ' + ', '.join(INGREDIENTS))
     for key, ingredient in outputs.items():
-        if ingredient not in INGREDIENTS:
+        if not isinstance(ingredient, str) or ingredient not in INGREDIENTS:
             raise ConfigError('{}.outputs.{}'.format(where, key), ingredient, 'one of ' + ', '.join(INGREDIENTS))
     return StateTemplate(outcome, {str(key): str(ingredient) for key, ingredient in outputs.items()})

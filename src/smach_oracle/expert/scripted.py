@@ -1,5 +1,4 @@
 """An expert without a person: follows the open lists and answers by rules (`rules.py`)."""
-import os
 import threading
 import time
 from typing import Any, Dict, Mapping, NamedTuple, Optional
@@ -10,6 +9,7 @@ import yaml
 from smach_oracle.msg import OpenQuery
 
 from ..oracle.errors import ConfigError, OracleError
+from ..oracle.paths import path_of
 from ..ros.command_line import parameters_only
 from ..ros.master_watch import start_master_watch
 from ..ros.question_messages import to_decision
@@ -115,7 +115,7 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     if not path:
         raise ConfigError('~rules', rules, 'rules in the parameter ~rules, or a YAML file in ~rules_file')
     try:
-        with open(os.path.expanduser(path)) as file:
+        with open(path_of(path)) as file:
             content = yaml.safe_load(file)
     except (OSError, yaml.YAMLError) as err:
         raise ConfigError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err

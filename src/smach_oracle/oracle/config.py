@@ -59,7 +59,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'escalate': values.flag,
     'watch_preconditions': values.flag,
     'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY),
-    'rates_file': values.text,
+    'rates_file': values.file,
     'oracle_label': values.label,
     'nested': values.flag,
 }

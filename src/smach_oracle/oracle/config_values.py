@@ -3,6 +3,7 @@ import math
 from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 
 from .errors import ConfigError
+from .paths import path_of
 
 Check = Callable[[str, Any], Any]
 
@@ -57,6 +58,11 @@ def text(key: str, value: Any) -> str:
     if not isinstance(value, str):
         raise ConfigError(key, value, 'a string')
     return value
+
+
+def file(key: str, value: Any) -> str:
+    """Check for a path, empty or not; returns it with `~` filled in."""
+    return path_of(text(key, value))
 
 
 def label(key: str, value: Any) -> str:

@@ -16,6 +16,7 @@ import smach
 
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput
 from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.paths import path_of
 
 from .expert_client import OWN_SERVER, ExpertQueryClient
 from .event_messages import rates_to_msg
@@ -134,7 +135,7 @@ class Attachments:
         return plan
 
     def _plan_for(self, folder: str, node: bool) -> _RecordingPlan:
-        folder = os.path.abspath(os.path.expanduser(folder))
+        folder = os.path.abspath(path_of(folder))
         prepare_folder(folder)
         topics = list(self.options.record_topics)
         if node:

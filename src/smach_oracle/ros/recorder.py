@@ -10,6 +10,7 @@ from weakref import WeakSet
 import rospy
 
 from ..oracle.events import Event, EventKind, EventSource
+from ..oracle.paths import path_of
 from .recorder_disk import Reporter, Topics, TrialBags, status_message
 from .recorder_queue import EndItem, EventItem, MessageItem, RecorderQueue, SnapshotItem
 from .recorder_status import DiskWatch, Losses, RecorderState, Status
@@ -47,7 +48,7 @@ class TrialRecorder:
         :param on_status: told each change of status, in the recorder's threads.
         :raises OSError: where the folder cannot be made or written: better known before the robot moves.
         """
-        self.folder = os.path.abspath(os.path.expanduser(folder))
+        self.folder = os.path.abspath(path_of(folder))
         prepare_folder(self.folder)
         default_say, default_warn = default_log()
         self._on_status = on_status

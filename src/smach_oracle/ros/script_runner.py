@@ -8,11 +8,13 @@ import atexit
 import os
 import sys
 import types
+from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.config import Settings
 from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.paths import check_writable, path_of
 from smach_oracle.oracle.policy import POLICIES
 
 from . import attachment
@@ -21,6 +23,7 @@ from .shutdown import ShutdownGuard
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 USAGE_ERROR = 2  # exit code
+NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = ('--config', '--record', '--record-topic', '--policy', '--rates-file')
 
 
@@ -91,29 +94,45 @@ def parse(args: Sequence[str]) -> Run:
     line = split(args)
     parser = make_parser()
     given = parser.parse_args(line.options)
-    if line.script is None:
-        parser.error('which SCRIPT?')
-    if not os.path.isfile(line.script):
-        parser.error('{}: no such file'.format(line.script))
+    if line.script in (None, NONE):
+        parser.error('which SCRIPT? (under roslaunch: script:=FILE)')
+    script = path_of(line.script)
+    why = _why_not_readable(script)
+    if why:
+        parser.error('{}: {}'.format(script, why))
     overrides: Dict[str, Any] = {}
     if given.policy:
         overrides['policy'] = given.policy
     if given.rates_file:
-        overrides['rates_file'] = os.path.abspath(given.rates_file)
+        overrides['rates_file'] = os.path.abspath(path_of(given.rates_file))
     if given.no_nested:
         overrides['nested'] = False
-    record = os.path.abspath(os.path.expanduser(given.record)) if given.record else ''
-    return Run(line.script, line.script_args, given.config, overrides, not given.without_oracle,
+    record = os.path.abspath(path_of(given.record)) if given.record else ''
+    return Run(script, line.script_args, given.config, overrides, not given.without_oracle,
                attachment.Options(record, tuple(given.record_topic)))
+
+
+def _why_not_readable(script: str) -> str:
+    if not os.path.isfile(script):
+        return 'no such file'
+    try:
+        open(script, 'rb').close()
+    except OSError as err:
+        return err.strerror or str(err)
+    return ''
 
 
 def check(run: Run) -> None:
     """Find mistakes before the robot moves.
 
-    :raises ConfigError: in the settings file or the command line.
+    :raises ConfigError: in the settings file or the command line; the file of the rates cannot be written.
     :raises OSError: where the folder for the bags cannot be made or written.
     """
-    read_settings(run, param=None, resolver=_looked_through)
+    loaded = load_settings(run.config, None, run.overrides)
+    with _located(loaded):
+        settings = Settings.from_dict(loaded, _looked_through)
+        if settings.rates_file:
+            check_writable('rates_file', settings.rates_file, replaced=True)
     if run.options.record:
         from .recorder import prepare_folder
         prepare_folder(run.options.record)
@@ -129,15 +148,21 @@ def _never_called(userdata: Any) -> bool:
     raise NotImplementedError
 
 
-def read_settings(run: Run, param: Optional[str] = '~oracle',
-                  resolver: Callable[[str], Any] = resolve_python) -> Settings:
+def read_settings(run: Run) -> Settings:
     """The settings for the machines of this run.
 
     :raises ConfigError: naming where the mistake is.
     """
-    loaded: LoadedSettings = load_settings(run.config, param, run.overrides)
+    loaded = load_settings(run.config, overrides=run.overrides)
+    with _located(loaded):
+        return Settings.from_dict(loaded, resolve_python)
+
+
+@contextmanager
+def _located(loaded: LoadedSettings) -> Iterator[None]:
+    """Let errors name where the setting was given."""
     try:
-        return Settings.from_dict(loaded, resolver)
+        yield
     except ConfigError as err:
         raise loaded.located(err) from err
 

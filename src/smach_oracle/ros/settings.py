@@ -11,6 +11,7 @@ import rospy
 import yaml
 
 from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.paths import path_of
 
 DEFAULT_PARAM = '~oracle'
 PYTHON_PREFIX = 'python:'
@@ -61,7 +62,7 @@ def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PAR
     """
     settings = LoadedSettings()
     if path:
-        values, lines = read_yaml(path)
+        values, lines = read_yaml(path_of(path))
         settings.put(values, str(path), lines)
     if param and rospy.core.is_initialized():
         settings.put(read_param(param), 'parameter ' + rospy.resolve_name(param))

@@ -50,6 +50,7 @@ def test_options_become_settings_and_options_of_the_process(script, tmp_path):
     (['no_such.py'], 'no_such.py: no such file'),
     (['--no-nested'], 'which SCRIPT'),
     (['__name:=x'], 'which SCRIPT'),
+    (['--config', 'o.yaml', 'none', '--speed', '2'], 'which SCRIPT? (under roslaunch: script:=FILE)'),
 ])
 def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
     with pytest.raises(SystemExit) as caught:
@@ -81,6 +82,43 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_script_starts(script
         script_runner.main(['--record', '/proc/no_bags_here', script])
     assert caught.value.code == 2
     assert '/proc/no_bags_here' in capsys.readouterr().err
+
+
+def test_a_script_that_cannot_be_read_is_told_before_it_starts(script, monkeypatch, capsys):
+    def refuse(name, *args):
+        raise PermissionError(13, 'Permission denied', name)
+    monkeypatch.setattr(script_runner, 'open', refuse, raising=False)
+    with pytest.raises(SystemExit) as caught:
+        script_runner.main([script])
+    assert caught.value.code == 2
+    assert 'task.py: Permission denied' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('given, words', [
+    ('nowhere/rates.json', ['there is no folder', 'nowhere']),
+    ('.', ['it is a folder']),
+])
+@pytest.mark.parametrize('in_file', [True, False])
+def test_a_file_of_rates_that_cannot_be_written_is_told_before_the_script_starts(script, tmp_path, capsys, given,
+                                                                                 words, in_file):
+    (tmp_path / 'task.py').write_text('raise AssertionError("started")\n')
+    (tmp_path / 'o.yaml').write_text('memory: 5\nrates_file: {}\n'.format(given))
+    with pytest.raises(SystemExit) as caught:
+        script_runner.main((['--config', 'o.yaml'] if in_file else ['--rates-file', given]) + [script])
+    error = capsys.readouterr().err
+    assert caught.value.code == 2
+    assert all(word in error for word in words + ['o.yaml line 2' if in_file else 'command line']), error
+
+
+def test_every_path_may_begin_with_the_home_folder(script, tmp_path, monkeypatch):
+    monkeypatch.setenv('HOME', str(tmp_path))
+    (tmp_path / 'o.yaml').write_text('rates_file: ~/rates.json\n')
+    run = parse(['--config', '~/o.yaml', '--record', '~/bags', '~/task.py', '~/as it is'])
+    assert (run.script, run.script_args) == (str(tmp_path / 'task.py'), ['~/as it is'])
+    assert run.options.record == str(tmp_path / 'bags')
+    assert script_runner.read_settings(run).rates_file == str(tmp_path / 'rates.json')
+    assert parse(['--rates-file', '~/r.json', script]).overrides['rates_file'] == str(tmp_path / 'r.json')
+    script_runner.check(run)
 
 
 def test_help_names_every_option(capsys):

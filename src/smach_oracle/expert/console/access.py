@@ -12,6 +12,7 @@ from typing import Callable, Iterable, List, NamedTuple, Optional
 from urllib.parse import urlsplit
 
 from ...oracle.errors import ConfigError
+from ...oracle.paths import path_of
 
 ROLES = ('viewer', 'operator', 'teleoperator')  # each may do what those before it may
 SHORTEST_TOKEN = 20  # characters
@@ -61,7 +62,7 @@ def load_tokens(path: str) -> TokenBook:
 
     :raises ConfigError: where others may read it, it cannot be read or made, or holds something else.
     """
-    file = Path(path).expanduser()
+    file = Path(path_of(path))
     try:
         if not file.exists():
             _write_tokens(file)

@@ -4,6 +4,7 @@ import socket
 from typing import Any, Callable, List, NamedTuple, Optional, Tuple
 
 from ...oracle.errors import ConfigError
+from ...oracle.paths import path_of
 from .access import Hosts, TokenBook, is_loopback, load_tokens
 
 NONE = 'none'
@@ -62,7 +63,7 @@ def _folders(value: Any) -> Tuple[str, ...]:
     folders = value.split(os.pathsep) if isinstance(value, str) else value
     if not isinstance(folders, list) or not all(isinstance(folder, str) for folder in folders):
         raise ConfigError('~bags', value, 'folders separated by {}, or a list of folders'.format(os.pathsep))
-    return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in folders if folder not in ('', NONE))
+    return tuple(os.path.abspath(path_of(folder)) for folder in folders if folder not in ('', NONE))
 
 
 def _port(value: Any) -> int:
@@ -73,7 +74,7 @@ def _port(value: Any) -> int:
 
 def _path(get: Callable[[str, Any], Any], name: str) -> str:
     value = _text(get, name, NONE)
-    return '' if value in ('', NONE) else os.path.expanduser(value)
+    return '' if value in ('', NONE) else path_of(value)
 
 
 def _text(get: Callable[[str, Any], Any], name: str, default: str) -> str:

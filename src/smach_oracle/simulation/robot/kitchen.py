@@ -42,10 +42,9 @@ def kitchen_from(settings: Dict[str, Any]) -> Kitchen:
     """
     if not isinstance(settings, dict):
         raise ValueError('kitchen: a dictionary is needed, not {!r}'.format(settings))
-    unknown = sorted(set(settings) - set(Kitchen._fields))
+    unknown = sorted(str(name) for name in settings if name not in Kitchen._fields)
     if unknown:
-        raise ValueError('kitchen: unknown {}; allowed: {}'.format(', '.join(map(str, unknown)),
-                                                                   ', '.join(Kitchen._fields)))
+        raise ValueError('kitchen: unknown {}; allowed: {}'.format(', '.join(unknown), ', '.join(Kitchen._fields)))
     kitchen = Kitchen(**{name: _like(name, value) for name, value in settings.items()})
     if not 0 <= kitchen.drinks_shelf < len(kitchen.shelves):
         raise ValueError('kitchen: drinks_shelf is {}, shelves there are {}'.format(kitchen.drinks_shelf,
@@ -123,7 +122,7 @@ def _like(name: str, value: Any) -> Any:
         else:
             made = type(default)(value)
             right = made == float(value) and (made > 0 or isinstance(default, int)) and np.isfinite(made)
-    except (TypeError, ValueError) as err:
+    except (TypeError, ValueError, OverflowError) as err:
         raise ValueError('kitchen: {} is {!r}; needed is something like {!r}'.format(name, value, default)) from err
     if not right:
         raise ValueError('kitchen: {} is {!r}; needed is something like {!r}'.format(name, value, default))

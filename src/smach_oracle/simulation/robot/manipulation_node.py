@@ -8,7 +8,7 @@ from smach_oracle.ros.command_line import parameters_only
 from .arm import Means
 from .collision import RobotModel, installed_model, model_from
 from .kitchen_skills import KitchenSkills
-from .perception_node import kitchen_at
+from .perception_node import kitchen_at, snapshot_service
 from .pr2_model import ModelError
 from .ros_robot import RosRobot
 from .shown_maps import ShownMaps
@@ -39,9 +39,10 @@ def main() -> None:
     parameters_only('Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, close_door and '
                     'hand_over as actions. Parameters: ~snapshot, ~kitchen; see doc/simulation.md.')
     rospy.init_node('pr2_manipulation')
-    robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
     try:
-        model, kitchen = robot_model(), kitchen_at('~kitchen')
+        snapshot, kitchen = snapshot_service(), kitchen_at('~kitchen')
+        robot = RosRobot(snapshot=snapshot)
+        model = robot_model()
     except (ValueError, ModelError) as err:
         rospy.logfatal('pr2_manipulation: %s', err)
         raise SystemExit(2) from err

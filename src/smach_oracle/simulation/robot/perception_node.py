@@ -1,13 +1,17 @@
 """The node of the PR2's eyes: what stands on the table, and where a drink is in the open refrigerator."""
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Any, Dict, List, Optional
 
 import numpy as np
 import rospy
 import yaml
+from rosgraph.names import is_legal_name
 
 from smach_oracle.msg import (DetectDrinkAction, DetectDrinkGoal, DetectDrinkResult, DetectTabletopAction,
                               DetectTabletopGoal, DetectTabletopResult)
+from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.paths import path_of
 from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.parameters import name_of
 
 from ...geometry.chain import Joint, read_joints
 from .clusters import Capsule, NotSeen
@@ -72,6 +76,14 @@ def _stamp(frame: Frame) -> rospy.Time:
     return rospy.Time.from_sec(frame.stamp)
 
 
+def snapshot_service() -> str:
+    """The service that the parameter ~snapshot names, or `none`. Raises ValueError."""
+    name = name_of('~snapshot', 'world/snapshot')
+    if not is_legal_name(name):
+        raise ConfigError(rospy.resolve_name('~snapshot'), name, 'the name of a service, or none')
+    return name
+
+
 def kitchen_at(parameter: str) -> Kitchen:
     """The map that a parameter names as a file or gives as a dictionary; the usual one where it is `none`.
 
@@ -81,7 +93,7 @@ def kitchen_at(parameter: str) -> Kitchen:
     if value in ('none', ''):
         return Kitchen()
     try:
-        return kitchen_from(value if isinstance(value, Mapping) else _read(value))
+        return kitchen_from(_read(path_of(value)) if isinstance(value, str) else value)
     except (OSError, ValueError, yaml.YAMLError) as err:
         raise ValueError('{}: {}'.format(rospy.resolve_name(parameter), err)) from err
 
@@ -114,11 +126,12 @@ def main() -> None:
                     'Parameters: ~snapshot, ~kitchen; see doc/perception.md.')
     rospy.init_node('pr2_perception')
     try:
-        links, kitchen = robot_links(), kitchen_at('~kitchen')
+        snapshot, kitchen = snapshot_service(), kitchen_at('~kitchen')
+        links = robot_links()
     except ValueError as err:
         rospy.logfatal('pr2_perception: %s', err)
         raise SystemExit(2) from err
-    robot = RosRobot(snapshot=rospy.get_param('~snapshot', 'world/snapshot'))
+    robot = RosRobot(snapshot=snapshot)
     perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort, robot.resume)
     server.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,))
     server.offer('detect_drink', DetectDrinkAction, perception.detect_drink, (NotSeen,))

@@ -2,10 +2,12 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
+
+from smach_oracle.oracle.paths import path_of, why_not_writable
 
 from . import kitchen_scene, tabletop_scene
 from .drink_rehearsal import DrinkTrial
@@ -16,6 +18,7 @@ from .scene import Scene
 
 FRAME = (480, 320)  # pixels, of the video
 PICTURE = (960, 640)
+PICTURES, VIDEOS = ('.png', '.jpg', '.jpeg'), ('.mp4',)  # how the names of files end
 PERIODS_S = 60  # control periods in a simulated second
 
 
@@ -72,7 +75,9 @@ def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.
     try:
         done = rehearse(task.draw(seed, True), world, task.steps)
         if world.picture is None:
-            raise RuntimeError('seed {}: {} failed: {}'.format(seed, done.failed or 'nothing', done.reason))
+            why = '{} failed: {}'.format(done.failed, done.reason) if done.failed else (
+                'nothing was held for {:g} s'.format(task.carried_s))
+            raise RuntimeError('seed {}: {}'.format(seed, why))
         return world.picture, world.shots
     finally:
         world.close()
@@ -90,11 +95,21 @@ def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
     return Path(path).stat().st_size > 0
 
 
+def check_file(path: str, suffixes: Sequence[str]) -> None:
+    """Find out before the work whether a picture or a video can be written. Raises ValueError."""
+    if not path.lower().endswith(tuple(suffixes)):
+        raise ValueError('{}: what kind of file? Its name may end in {}'.format(path, ', '.join(suffixes)))
+    why = why_not_writable(path)
+    if why:
+        raise ValueError('{}: {}'.format(path, why))
+
+
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(prog='pr2_film', description=__doc__)
-    parser.add_argument('picture', help='file of the picture (.png or .jpg)')
-    parser.add_argument('--video', metavar='FILE', help='also write a video (.mp4), at simulated time')
+    parser.add_argument('picture', type=path_of, help='file of the picture ({})'.format(', '.join(PICTURES)))
+    parser.add_argument('--video', metavar='FILE', type=path_of,
+                        help='also write a video ({}), at simulated time'.format(', '.join(VIDEOS)))
     parser.add_argument('--fps', type=float, default=5.0, help='frames of the video per simulated s (default: 5)')
     parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)')
     parser.add_argument('--seed', type=int, help='of the scene (default: one that looks well)')
@@ -103,6 +118,12 @@ def main(argv: Optional[List[str]] = None) -> int:
     seed = task.seed if args.seed is None else args.seed
     if not 0.5 <= args.fps <= 60 or seed < 0:
         parser.error('--fps must be from 0.5 to 60, --seed 0 or more')
+    try:
+        check_file(args.picture, PICTURES)
+        if args.video:
+            check_file(args.video, VIDEOS)
+    except ValueError as err:
+        parser.error(str(err))
     try:
         picture, frames = film(task, seed, args.fps if args.video else 0.0)
     except RuntimeError as err:

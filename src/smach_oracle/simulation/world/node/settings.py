@@ -2,8 +2,10 @@
 from typing import Any, Callable, NamedTuple
 
 from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.paths import check_writable, path_of
 
 TASKS = ('pick_and_place', 'drink_retrieval')
+NONE = 'none'
 
 
 class WorldSettings(NamedTuple):
@@ -15,7 +17,7 @@ class WorldSettings(NamedTuple):
     real_time_factor: float = 0.0  # simulated s per wall s; 0: as fast as possible, frozen while nothing is commanded
     idle_speed: float = 10.0  # at factor 0: s that the clock goes on per wall s while nothing is commanded
     idle_grace: float = 0.1  # at factor 0: wall s that nothing was commanded before the clock goes on alone
-    truth_file: str = 'none'  # gets a line of JSON on each trial that has ended
+    truth_file: str = NONE  # gets a line of JSON on each trial that has ended
     state_rate: float = 10.0  # joint states and transforms per simulated s; at factor 0 the default is 4
     camera_rate: float = 2.0  # frames per simulated s for those who subscribe; at factor 0 the default is 0: snapshots
 
@@ -41,7 +43,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         benign=_truth('benign', get),
         idle_speed=_number('idle_speed', get, 10.0, 0.0, 1000.0),
         idle_grace=_number('idle_grace', get, 0.1, 0.0, 60.0),
-        truth_file=_text('truth_file', get, 'none'),
+        truth_file=_file('truth_file', get),
         state_rate=_number('state_rate', get, 10.0 if factor else 4.0, 0.1, 60.0),
         camera_rate=_number('camera_rate', get, 2.0 if factor else 0.0, 0.0, 30.0))
 
@@ -60,11 +62,15 @@ def _truth(name: str, get: Callable[[str, Any], Any]) -> bool:
     return value
 
 
-def _text(name: str, get: Callable[[str, Any], Any], default: str) -> str:
-    value = get('~' + name, default)
+def _file(name: str, get: Callable[[str, Any], Any]) -> str:
+    value = get('~' + name, NONE)
     if not isinstance(value, str) or not value:
-        raise ConfigError('~' + name, value, "a file's name, or {}".format(default))
-    return value
+        raise ConfigError('~' + name, value, "a file's name, or {}".format(NONE))
+    if value == NONE:
+        return value
+    path = path_of(value)
+    check_writable('~' + name, path)
+    return path
 
 
 def _seed(value: Any) -> int:
