@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point, PoseStamped
 from smach_oracle.msg import OpenQuery
 from smach_oracle.simulation.operator.eye import EyeError
 from smach_oracle.simulation.operator.node import Operator
-from smach_oracle.simulation.operator.plans import Means
+from smach_oracle.simulation.operator.plans import Means, Plans
 from smach_oracle.simulation.operator.sight import Sight
 from smach_oracle.simulation.operator.topic_hand import Interrupted
 from smach_oracle.simulation.operator.work import Job, do, point_in_base
@@ -62,6 +62,21 @@ def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_e
     with pytest.raises(KeyboardInterrupt):
         Operator(SimpleNamespace(seed=1), questions, eye, None).run()
     assert (eye.looks, questions.claims) == (looks, claims)
+
+
+@pytest.mark.parametrize('offered, told', [
+    (['eye', 'hand'], "PICK: means take needs an interface offered under the name 'manipulation'; offered: eye, hand"),
+    ([], "'manipulation'; offered: none"), (['manipulation'], ''), (['perception', 'manipulation'], '')])
+def test_where_an_interface_has_another_name_it_says_so_once_and_tries_without(monkeypatch, offered, told):
+    warned = []
+    monkeypatch.setattr(rospy, 'logwarn', lambda text, *what: warned.append(text % what))
+    settings = SimpleNamespace(plans=Plans({'PICK': {'means': 'take'}}), most_questions=9)
+    operator = Operator(settings, None, None, None)
+    goal = SimpleNamespace(failed_state='PICK', choices=[SimpleNamespace(state='PICK', blocked='')],
+                           interfaces=[SimpleNamespace(name=name) for name in offered])
+    decisions = [operator._decide(SimpleNamespace(goal=goal), 0, Sight({}, 1, '')) for _ in range(2)]
+    assert all(bool(decision.interface) != bool(told) for decision in decisions)
+    assert len(warned) == bool(told) and told in ''.join(warned)
 
 
 class Settled:

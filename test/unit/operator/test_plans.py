@@ -2,7 +2,7 @@
 import pytest
 
 from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.simulation.operator.plans import Decision, Means, Plans, Situation, decide
+from smach_oracle.simulation.operator.plans import Decision, Means, Plans, Situation, decide, missing
 
 BOTH = ['perception', 'manipulation']
 STATES = ['MOVE_ARMS_ASIDE', 'DETECT', 'PICK', 'PLACE']
@@ -37,6 +37,13 @@ def test_without_the_interface_the_state_is_tried_again_and_then_an_earlier_one(
         'PICK', 'DETECT', 'PICK', 'DETECT']
 
 
+@pytest.mark.parametrize('means, offered, lacking', [
+    ('take', ['hand', 'perception'], 'manipulation'), ('show', [], 'perception'), ('put_down', BOTH, ''),
+    ('retry', [], '')])
+def test_an_interface_is_known_by_the_name_under_which_it_is_offered(means, offered, lacking):
+    assert missing(Means(means), offered) == lacking
+
+
 def test_what_cannot_be_seen_is_not_shown_and_what_is_not_held_is_not_put_down():
     assert decide(Means('show', hidden='MOVE_ARMS_ASIDE'), situation('DETECT', seen=False)).goto == 'MOVE_ARMS_ASIDE'
     assert decide(Means('put_down', place='p', lost='DETECT'), situation('PLACE', holds=False)).goto == 'DETECT'
@@ -51,6 +58,7 @@ def test_a_state_that_cannot_be_entered_is_not_chosen_and_with_none_left_it_give
 
 @pytest.mark.parametrize('settings, says', [
     (7, 'states'), ({'PICK': 'take'}, 'PICK'), ({'PICK': {'means': 'dance'}}, 'PICK.means'),
+    ({'PICK': {'means': ['take']}}, 'PICK.means'), ({'PICK': {'means': {'take': 1}}}, 'PICK.means'),
     ({'PICK': {'means': 'take', 'arms': 'left'}}, 'PICK.arms'),
     ({'PICK': {'means': 'take', 'arm': 'third'}}, 'PICK.arm'),
     ({'PLACE': {'means': 'put_down'}}, 'either place or onto'),

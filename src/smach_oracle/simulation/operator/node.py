@@ -2,7 +2,7 @@
 import math
 import time
 import zlib
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Set, Tuple
 
 import numpy as np
 import rospy
@@ -17,7 +17,7 @@ from smach_oracle.ros.parameters import name_of, number_of
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
 from .eye import Eye, EyeError
-from .plans import PUT_DOWN, SHOW, Decision, Plans, Situation, decide
+from .plans import PUT_DOWN, SHOW, Decision, Means, Plans, Situation, decide, missing
 from .showing import what_to_show
 from .sight import Sight
 from .topic_hand import Interrupted
@@ -58,6 +58,7 @@ class Operator:
         self._asked: Dict[str, int] = {}
         self._done: List[str] = []  # keys of questions that were attended to
         self._spoilt: List[str] = []  # of those that came to nothing, once for each time
+        self._warned: Set[str] = set()  # states whose interface was not offered
 
     def run(self) -> None:
         """Until the node ends."""
@@ -113,12 +114,21 @@ class Operator:
         if sum(self._asked.values()) > self._settings.most_questions:
             return Decision(why='{} questions in one trial are enough'.format(self._settings.most_questions))
         means = self._settings.plans.of(goal.failed_state)
+        offered = [offer.name for offer in goal.interfaces]
+        self._warn(goal.failed_state, means, offered)
         situation = Situation(
-            goal.failed_state, [choice.state for choice in goal.choices if not choice.blocked],
-            [offer.name for offer in goal.interfaces], number,
+            goal.failed_state, [choice.state for choice in goal.choices if not choice.blocked], offered, number,
             means.means != PUT_DOWN or sight.held_by(means.arm) is not None,
             means.means != SHOW or what_to_show(sight) is not None)
         return decide(means, situation)
+
+    def _warn(self, state: str, means: Means, offered: List[str]) -> None:
+        """Say, once for each state, that it cannot be done as the settings have it."""
+        lacking = missing(means, offered)
+        if lacking and state not in self._warned:
+            self._warned.add(state)
+            rospy.logwarn('%s: means %s needs an interface offered under the name %r; offered: %s. It is tried again '
+                          'without.', state, means.means, lacking, ', '.join(offered) or 'none')
 
     def _say(self, listed: Listed, decision: Decision) -> bool:
         kind = (ExpertDecision.INTERFACE if decision.interface

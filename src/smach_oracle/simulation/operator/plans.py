@@ -4,13 +4,14 @@
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}
       default: {means: retry}
 """
-from typing import Any, Dict, List, Mapping, NamedTuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
 from smach_oracle.oracle.errors import ConfigError
 
 DEFAULT = 'default'
 SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
-MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}  # and the interface of each
+# and the interface of each, by the name under which the oracle's settings offer it
+MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
 _TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise')
 
 
@@ -66,6 +67,11 @@ class Situation(NamedTuple):
     seen: bool  # what there is to show can be seen
 
 
+def missing(means: Means, offered: Sequence[str]) -> str:
+    """The interface that the means need, where it is not offered, else ''."""
+    return '' if MEANS[means.means] in offered else MEANS[means.means]
+
+
 def decide(means: Means, situation: Situation) -> Decision:
     """The answer to a question."""
     def go(state: str, why: str) -> Decision:
@@ -90,7 +96,7 @@ def _means(state: str, value: Any) -> Means:
     unknown = sorted(str(field) for field in value if field not in Means._fields)
     if unknown:
         raise ConfigError('{}.{}'.format(state, unknown[0]), value[unknown[0]], 'the keys ' + ', '.join(Means._fields))
-    if value.get('means') not in MEANS:
+    if not isinstance(value.get('means'), str) or value['means'] not in MEANS:
         raise ConfigError(state + '.means', value.get('means'), ', '.join(sorted(MEANS)))
     for field in _TEXTS:
         if not isinstance(value.get(field, ''), str):
