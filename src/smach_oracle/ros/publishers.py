@@ -52,6 +52,9 @@ class RatesPublisher:
         self._publisher = rospy.Publisher(topic, OracleRates, queue_size=10, latch=True)
         self._period_s = period_s
         self._wake = threading.Condition()
+        # Of two threads the one that looked last also publishes last: its message stays latched. Re-entrant, as a signal
+        # handler may end a trial in the thread that publishes.
+        self._publishing = threading.RLock()
         self._pending: Dict[int, Any] = {}  # id(container) -> weak reference
         self._closed = False
         self._thread = threading.Thread(target=self._run, name='oracle_rates', daemon=True)
@@ -77,9 +80,10 @@ class RatesPublisher:
 
     def publish(self, container: Any) -> None:
         """Publish this machine's rates now."""
-        message = rates_to_msg(container.trial_id, container.rates(), container.transition_counts())
-        if not rospy.is_shutdown() and not self._closed:
-            self._publisher.publish(message)
+        with self._publishing:
+            message = rates_to_msg(container.trial_id, container.rates(), container.transition_counts())
+            if not rospy.is_shutdown() and not self._closed:
+                self._publisher.publish(message)
 
     def close(self) -> None:
         """Stop the thread and take the topic back."""
