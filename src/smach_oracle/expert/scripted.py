@@ -1,7 +1,7 @@
 """An expert without a person: follows the open lists and answers by rules (`rules.py`)."""
 import threading
 import time
-from typing import Any, Dict, Mapping, NamedTuple, Optional
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional
 
 import rospy
 import yaml
@@ -12,6 +12,7 @@ from ..oracle.errors import ConfigError, OracleError
 from ..oracle.paths import path_of
 from ..ros.command_line import parameters_only
 from ..ros.master_watch import start_master_watch
+from ..ros.parameters import name_of
 from ..ros.question_messages import to_decision
 from .followed_server import Listed, ServerGoneError
 from .front_end import FrontEnd
@@ -112,14 +113,27 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     """
     if rules:
         return Rules.parse(rules)
+    if not isinstance(path, str):
+        raise ConfigError('~rules_file', path, 'the name of a YAML file of rules')
     if not path:
         raise ConfigError('~rules', rules, 'rules in the parameter ~rules, or a YAML file in ~rules_file')
     try:
-        with open(path_of(path)) as file:
+        with open(path_of(path), encoding='utf-8') as file:
             content = yaml.safe_load(file)
-    except (OSError, yaml.YAMLError) as err:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as err:
         raise ConfigError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err
     return Rules.parse(content)
+
+
+def servers_of(value: Any) -> List[str]:
+    """Names of servers from a text, separated by spaces, or a list; none for all that there are.
+
+    :raises ConfigError: for anything else.
+    """
+    names = value.split() if isinstance(value, str) else value
+    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+        raise ConfigError('~servers', value, 'names separated by spaces, a list of names, or ' + ALL_SERVERS)
+    return [] if names == [ALL_SERVERS] else names
 
 
 def main() -> None:
@@ -130,12 +144,11 @@ def main() -> None:
     start_master_watch()
     try:
         rules = load_rules(rospy.get_param('~rules', None), rospy.get_param('~rules_file', ''))
+        servers = servers_of(rospy.get_param('~servers', ALL_SERVERS))
+        name = name_of('~expert', rospy.get_name().strip('/'))
     except ConfigError as err:
-        rospy.logfatal('%s', err)
+        rospy.logfatal('scripted_expert: %s', err)
         raise SystemExit(2) from err
-    servers = rospy.get_param('~servers', ALL_SERVERS).split()
-    if servers == [ALL_SERVERS]:
-        servers = []
-    expert = ScriptedExpert(FrontEnd(rospy.get_param('~expert', '') or rospy.get_name().strip('/'), servers), rules)
+    expert = ScriptedExpert(FrontEnd(name, servers), rules)
     rospy.on_shutdown(expert.stop)
     rospy.spin()

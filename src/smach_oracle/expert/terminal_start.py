@@ -16,9 +16,17 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--server', action='append', default=[], metavar='NAME',
                         help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
                              '(default: all that the master knows)')
-    parser.add_argument('--name', default='{}@{}'.format(getpass.getuser(), socket.gethostname()),
+    parser.add_argument('--name', default='{}@{}'.format(_user(), socket.gethostname()),
                         help='your name, as robots and other experts see it (default: %(default)s)')
     return parser.parse_args(arguments)
+
+
+def _user() -> str:
+    """The user's name; a number that nobody has given one to, as in a container, is an operator's."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # Python 3.13 raises the second
+        return 'operator'
 
 
 def wait_for_master(console: Console) -> None:

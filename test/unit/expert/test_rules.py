@@ -6,7 +6,7 @@ import pytest
 from expert_fixtures import make_question
 
 from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
-from smach_oracle.expert.scripted import load_rules
+from smach_oracle.expert.scripted import load_rules, servers_of
 from smach_oracle.oracle.errors import ConfigError
 from smach_oracle.oracle.question import Answer, AnswerKind, InterfaceOffer
 
@@ -59,9 +59,23 @@ def test_rules_come_from_a_file(tmp_path):
     path.write_text('PICK: {kind: goto, state: DETECT}')
     assert load_rules(None, str(path)).next('/r', 't', 'P', 'PICK').state == 'DETECT'
     path.write_text('PICK: {kind: goto')
-    for wrong in (str(path), str(tmp_path / 'none.yaml'), ''):
-        with pytest.raises(ConfigError):
+    french = tmp_path / 'french.yaml'
+    french.write_bytes(b'PICK: {why: \xe9t\xe9}')
+    for wrong in (str(path), str(french), str(tmp_path), str(tmp_path / 'none.yaml'), 7, ''):
+        with pytest.raises(ConfigError, match='~rules'):
             load_rules(None, wrong)
+
+
+@pytest.mark.parametrize('value, names', [('all', []), ('', []), ('/a/q /b/q', ['/a/q', '/b/q']), (['all'], []),
+                                          (['/a/q', '/b/q'], ['/a/q', '/b/q'])])
+def test_servers_are_a_text_or_a_list(value, names):
+    assert servers_of(value) == names
+
+
+@pytest.mark.parametrize('value', [7, None, ['/a/q', 7], ['/a/q', ''], {'/a/q': 1}])
+def test_servers_that_are_none_are_refused(value):
+    with pytest.raises(ConfigError, match='~servers'):
+        servers_of(value)
 
 
 def ask(rules, cancelled=None, **changes):
