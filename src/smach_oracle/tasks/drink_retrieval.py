@@ -82,13 +82,25 @@ def palm() -> PoseStamped:
     return PoseStamped(Header(frame_id=ODOM), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
 
+def find_reset() -> rospy.ServiceProxy:
+    """The service that begins a trial. Ends the script where there is no world."""
+    try:
+        rospy.wait_for_service('world/reset', SERVER_WAIT_S)
+    except rospy.ROSInterruptException:
+        raise
+    except rospy.ROSException as err:
+        raise SystemExit('drink_retrieval: no world here: nobody offers {} within {:.0f} s. Start it and the task with '
+                         'roslaunch smach_oracle drink_retrieval.launch'.format(rospy.resolve_name('world/reset'), SERVER_WAIT_S)
+                         ) from err
+    return rospy.ServiceProxy('world/reset', ResetWorld)
+
+
 def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
     """Run the machine once per trial.
 
     :returns: how many trials ended in success.
     """
-    rospy.wait_for_service('world/reset', SERVER_WAIT_S)
-    reset = rospy.ServiceProxy('world/reset', ResetWorld)
+    reset = find_reset()
     successes = 0
     for trial in range(trials):
         if rospy.is_shutdown():

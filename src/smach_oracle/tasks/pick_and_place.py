@@ -70,13 +70,25 @@ def place_pose() -> PoseStamped:
     return PoseStamped(Header(frame_id=BASE), Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
 
+def find_reset() -> rospy.ServiceProxy:
+    """The service that begins a trial. Ends the script where there is no world."""
+    try:
+        rospy.wait_for_service('world/reset', SERVER_WAIT_S)
+    except rospy.ROSInterruptException:
+        raise
+    except rospy.ROSException as err:
+        raise SystemExit('pick_and_place: no world here: nobody offers {} within {:.0f} s. Start it and the task with '
+                         'roslaunch smach_oracle pick_and_place.launch'.format(rospy.resolve_name('world/reset'), SERVER_WAIT_S)
+                         ) from err
+    return rospy.ServiceProxy('world/reset', ResetWorld)
+
+
 def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
     """Run the machine once per trial.
 
     :returns: how many trials ended in success.
     """
-    rospy.wait_for_service('world/reset', SERVER_WAIT_S)
-    reset = rospy.ServiceProxy('world/reset', ResetWorld)
+    reset = find_reset()
     successes = 0
     for trial in range(trials):
         if rospy.is_shutdown():
