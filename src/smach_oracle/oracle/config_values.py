@@ -14,7 +14,7 @@ def is_state(value: object) -> bool:
 
 
 def number(low: float, high: float, allowed: str) -> Check:
-    """Check for a number from `low` to `high`."""
+    """Check for a number from `low` to `high`; its ConfigError says `allowed`."""
     def check(key: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
             raise ConfigError(key, value, allowed)
@@ -29,7 +29,7 @@ def number(low: float, high: float, allowed: str) -> Check:
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check:
-    """Check for a whole number from `low` to `high`."""
+    """Check for a whole number from `low` to `high`; its ConfigError says `allowed`."""
     def check(key: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ConfigError(key, value, allowed)
@@ -38,14 +38,14 @@ def whole(low: int, allowed: str, high: float = math.inf) -> Check:
 
 
 def flag(key: str, value: Any) -> bool:
-    """Check for true or false."""
+    """Check for true or false. Raises ConfigError."""
     if not isinstance(value, bool):
         raise ConfigError(key, value, 'true or false')
     return value
 
 
 def choice(options: Sequence[str]) -> Check:
-    """Check for one of some words."""
+    """Check for one of some words; its ConfigError names them all."""
     def check(key: str, value: Any) -> str:
         if not isinstance(value, str) or value not in options:
             raise ConfigError(key, value, ', '.join(options))
@@ -54,7 +54,7 @@ def choice(options: Sequence[str]) -> Check:
 
 
 def text(key: str, value: Any) -> str:
-    """Check for a string, empty or not."""
+    """Check for a string, empty or not. Raises ConfigError."""
     if not isinstance(value, str):
         raise ConfigError(key, value, 'a string')
     return value
@@ -66,14 +66,14 @@ def file(key: str, value: Any) -> str:
 
 
 def label(key: str, value: Any) -> str:
-    """Check for a string that is not empty."""
+    """Check for a string that is not empty. Raises ConfigError."""
     if not isinstance(value, str) or not value:
         raise ConfigError(key, value, 'a string that is not empty')
     return value
 
 
 def words(key: str, value: Any) -> Tuple[str, ...]:
-    """Check for a list of strings, none of them empty."""
+    """Check for a list of strings, none of them empty. Raises ConfigError."""
     if isinstance(value, str) or not isinstance(value, (list, tuple, set, frozenset)):
         raise ConfigError(key, value, 'a list of strings')
     for entry in value:
@@ -90,7 +90,10 @@ def optional(check: Check) -> Check:
 
 
 def mapping(key: str, value: Any) -> Mapping[str, Any]:
-    """Check for a mapping whose keys are strings; None (an empty section of a YAML file) counts as empty."""
+    """Check for a mapping whose keys are strings; None (an empty section of a YAML file) counts as empty.
+
+    :raises ConfigError: naming the value, or the key that is no string.
+    """
     if value is None:
         return {}
     if not isinstance(value, Mapping):
@@ -102,7 +105,11 @@ def mapping(key: str, value: Any) -> Mapping[str, Any]:
 
 
 def on_no_answer(key: str, value: Any) -> Tuple[str, str]:
-    """Check for a fallback: 'stop', 'goto:LABEL', 'give_up:OUTCOME' or a mapping of one of these words."""
+    """Check for a fallback: 'stop', 'goto:LABEL', 'give_up:OUTCOME' or a mapping of one of these words.
+
+    :returns: the word, and what it names or ''.
+    :raises ConfigError: for anything else.
+    """
     if isinstance(value, Mapping) and len(value) == 1:
         (verb, target), = value.items()
     elif isinstance(value, str):
@@ -118,11 +125,11 @@ def on_no_answer(key: str, value: Any) -> Tuple[str, str]:
 
 
 def deadline(key: str, value: Any) -> float:
-    """Check for a deadline in seconds; 0 waits without end."""
+    """Check for a deadline in seconds; 0 waits without end. Raises ConfigError."""
     return float(number(0, math.inf, 'seconds from 0; 0 waits without end')(key, value))
 
 
 def time_limit(key: str, value: Any) -> Optional[float]:
-    """Check for a time limit in seconds; 0 and None are no limit."""
+    """Check for a time limit in seconds; 0 and None are no limit. Raises ConfigError."""
     limit_s = optional(number(0, math.inf, 'seconds from 0; 0 is no limit'))(key, value)
     return limit_s or None

@@ -177,7 +177,10 @@ class OracleContainer(smach.StateMachine):
     # -- execution
 
     def execute(self, *args: Any, **kwargs: Any) -> Optional[str]:
-        """Run the machine; the outermost running one of a tree begins and ends a trial."""
+        """Run the machine; the outermost running one of a tree begins and ends a trial.
+
+        Raises what a StateMachine raises.
+        """
         from .trial import run_container
         return run_container(self, lambda: super(OracleContainer, self).execute(*args, **kwargs))
 

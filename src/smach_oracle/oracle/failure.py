@@ -1,4 +1,7 @@
-"""What the end of a state means: where it leads, whether it is a failure, and how it would have ended the container."""
+"""What the end of a state means: where it leads, whether it is a failure, and how it would have ended the container.
+
+Without an oracle an unsuccessful outcome leads to a state of the author's or ends the machine (paper, section VI-A).
+"""
 import traceback
 from typing import Any, Callable, NamedTuple, Optional, Tuple
 

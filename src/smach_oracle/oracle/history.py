@@ -1,4 +1,4 @@
-"""The chain of visited states of one container. Pure; no smach. Every query is O(1), memory is bounded.
+"""The chain of visited states of one container (paper, IV-C). Pure; no smach. Every query is O(1), memory is bounded.
 
 The policies ask two things of the chain: which state without preconditions was visited last before the present visit
 (`unconditioned`, the listing's Rs), and which other state succeeded last before the present state began to fail

@@ -1,4 +1,4 @@
-"""The settings of shared-autonomy interfaces: what is offered, for which states, how it is started. Pure."""
+"""The settings of shared-autonomy interfaces (paper, section V-A): what is offered, where, how it is started. Pure."""
 import re
 from typing import Any, List, Mapping, Optional, Tuple
 

@@ -143,7 +143,8 @@ class Expert:
         """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
 
         Must return soon (tens of milliseconds) after `cancelled` is set. An INTERFACE answer is handed back as it is;
-        `run_interface` is then called. Deadlines are monotonic wall time.
+        `run_interface` is then called. Deadlines are monotonic wall time. May raise AnswerError for an answer that
+        cannot be used; the question is then put again.
         """
         raise NotImplementedError
 

@@ -73,7 +73,10 @@ class Workers:
 
     def run(self, state: Any, make_userdata: Callable[[Gate], Any], gate: Gate, label: str, limit_s: float,
             grace_s: float) -> LimitedResult:
-        """Execute `state` with a time limit and a grace period, in seconds of monotonic time."""
+        """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
+
+        What the state raises is told in the result, not raised.
+        """
         run = _Run(state, make_userdata(gate), 'smach_oracle worker of {}'.format(label))
         run.thread.start()
         try:

@@ -57,7 +57,11 @@ def rebuild(oracle_class: type, base: type) -> Any:
 
 def wrap_machine(oracle_class: type, given: Any, settings: Settings, nested: bool, name: str,
                  expert: Optional[Expert], strict: bool, recover: bool) -> Any:
-    """Wrap a machine and what is nested in it; see OracleContainer.wrap."""
+    """Wrap a machine and what is nested in it; see OracleContainer.wrap.
+
+    :raises ConfigError: for what is no machine or cannot be wrapped, and for settings that do not fit it; a
+        bare machine then stays bare.
+    """
     if not isinstance(given, smach.StateMachine):
         raise ConfigError('machine', given, 'a smach.StateMachine')
     machine: Any = given
@@ -136,7 +140,10 @@ def quicken(machine: Any) -> None:
 
 
 def adopt(machine: Any) -> None:
-    """Wrap what is nested in a wrapped machine and is not wrapped yet; let all of it share one tree."""
+    """Wrap what is nested in a wrapped machine and is not wrapped yet; let all of it share one tree.
+
+    :raises ConfigError: for a machine whose class cannot be extended.
+    """
     parent = machine._oracle
     for below, child in _machines_below(machine, ()):
         if not isinstance(child, OracleContainer):
