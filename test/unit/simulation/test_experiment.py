@@ -41,6 +41,20 @@ def test_wrong_arguments_end_with_usage(argv: list, capsys: pytest.CaptureFixtur
     assert 'usage' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('argv, words', [(['--answer-delay', '4000'], '--answer-delay must be from 0 to 3600'),
+                                         (['--answer-delay', '-1'], '--answer-delay must be from 0 to 3600'),
+                                         (['--seed', '-1'], '--seed 0 or more')])
+def test_a_wrong_number_is_told_with_what_is_allowed(argv: list, words: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        parse(argv)
+    assert words in capsys.readouterr().err
+
+
+def test_the_output_may_be_in_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    assert parse(['--output', '~/trials', '--answer-delay', '3600']).output == tmp_path / 'trials'
+
+
 @pytest.mark.parametrize('task, trials', [('pick_and_place', 150), ('drink_retrieval', 100)])
 def test_the_default_experiment_is_the_papers(task: str, trials: int) -> None:
     plan = parse(['--task', task]).plan

@@ -19,6 +19,7 @@ from smach_oracle.oracle.config import Settings
 from smach_oracle.oracle.errors import ConfigError
 from smach_oracle.oracle.failure_rate import ESTIMATORS
 from smach_oracle.oracle.packages import lacking
+from smach_oracle.oracle.paths import path_of
 from smach_oracle.oracle.policy import POLICIES
 
 from .interrupts import Interrupted, Interrupts
@@ -28,6 +29,7 @@ from .progress import ProgressLine
 
 POLL_S = 0.5
 FAILED, LACKING, LOST = 1, 2, 3  # exit codes
+LONGEST_DELAY = 3600.0  # s, of the operator
 # Settings of the oracle that go over those of the task: option, type, what it is.
 OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
              ('high_from', float, 'failure rate from which a state is HIGH'),
@@ -116,12 +118,12 @@ def make_parser() -> argparse.ArgumentParser:
     for name, kind, what in OVERRIDES:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
     parser.add_argument('--answer-delay', type=float, default=15.0,
-                        help='s of simulated time that the scripted expert takes, in the median (default: 15)')
+                        help='s of simulated time that the scripted operator takes, in the median (default: 15)')
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
     parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
                         help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
                         'before it is run anew (default: 300)')
-    parser.add_argument('--output', type=Path,
+    parser.add_argument('--output', type=lambda text: Path(path_of(text)),
                         help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
     return parser
 
@@ -131,8 +133,10 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     parser = make_parser()
     args = parser.parse_args(argv)
     trials = TASKS[args.task][1] if args.trials is None else args.trials
-    if min(trials, args.jobs, args.replicates) < 1 or args.seed < 0 or not 0.0 <= args.answer_delay < 3600.0:
-        parser.error('--trials, --jobs and --replicates must be 1 or more, --seed and --answer-delay 0 or more')
+    if min(trials, args.jobs, args.replicates) < 1 or args.seed < 0:
+        parser.error('--trials, --jobs and --replicates must be 1 or more, --seed 0 or more')
+    if not 0.0 <= args.answer_delay <= LONGEST_DELAY:
+        parser.error('--answer-delay must be from 0 to {:g}'.format(LONGEST_DELAY))
     if not args.hung_after > 0:
         parser.error('--hung-after must be more than 0')
     settings = {name: getattr(args, name) for name in ['estimator'] + [name for name, _, _ in OVERRIDES]

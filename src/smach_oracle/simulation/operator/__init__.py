@@ -1,1 +1,1 @@
-"""The scripted expert with the real expert means: its eye is the truth, its hands are the interfaces of people."""
+"""The scripted operator with the real expert means: its eye is the truth, its hands are the interfaces of people."""

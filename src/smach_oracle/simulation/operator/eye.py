@@ -1,4 +1,4 @@
-"""The scripted expert's eye on ROS: the service `world/reveal`."""
+"""The scripted operator's eye on ROS: the service `world/reveal`."""
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseStamped

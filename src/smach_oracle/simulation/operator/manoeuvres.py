@@ -1,4 +1,4 @@
-"""What the scripted expert does with a hand in place of the robot: take a thing, put it down, hand it over."""
+"""What the scripted operator does with a hand in place of the robot: take a thing, put it down, hand it over."""
 from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np

@@ -156,7 +156,7 @@ def userdata_of(items: List[UserdataItem]) -> Dict[str, Any]:
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_only('Node: a scripted expert who works with the interfaces of people. Parameters: ~states, ~seed, '
+    parameters_only('Node: a scripted operator who works with the interfaces of people. Parameters: ~states, ~seed, '
                     '~delay_median_s, ~delay_sigma and more; see doc/shared_autonomy.md.')
     rospy.init_node('scripted_operator')
     start_master_watch()

@@ -1,4 +1,4 @@
-"""Which means the scripted expert uses for which state, from its settings. Pure.
+"""Which means the scripted operator uses for which state, from its settings. Pure.
 
     states:
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}

@@ -1,4 +1,4 @@
-"""The services of the two interfaces, as the scripted expert calls them."""
+"""The services of the two interfaces, as the scripted operator calls them."""
 import time
 from typing import Callable, Sequence, TypeVar
 

@@ -1,4 +1,4 @@
-"""How the scripted expert shows a thing in the camera's image: a hasty rectangle, a look at the mask, strokes."""
+"""How the scripted operator shows a thing in the camera's image: a hasty rectangle, a look at the mask, strokes."""
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np

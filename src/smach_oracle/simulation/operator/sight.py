@@ -1,4 +1,4 @@
-"""What the scripted expert sees: things as they truly are, in the robot's base frame. Plain data."""
+"""What the scripted operator sees: things as they truly are, in the robot's base frame. Plain data."""
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The scripted expert's hand on ROS: commands to the manipulation interface, one after the other, in lock-step."""
+"""The scripted operator's hand on ROS: commands to the manipulation interface, one after the other, in lock-step."""
 import threading
 import time
 from typing import Optional

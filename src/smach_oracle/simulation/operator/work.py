@@ -1,4 +1,4 @@
-"""What the scripted expert does once an interface runs: shows a thing, or drives the hand; then says how it went."""
+"""What the scripted operator does once an interface runs: shows a thing, or drives the hand; then says how it went."""
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
