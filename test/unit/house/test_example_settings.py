@@ -1,11 +1,12 @@
 """launch/oracle.yaml, from which settings are copied, has them all with their defaults; doc/executive.md names them."""
 import re
 
+import pytest
 import yaml
 from house import ROOT
 
-from smach_oracle.oracle import interface_config
-from smach_oracle.oracle.config import Settings, setting_names
+from smach_oracle.oracle.config import Settings
+from smach_oracle.oracle.errors import ConfigError
 
 TEXT = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8')
 
@@ -16,6 +17,21 @@ def uncommented():
     return yaml.safe_load('\n'.join(lines))
 
 
+def allowed(given):
+    """The keys that the error for an unknown one names."""
+    with pytest.raises(ConfigError) as told:
+        Settings.from_dict(given)
+    return set(str(told.value).rsplit('one of the keys ', 1)[1].split(', '))
+
+
+def setting_names():
+    return allowed({'unknown': 1})
+
+
+def interface_keys():
+    return allowed({'interfaces': {'by_hand': {'unknown': 1}}})
+
+
 def resolved(name):
     assert name.startswith('python:')
     return bool
@@ -23,7 +39,7 @@ def resolved(name):
 
 def test_every_setting_is_there_with_its_default():
     given = uncommented()
-    assert set(given) == set(setting_names())
+    assert set(given) == setting_names()
     examples = {key: given.pop(key) for key in ('interfaces', 'states')}
     assert Settings.from_dict(given) == Settings()
     assert Settings.from_dict(examples, resolved).interfaces
@@ -31,7 +47,7 @@ def test_every_setting_is_there_with_its_default():
 
 def test_every_key_of_an_interface_is_there():
     offers = uncommented()['interfaces'].values()
-    assert {key for offer in offers for key in offer} == set(interface_config._KEYS)
+    assert {key for offer in offers for key in offer} == interface_keys()
 
 
 def test_nothing_is_set_unless_somebody_removes_a_comment_sign():
@@ -42,4 +58,4 @@ def test_the_page_of_the_executive_names_every_setting():
     page = (ROOT / 'doc/executive.md').read_text(encoding='utf-8')
     section = page[page.index('## Settings'):page.index('## Trials')]
     named = set(re.findall(r'`([a-z_]+)', section))
-    assert set(setting_names()) | set(interface_config._KEYS) <= named | {'states'}
+    assert setting_names() | interface_keys() <= named | {'states'}
