@@ -18,7 +18,7 @@ class UprightBox(NamedTuple):
 
     @property
     def matrix(self) -> np.ndarray:
-        """4x4 of its pose."""
+        """4x4: the frame of `centre` from its own."""
         return from_rpy(self.centre, yaw=self.yaw)
 
     @property
@@ -32,14 +32,14 @@ class UprightBox(NamedTuple):
         return float(max(self.size[:2]))
 
     def corners(self) -> np.ndarray:
-        """(4, 2): its footprint."""
+        """(4, 2) m: x and y of its footprint."""
         half = self.size[:2] / 2
         turned = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half
         return turned @ self.matrix[:2, :2].T + self.centre[:2]
 
 
 def upright_box(points: np.ndarray, floor: float, trim: float = 1.0) -> UprightBox:
-    """The tightest upright box around points (n, 3), n >= 1, down to z = `floor`.
+    """The tightest upright box around points (n, 3) in m, n >= 1, down to z = `floor`.
 
     :param trim: per cent of the points that may stick out on each side, as noise does.
     """

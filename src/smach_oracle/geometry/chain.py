@@ -28,7 +28,7 @@ class Joint(NamedTuple):
     origin: np.ndarray  # 4x4, parent from joint at zero
     axis: np.ndarray  # (3,), unit length, in the joint's frame
     lower: float  # rad or m; -inf for a continuous joint
-    upper: float
+    upper: float  # likewise, or inf
     velocity: float  # rad/s or m/s, the limit; inf where none is given
 
 
@@ -48,7 +48,7 @@ def read_joints(urdf: str) -> Dict[str, Joint]:
 
 
 class Chain:
-    """The moving joints between two links, in order from the root."""
+    """The n moving joints between two links, in order from the root; their positions are rad, or m where they slide."""
 
     def __init__(self, joints: List[Joint], fixed: Mapping[str, float]) -> None:
         """See from_urdf; `joints` are all of those between root and tip, with the fixed ones."""
@@ -82,7 +82,8 @@ class Chain:
         """The chain between two links of a robot description (XML text).
 
         :param fixed: joints on the way that shall not move, with where they are (rad or m).
-        :raises ValueError: where the text is no URDF, a link is not in it, or `tip` does not hang below `root`.
+        :raises ValueError: where the text is no URDF, a link or a fixed joint is not there, `tip` does not hang below
+            `root`, or no joint between them moves.
         """
         by_child = read_joints(urdf)
         links = set(by_child) | {joint.parent for joint in by_child.values()}
@@ -113,11 +114,11 @@ class Chain:
         return self._jacobians(*self._frames(np.asarray(q, dtype=float)[None]))[0]
 
     def clip(self, q: np.ndarray) -> np.ndarray:
-        """The nearest joint positions within the limits."""
+        """The joint positions within the limits that are nearest to `q`, (n,) or (m, n)."""
         return np.clip(q, self.lower, self.upper)
 
     def nearest_turn(self, q: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """`q` with continuous joints taken to within half a turn of `reference`."""
+        """`q`, (n,) or (m, n), with continuous joints taken to within half a turn of `reference`, (n,)."""
         turned = reference + (q - reference + np.pi) % (2 * np.pi) - np.pi
         return np.where(self.continuous, turned, q)
 

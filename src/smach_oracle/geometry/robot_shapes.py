@@ -34,7 +34,7 @@ class Shape(NamedTuple):
 
 
 class Mimic(NamedTuple):
-    """A joint that goes with another one: position = multiplier * that of `joint` + offset."""
+    """A joint that goes with another one: position (rad or m) = multiplier * that of `joint` + offset."""
 
     joint: str
     multiplier: float
