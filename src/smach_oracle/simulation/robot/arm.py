@@ -42,7 +42,10 @@ def seed_of(*parts: Any) -> int:
 
 
 class Arm:
-    """An arm at work among boxes. Use it in a `with`; it then drops its collision world."""
+    """An arm at work among boxes. Use it in a `with`; it then drops its collision world.
+
+    Joint positions are (7,), rad; poses are 4x4, base_footprint from tool.
+    """
 
     def __init__(self, means: Means, arm: str, boxes: Mapping[str, MapBox], seed: int) -> None:
         """
@@ -83,6 +86,7 @@ class Arm:
     def reach(self, pose: np.ndarray, near: Optional[np.ndarray] = None, restarts: int = 12) -> List[np.ndarray]:
         """Joint positions free of collision that take the tool to `pose`, nearest to `near` first; [] for none.
 
+        :param near: where None, the arm's usual posture.
         :raises Unreachable: where no joint positions at all take it there.
         """
         seed = READY[self.name] if near is None else near
@@ -96,7 +100,7 @@ class Arm:
         return [q for q in distinct[:2 * ENOUGH] if self.space.is_free(q)][:ENOUGH]
 
     def way(self, goal: np.ndarray, start: Optional[np.ndarray] = None, budget: int = BUDGET) -> np.ndarray:
-        """A way (m, 7) around the obstacles. Raises PlanningError."""
+        """A way (m, 7) around the obstacles, by at most `budget` collision checks. Raises PlanningError."""
         return plan(self.space, self.now() if start is None else start, goal, int(self.generator.integers(1, 2 ** 31)),
                     budget)
 
@@ -105,7 +109,11 @@ class Arm:
         return straight(self.space, start, goal)
 
     def follow(self, way: np.ndarray, speed: float = FAST) -> None:
-        """Move along a way. Raises SkillError where the arm does not get there."""
+        """Move along a way (m, 7).
+
+        :param speed: share of the joints' velocity limits.
+        :raises SkillError: where the arm does not get there.
+        """
         positions, times = timed(self.chain, way, speed)
         try:
             self._robot.follow(ARM_JOINTS[self.name], positions, times)
@@ -113,7 +121,7 @@ class Arm:
             raise SkillError('the {} arm did not follow its way: {}'.format(self.name, err)) from err
 
     def go(self, goal: np.ndarray, speed: float = FAST) -> None:
-        """Plan and move to joint positions. Raises SkillError."""
+        """Plan and move to joint positions, as `follow` does. Raises SkillError, also where there is no way."""
         try:
             way = self.way(goal)
         except PlanningError as err:
@@ -121,7 +129,7 @@ class Arm:
         self.follow(way, speed)
 
     def open(self, gap: float = GRIPPER_OPEN) -> None:
-        """Open the gripper. Raises SkillError where it does not open as far."""
+        """Open the gripper to `gap` m between the tips. Raises SkillError where it does not open as far."""
         state = self._gripper(gap)
         if state.position < gap - 0.015:  # something that it held may have got in the way of a finger
             state = self._gripper(gap)
@@ -131,7 +139,10 @@ class Arm:
         self._set_fingers()
 
     def close(self, effort: float = FEEL_EFFORT) -> float:
-        """Close the gripper; the gap (m) that something keeps open, 0 where there is nothing."""
+        """Close the gripper with `effort` N; the gap (m) that something keeps open, 0 where there is nothing.
+
+        :raises SkillError: where the gripper fails.
+        """
         state = self._gripper(0.0, effort)
         self._set_fingers()
         return state.position if state.stalled and state.position > LEAST_GAP else 0.0
@@ -153,7 +164,7 @@ class Unreachable(Exception):
 
 
 def read_joints(robot: Robot) -> Dict[str, float]:
-    """Encoder readings. Raises SkillError where there are none."""
+    """Encoder readings, rad or m by joint. Raises SkillError where there are none."""
     try:
         return dict(robot.joints())
     except RobotError as err:
@@ -161,7 +172,7 @@ def read_joints(robot: Robot) -> Dict[str, float]:
 
 
 def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
-    """(7,) of an arm out of encoder readings. Raises SkillError where one is missing."""
+    """(7,) rad of an arm out of encoder readings. Raises SkillError where one is missing."""
     missing = [name for name in ARM_JOINTS[arm] if name not in joints]
     if missing:
         raise SkillError('no encoder reading of {}'.format(', '.join(missing)))
@@ -175,12 +186,12 @@ def stands_open(joints: Mapping[str, float], arm: str) -> bool:
 
 
 def lifted(pose: np.ndarray, height: float) -> np.ndarray:
-    """A pose moved upwards by `height` m."""
+    """A pose (4x4) moved upwards by `height` m."""
     return from_rpy((0.0, 0.0, height)) @ pose
 
 
 def backed_off(pose: np.ndarray, distance: float) -> np.ndarray:
-    """A pose of the tool, moved back along its own x axis by `distance` m."""
+    """A pose (4x4) of the tool, moved back along its own x axis by `distance` m."""
     moved = pose.copy()
     moved[:3, 3] = apply(pose, np.array([-distance, 0.0, 0.0]))
     return moved

@@ -121,7 +121,7 @@ class CollisionWorld:
         return sorted(self._boxes)
 
     def attach(self, half: Sequence[float], tool_from_object: np.ndarray) -> None:
-        """From now on the hand holds a box of these half extents (m); its own hand may touch it."""
+        """From now on the hand holds a box of these half extents (m) at a pose (4x4), and may touch it."""
         self.detach()
         self._held = (self._body(half, 0.1, _FAR, (0.0, 0.0, 0.0, 1.0)), tool_from_object)
 

@@ -75,7 +75,7 @@ def around(made: CollisionMap, target: UprightBox) -> Dict[str, MapBox]:
 
 
 def nearest_object(made: CollisionMap, point: np.ndarray, within: float = 0.05) -> Optional[int]:
-    """Index of the object at a point (3,), at most `within` m beside it; None where there is none."""
+    """Index of the object at a point (3,) of base_footprint, at most `within` m beside it; None where there is none."""
     distances = [float(np.hypot(*(box.centre - point)[:2])) for box in made.objects]
     if not distances or min(distances) > within:
         return None

@@ -138,7 +138,7 @@ def _stow_beside(means: Means, kitchen: Kitchen, angle: float) -> None:
 
 
 def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> DoorView:
-    """Look for the door at a point of the fridge's frame. Raises SkillError where it is not seen."""
+    """Look for the door at a point (3,) of the fridge's frame. Raises SkillError where it is not seen."""
     expected = base_from_fridge(kitchen, robot.odom_from_base())
     robot.look_at(apply(expected, point))
     for attempt in range(tries):
@@ -285,7 +285,7 @@ def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, re
 
 
 def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str, MapBox]:
-    """The fridge as obstacles by name."""
+    """The fridge (4x4, in base_footprint) as obstacles by name, its door open by `angle` rad."""
     boxes = fridge_boxes(kitchen, fridge, angle)
     named = {'fridge_{}'.format(index): box for index, box in enumerate(boxes[:-2])}
     named.update(door=boxes[-2], handle=boxes[-1])

@@ -53,7 +53,10 @@ def find_drink(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray, min
 
 def things_on_shelf(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray,
                     limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
-    """Everything that is seen to stand on the drinks' shelf, foremost first; [] where the shelf is not seen."""
+    """Everything that is seen to stand on the drinks' shelf, foremost first; [] where the shelf is not seen.
+
+    Parameters and boxes are as in find_drink().
+    """
     view = view_of(frame, limbs)
     points = _about_shelf(view, kitchen, base_from_fridge)
     plane = find_plane(points, generator_of(frame), tolerance=OFF_SHELF, least=LEAST_SHELF)

@@ -71,7 +71,7 @@ def pose_message(pose: np.ndarray, stamp: Optional[object] = None) -> PoseStampe
 
 
 def box_messages(box: UprightBox, stamp: Optional[object] = None) -> Tuple[PoseStamped, Vector3]:
-    """Pose of the centre and extents of a box in base_footprint."""
+    """Pose of the centre and extents (m) of a box in base_footprint."""
     return pose_message(box.matrix, stamp), Vector3(*box.size)
 
 

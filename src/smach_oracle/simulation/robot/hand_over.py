@@ -37,7 +37,11 @@ def hand_over(means: Means, arm: str, expected: np.ndarray, held: Held) -> None:
 
 
 def find_palm(frame: Frame, expected: np.ndarray) -> MapBox:
-    """The palm in a frame, as a box. Raises SkillError where there is none near where it is expected."""
+    """The palm in a frame, as a box in base_footprint.
+
+    :param expected: (3,) m in base_footprint, as for hand_over().
+    :raises SkillError: where there is none near.
+    """
     points = points_of(frame.depth[::STRIDE, ::STRIDE], frame.intrinsics, frame.base_from_camera, stride=STRIDE)
     points = points.reshape(-1, 3)
     with np.errstate(invalid='ignore'):

@@ -62,16 +62,22 @@ class Robot(Protocol):
         """
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
-        """Open or close a gripper to `position` m between the tips, with at most `max_effort` N."""
+        """Open or close a gripper to `position` m between the tips, with at most `max_effort` N.
+
+        :raises RobotError: where it is refused or does not come to its end; to stall at something is no error.
+        """
 
     def torso(self, height: float) -> None:
         """Lift the torso joint to `height` m. Raises RobotError."""
 
     def look_at(self, point: Sequence[float]) -> None:
-        """Point the camera's optical axis at a point of BASE_FRAME. Raises RobotError."""
+        """Point the camera's optical axis at a point (3,) of BASE_FRAME. Raises RobotError."""
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
-        """Drive the base to a pose in ODOM_FRAME, straight and blindly. Raises RobotError where it ends elsewhere."""
+        """Drive the base to a pose (4x4) in ODOM_FRAME, straight and blindly.
+
+        :raises RobotError: where it ends elsewhere, as far as odometry can tell.
+        """
 
     def see(self) -> Frame:
         """A fresh frame of the head camera. Raises RobotError where none comes."""

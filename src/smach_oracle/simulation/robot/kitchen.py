@@ -53,7 +53,7 @@ def kitchen_from(settings: Dict[str, Any]) -> Kitchen:
 
 
 def base_from_fridge(kitchen: Kitchen, odom_from_base: np.ndarray) -> np.ndarray:
-    """4x4: where the fridge is, as far as the robot knows where it stands itself."""
+    """4x4: where the fridge is, as far as the robot knows by `odom_from_base` (4x4) where it stands itself."""
     x, y, yaw = kitchen.place
     return inverse(odom_from_base) @ from_rpy((x, y, 0.0), yaw=yaw)
 
@@ -70,13 +70,16 @@ def door_frame(kitchen: Kitchen, angle: float) -> np.ndarray:
 
 
 def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
-    """(3,) of the handle's axis at a height, in the fridge's frame, with the door open by `angle`."""
+    """(3,) of the handle's axis at a height above the floor, in the fridge's frame, with the door open by `angle`."""
     out = kitchen.door_thickness + kitchen.handle_stand_off
     return apply(door_frame(kitchen, angle), np.array([out, kitchen.width - kitchen.handle_inset, height]))
 
 
 def fridge_boxes(kitchen: Kitchen, base_from_fridge: np.ndarray, door_angle: float) -> List[MapBox]:
-    """The fridge as boxes for a collision map: walls, shelves, the door at `door_angle`, its handle."""
+    """The fridge as boxes for a collision map: walls, shelves and, last, the door at `door_angle` and its handle.
+
+    :param base_from_fridge: 4x4.
+    """
     wall, half_width = kitchen.wall, kitchen.width / 2
     middle = kitchen.depth / 2
     parts = [((middle, side * (half_width - wall / 2), kitchen.height / 2), (middle, wall / 2, kitchen.height / 2))

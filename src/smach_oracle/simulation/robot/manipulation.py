@@ -30,7 +30,10 @@ USUAL = np.array([0.03, 0.03, 0.06])  # m, half extents of a held thing that not
 
 
 class Manipulation:
-    """Arms aside, head, collision map, pick and place, as answers to goals."""
+    """Arms aside, head, collision map, pick and place, as answers to goals.
+
+    A goal that cannot be reached, or makes no sense, ends in a SkillError, RobotError or PlanningError with the reason.
+    """
 
     def __init__(self, means: Means) -> None:
         self.means = means
@@ -61,7 +64,10 @@ class Manipulation:
         return PointHeadResult()
 
     def build_collision_map(self, goal: BuildCollisionMapGoal, say: Say) -> BuildCollisionMapResult:
-        """Boxes of the table and the objects, under an id."""
+        """Boxes of the table and the objects, under an id.
+
+        :raises SkillError: for a pose or size that is none, or another number of objects than of sizes.
+        """
         robot = self.means.robot
         if len(goal.objects) != len(goal.sizes):
             raise SkillError('{} objects but {} sizes'.format(len(goal.objects), len(goal.sizes)))
@@ -85,7 +91,7 @@ class Manipulation:
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, say: Say) -> PlaceResult:
-        """Put down what is held, and look whether it stands there."""
+        """Put down what is held, and look whether it stands there. Raises SkillError where it does not."""
         arm = known_arm(goal.arm)
         robot = self.means.robot
         centre = pose_in_base(goal.pose, robot, 'pose')[:3, 3]

@@ -67,7 +67,7 @@ def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping
 def put_back(means: Means, arm: str, held: Held, boxes: Mapping[str, MapBox]) -> None:
     """Let go of an object where it was taken, if the arm is still above that; elsewhere, where it is.
 
-    :raises SkillError: where the hand does not open.
+    :raises SkillError: where the hand does not open, or the arm does not follow its way.
     """
     with Arm(means, arm, boxes, seed_of(arm, held.grasp)) as hand:
         now = hand.pose()
@@ -84,7 +84,7 @@ def put_back(means: Means, arm: str, held: Held, boxes: Mapping[str, MapBox]) ->
 
 
 def stands_there(frame: Frame, centre: np.ndarray, held: Held) -> bool:
-    """Whether a frame shows something as high as the object, where its centre (3,) should be."""
+    """Whether a frame shows something as high as the object, where its centre (3,), m in base_footprint, should be."""
     points = points_of(frame.depth[::2, ::2], frame.intrinsics, frame.base_from_camera, stride=2).reshape(-1, 3)
     beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
     bottom = centre[2] - held.half[2]

@@ -55,7 +55,7 @@ def plan(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, 
 
 
 def step_out(space: CollisionWorld, start: np.ndarray, seed: int, tries: int = 200) -> np.ndarray:
-    """Joint positions free of collision: `start` itself, or else some close to it.
+    """Joint positions (7,) free of collision: `start` (7,) itself, or else some close to it.
 
     :raises PlanningError: where there are none close by.
     """
@@ -70,8 +70,9 @@ def step_out(space: CollisionWorld, start: np.ndarray, seed: int, tries: int = 2
 
 
 def straight(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Optional[np.ndarray]:
-    """A way that takes the tool along a straight line from where it is at `start` (7,) to the pose `goal` (4x4).
+    """A way that takes the tool along a straight line from where it is at `start` (7,) to a pose (4x4).
 
+    :param goal: base_footprint from tool.
     :returns: (m, 7) from the start; None where the line leaves the reach, needs another posture, or meets something.
     """
     chain = space.chain

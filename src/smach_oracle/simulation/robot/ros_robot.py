@@ -71,7 +71,10 @@ class RosRobot:
         return self._senses.see(BASE_FRAME, CAMERA_FRAME)
 
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
-        """See Robot; all of the joints belong to one arm."""
+        """See Robot; all of the joints belong to one arm.
+
+        :raises RobotError: for other joints, for shapes that do not fit, and where the controller refuses or fails.
+        """
         arm = next((arm for arm in ARMS if set(joints) <= set(ARM_JOINTS[arm])), '')
         if not arm or not len(joints):
             raise RobotError('follow: joints {}; allowed: those of one arm, {}'.format(
@@ -107,7 +110,7 @@ class RosRobot:
         self._do('head_traj_controller/point_head_action', goal, 'head')
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
-        """See Robot."""
+        """See Robot. Raises RobotError for a goal that is no finite 4x4, too."""
         if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
             raise RobotError('drive: the goal is no finite 4x4 pose')
         place = Point(*odom_from_goal[:3, 3].tolist())

@@ -80,17 +80,20 @@ class RosSenses:
         self._listener = tf2_ros.TransformListener(self._buffer, tcp_nodelay=True)
 
     def joints(self) -> Dict[str, float]:
-        """Joint positions, rad or m, now."""
+        """Joint positions, rad or m, now. Raises RobotError where none come."""
         message = self._states_of_snapshot() if self._snapshot else self._next_states()
         return dict(zip(message.name, message.position))
 
     def transform(self, target: str, source: str) -> np.ndarray:
-        """4x4, target from source, now."""
+        """4x4, target from source, now. Raises RobotError where it is not known."""
         stamp = self._shot(False) if self._snapshot else self._next_states().header.stamp
         return self._looked_up(target, source, stamp)
 
     def see(self, base: str, camera: str) -> Frame:
-        """A frame of the camera, with the pose of the frame `camera` in `base` at its moment."""
+        """A frame of the camera, with the pose of the frame `camera` in `base` at its moment.
+
+        :raises RobotError: where none comes, its pose is not known, or it holds no image.
+        """
         topics = self._camera_topics()
         if self._snapshot:
             stamp = self._shot(True)

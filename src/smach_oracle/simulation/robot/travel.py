@@ -50,7 +50,11 @@ def carry(limb: Arm) -> None:
 
 
 def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -> None:
-    """Draw the hand back along its own axis by up to `length` m, as far as there is a straight way."""
+    """Draw the hand back along its own axis by up to `length` m, as far as there is a straight way.
+
+    :param touching: names of obstacles that the hand may touch meanwhile.
+    :raises SkillError: where the arm does not follow it.
+    """
     here = limb.pose()
     for share in (1.0, 0.7, 0.4):
         goal = here.copy()
@@ -63,7 +67,7 @@ def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -
 
 
 def drive(means: Means, odom_from_goal: np.ndarray) -> None:
-    """Drive the base. Raises SkillError where it does not get there."""
+    """Drive the base to a pose (4x4) in odom_combined. Raises SkillError where it does not get there."""
     try:
         means.robot.drive(odom_from_goal)
     except RobotError as err:
