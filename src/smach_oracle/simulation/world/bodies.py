@@ -159,7 +159,7 @@ def _finite(values: Sequence[float]) -> bool:
 
 
 def pose_of(position: Sequence[float], xyzw: Sequence[float]) -> np.ndarray:
-    """4x4 of a position and a unit quaternion, as PyBullet has them."""
+    """4x4 of a position (m) and a unit quaternion (x, y, z, w), as PyBullet has them."""
     result = np.eye(4)
     result[:3, :3] = np.array(pybullet.getMatrixFromQuaternion(xyzw)).reshape(3, 3)
     result[:3, 3] = position

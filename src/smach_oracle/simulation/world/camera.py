@@ -25,12 +25,12 @@ DIMMED = 0.6  # brightness below which depth suffers, too
 
 
 class View:
-    """What a camera that knows no noise sees."""
+    """What a camera that knows no noise sees: `colour` (h, w, 3) uint8 RGB, `depth` (h, w), `bodies` (h, w)."""
 
     def __init__(self, world: World, world_from_camera: np.ndarray, size: Tuple[int, int] = (WIDTH, HEIGHT),
                  field_of_view: float = FIELD_OF_VIEW, far: float = FAR, **light: object) -> None:
         """
-        :param world_from_camera: 4x4, z forward, x right, y down.
+        :param world_from_camera: 4x4, m, z forward, x right, y down.
         :param size: width and height, pixels.
         :param field_of_view: degrees, from top to bottom.
         :param far: m, how far it sees.

@@ -11,7 +11,10 @@ from .trajectory import Motion, Result, Trajectory, run
 
 
 class DirectRobot:
-    """Drives the PR2 of a world; every call returns when the motion has ended. Bad values raise RobotError."""
+    """Drives the PR2 of a world; every call returns when the motion has ended.
+
+    Values that cannot be, and motions that do not get there, raise RobotError.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -29,7 +32,7 @@ class DirectRobot:
         self._do(lambda: Trajectory(joints, positions, times))
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
-        """See Robot."""
+        """See Robot. Raises RobotError where the gripper does not tell how it ended, too."""
         state = self._do(lambda: Gripper(arm, position, max_effort)).gripper
         if state is None:
             raise RobotError('the {} gripper does not tell its state'.format(arm))

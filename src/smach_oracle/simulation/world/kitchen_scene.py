@@ -1,4 +1,4 @@
-"""The kitchen of the second use case: a refrigerator with drinks, and a person who holds out a hand."""
+"""The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person who holds out a hand."""
 from typing import List, Tuple
 
 import numpy as np

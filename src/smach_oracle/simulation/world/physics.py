@@ -31,7 +31,7 @@ class Contact(NamedTuple):
 
 
 class World:
-    """One PyBullet client, owned by one thread."""
+    """One PyBullet client, owned by one thread. Whoever names an arm or a body that is not there gets a ValueError."""
 
     def __init__(self, scene: Scene = EMPTY) -> None:
         self._client = -1
@@ -219,12 +219,12 @@ class World:
         return pose_of(*pose) @ inverse(pose_of(inertial[3], inertial[4]))
 
     def body_speed(self, name: str) -> Tuple[float, float]:
-        """m/s and rad/s of a body."""
+        """How fast a body moves and turns, m/s and rad/s."""
         linear, angular = pybullet.getBaseVelocity(self._find(name).number, physicsClientId=self._client)
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
 
     def body_joint(self, name: str, joint: str) -> float:
-        """rad or m of a joint of a body."""
+        """rad or m of a joint of a body. Raises ValueError for one that is not there, with those that are."""
         placed = self._find(name)
         if joint not in placed.joints:
             raise ValueError('no joint {!r} in {!r}; there: {}'.format(joint, name, ', '.join(placed.joints) or 'none'))

@@ -90,13 +90,13 @@ class Pr2Body:
         return ''
 
     def states(self, field: int) -> Dict[str, float]:
-        """Of every encoder: 0 positions (rad or m), 1 velocities, 3 what its motor gives (N m or N)."""
+        """Of every encoder: 0 positions (rad or m), 1 velocities (rad/s or m/s), 3 what its motor gives (N m or N)."""
         states = pybullet.getJointStates(self.index, [self.numbers[name] for name in self.encoders],
                                          physicsClientId=self._client)
         return {name: state[field] for name, state in zip(self.encoders, states)}
 
     def position(self, name: str) -> float:
-        """Of one joint, also of the base's."""
+        """rad or m of one joint, also of the base's."""
         position: float = pybullet.getJointState(self.index, self.numbers[name], physicsClientId=self._client)[0]
         return position
 
@@ -123,7 +123,10 @@ class Pr2Body:
         return pose_of(state[4], state[5]) @ holder_from_link
 
     def set_target(self, name: str, position: float, velocity: float, force: Optional[float]) -> None:
-        """Where a joint shall be at the end of the coming period, moving at `velocity` until then."""
+        """Where a joint shall be (rad or m) at the end of the coming period, moving at `velocity` (per s) until then.
+
+        :param force: N m or N, at most; None: as before.
+        """
         number = self.numbers[name]
         self._targets[number], self._rates[number] = position, velocity
         if force is not None:
@@ -131,7 +134,7 @@ class Pr2Body:
         self._changed.add(number)
 
     def target(self, name: str) -> float:
-        """Where a joint was sent last."""
+        """rad or m, where a joint was sent last."""
         return float(self._targets[self.numbers[name]])
 
     def set_grip(self, arm: str, gap: float, force: float) -> None:

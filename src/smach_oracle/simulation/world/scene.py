@@ -11,11 +11,11 @@ class Body(NamedTuple):
     shape: str  # 'box', 'cylinder', 'round' (between a ball and a cylinder) or 'urdf'
     size: Vector  # m; box, round: full extents; cylinder: radius, radius, height; urdf: unused
     position: Vector  # m, of its centre (urdf: of its root)
-    yaw: float = 0.0
+    yaw: float = 0.0  # rad, as roll and pitch: about the fixed axes z, x and y, roll first
     roll: float = 0.0
     pitch: float = 0.0
     mass: float = 0.0  # kg; 0: it cannot move
-    friction: float = 0.8
+    friction: float = 0.8  # coefficient
     colour: Vector = (0.5, 0.5, 0.5)
     urdf: str = ''  # text of the model, for shape 'urdf'
     joints: Tuple[Tuple[str, float], ...] = ()  # urdf: where its joints start

@@ -1,4 +1,4 @@
-"""The world of the first use case: a table, things on it, and reasons to fail, all drawn from the trial's seed."""
+"""The world of the first use case (paper, VI-B): table, things and reasons to fail, all drawn from the trial's seed."""
 from typing import List, Tuple
 
 import numpy as np

@@ -75,7 +75,7 @@ class Trajectory:
         """
         :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to the first point.
         :param times: (n,) s from the start, increasing; the first may be 0.
-        :param velocities: (n, len(joints)).
+        :param velocities: (n, len(joints)), rad/s or m/s.
         :raises ValueError: for shapes that do not fit, values that are not finite, times that do not increase.
         """
         self._joints = list(joints)

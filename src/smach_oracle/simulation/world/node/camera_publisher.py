@@ -33,6 +33,7 @@ class CameraPublisher:
 
         :param colour: (h, w, 3) uint8, RGB.
         :param depth: (h, w) float32, m along the optical axis, NaN where nothing was measured.
+        :param intrinsics: (3, 3).
         """
         header = Header(stamp=stamp, frame_id=CAMERA_FRAME)
         info = camera_info(intrinsics, colour.shape, header)
@@ -49,7 +50,11 @@ class CameraPublisher:
 
 
 def camera_info(intrinsics: np.ndarray, shape: Any, header: Header) -> CameraInfo:
-    """Of a camera without distortion; `shape` begins with height and width."""
+    """Of a camera without distortion.
+
+    :param intrinsics: (3, 3).
+    :param shape: height and width, px; what follows does not matter.
+    """
     projection = np.hstack([intrinsics, np.zeros((3, 1))])
     return CameraInfo(header=header, height=shape[0], width=shape[1], distortion_model='plumb_bob', D=[0.0] * 5,
                       K=intrinsics.ravel().tolist(), R=np.eye(3).ravel().tolist(), P=projection.ravel().tolist())

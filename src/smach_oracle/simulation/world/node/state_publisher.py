@@ -26,7 +26,7 @@ from .transform_tree import Link, TransformTree, link_of
 
 
 def ros_time(nanoseconds: int) -> rospy.Time:
-    """As a message has it."""
+    """A time in ns as a message has it."""
     return rospy.Time(*divmod(nanoseconds, 1_000_000_000))
 
 
@@ -70,13 +70,21 @@ class StatePublisher:
 
 def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_base: np.ndarray,
                stamp: rospy.Time) -> TFMessage:
-    """What moves, as a message for /tf."""
+    """What moves, as a message for /tf.
+
+    :param positions: rad or m by joint.
+    :param odom_from_base: 4x4, ODOM_FRAME from BASE_FRAME.
+    """
     links = [link_of(ODOM_FRAME, BASE_FRAME, odom_from_base)] + tree.moving(positions)
     return TFMessage([_stamped(link, stamp) for link in links])
 
 
 def odometry(odom_from_base: np.ndarray, velocity: np.ndarray, stamp: rospy.Time) -> Odometry:
-    """Where the robot believes to stand, and how it moves (`Pr2Body.base_velocity`); no variance is known (zeros)."""
+    """Where the robot believes to stand, and how it moves; no variance is known (zeros).
+
+    :param odom_from_base: 4x4, ODOM_FRAME from BASE_FRAME.
+    :param velocity: (3,), as `Pr2Body.base_velocity` gives it.
+    """
     link = link_of(ODOM_FRAME, BASE_FRAME, odom_from_base)
     forward, left, turn = velocity
     return Odometry(Header(stamp=stamp, frame_id=link.parent), link.child,
