@@ -166,7 +166,7 @@ class ArmPort:
         return 'no controller listens to {}'.format(self._publisher.resolved_name)
 
     def send(self, positions: np.ndarray, velocities: np.ndarray, period_s: float) -> None:
-        """Be at `positions` (rad) `period_s` from now."""
+        """Be at `positions` (n,), rad, `period_s` from now, moving at `velocities` (n,), rad/s."""
         point = JointTrajectoryPoint(positions=positions.tolist(), velocities=velocities.tolist(),
                                      time_from_start=rospy.Duration(period_s))
         self._publisher.publish(JointTrajectory(joint_names=self._joints, points=[point]))

@@ -152,7 +152,7 @@ class Hand:
                            Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
 
     def in_base(self, twist: np.ndarray) -> Twist:
-        """A twist along the axes of the arm's own base (6,), along those of the robot's."""
+        """A twist (6,), m/s and rad/s, along the axes of the arm's own base, along those of the robot's."""
         axes = self._axes(self._names.base, self._robot.listener.now()[0])
         return Twist(Vector3(*(axes @ twist[:3])), Vector3(*(axes @ twist[3:])))
 

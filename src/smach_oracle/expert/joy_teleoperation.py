@@ -30,7 +30,7 @@ class JoySettings(NamedTuple):
     close: int
     toggle: int  # closes and opens by turns
     gripper_open: float  # m
-    dead_zone: float
+    dead_zone: float  # share of the full deflection
     silent_s: float  # without a message of the joystick for so long, its dead-man counts as let go
     rate_hz: float
     frame: str

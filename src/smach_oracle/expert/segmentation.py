@@ -1,7 +1,7 @@
 """From what a person draws on a camera frame to the object: GrabCut gives a mask, depth gives it a place and a size.
 
 Works on any frame that has colour, depth, intrinsics and the camera's pose; knows no ROS. The same frame and drawing
-give the same object.
+give the same object. The segmentation interface of the paper, section V-A.
 """
 from typing import NamedTuple, Optional, Sequence, Tuple
 
@@ -27,7 +27,10 @@ Corners = Tuple[int, int, int, int]  # left, top, right, bottom; the last two ex
 
 
 class SegmentationError(Exception):
-    """What was drawn gives no object; the text says why and what may help. `mask` is there where only depth failed."""
+    """What was drawn gives no object; the text says why and what may help.
+
+    `mask`: (h, w) bool, where GrabCut found one; what came after it failed then.
+    """
 
     def __init__(self, text: str, mask: Optional[np.ndarray] = None) -> None:
         super().__init__(text)
@@ -63,7 +66,7 @@ class Cutting(NamedTuple):
 
 
 def rectangle(left: float, top: float, width: float, height: float) -> np.ndarray:
-    """(4, 2): a rectangle as a region."""
+    """(4, 2) px: a rectangle as a region."""
     return np.array([[left, top], [left + width, top], [left + width, top + height], [left, top + height]], float)
 
 

@@ -112,7 +112,7 @@ class SegmentationServer:
 
 
 def region_of(request: SegmentObjectRequest) -> np.ndarray:
-    """(n, 2): the corners of what was drawn. Raises SegmentationError where nothing was."""
+    """(n, 2) px: the corners of what was drawn. Raises SegmentationError where nothing was, or too many."""
     corners, box = request.polygon.points, request.region
     if len(corners) > MOST_POINTS:
         raise SegmentationError('the polygon has {} corners; allowed: {}'.format(len(corners), MOST_POINTS))

@@ -2,7 +2,7 @@
 
 Damped least squares; a limit slows all joints alike, so that the tool keeps its direction and only gets slower.
 ROS-free. Lengths in m, angles in rad, times in s; twists are (6,): linear, then angular, along the axes of the chain's
-base, about the tool's origin.
+base, about the tool's origin. The teleoperation of the paper, section V-A.
 """
 from functools import partial
 from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tuple
@@ -94,7 +94,7 @@ class CartesianDrive:
         self._half_range = np.where(finite, np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf)
 
     def step(self, joints: np.ndarray, twist: np.ndarray, period: float, turn_freely: bool = False) -> Step:
-        """Where the joints go within one period for the tool to move by `twist`.
+        """Where the joints (n,) go within one period for the tool to move by `twist` (6,).
 
         :param turn_freely: only the linear part counts; meanwhile, also where it is zero, tool and elbow turn as brings
             the arm to its posture.
@@ -212,7 +212,7 @@ class CartesianDrive:
 
 
 def pulled_back(commanded: np.ndarray, measured: np.ndarray, lead: float) -> np.ndarray:
-    """Commanded joint positions, kept within `lead` rad of the measured ones: pushing at a wall piles up no force."""
+    """Commanded joint positions (n,), within `lead` rad of the measured ones: pushing at a wall piles up no force."""
     return measured + np.clip(commanded - measured, -lead, lead)
 
 

@@ -76,7 +76,7 @@ def decode(item: UserdataItem) -> Any:
 
 
 def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict[str, Any]:
-    """All items as a dictionary.
+    """All items as a dictionary; with `skip_unsent` without those that were not sent.
 
     :raises UserdataCodecError: as `decode` does, and if a key comes twice.
     """

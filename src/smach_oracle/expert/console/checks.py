@@ -23,7 +23,10 @@ class Output(NamedTuple):
 
 
 def text(longest: int, least: int = 0) -> Check:
-    """Text of `least` to `longest` characters, without control characters; what is left out is empty."""
+    """Text of `least` to `longest` characters, without control characters; what is left out is empty.
+
+    :raises ValueError: (the check) for anything else, saying what is allowed.
+    """
     def check(value: Any) -> str:
         if value is None and not least:
             return ''
@@ -37,7 +40,7 @@ def text(longest: int, least: int = 0) -> Check:
 
 
 def one_of(allowed: Tuple[str, ...]) -> Check:
-    """One of a few words."""
+    """One of a few words; the check raises ValueError for others, naming those."""
     def check(value: Any) -> str:
         if value not in allowed:
             raise ValueError('{} is not allowed; allowed: {}'.format(shown(value), ', '.join(allowed)))
@@ -52,7 +55,10 @@ def shown(value: Any) -> str:
 
 
 def outputs(value: Any) -> List[Output]:
-    """Values for the userdata; what is left out is none."""
+    """Values for the userdata; what is left out is none.
+
+    :raises ValueError: for what is no list of outputs, too many of them, one twice, or one that is nested too deep.
+    """
     if value is None:
         return []
     if not isinstance(value, list) or len(value) > _MOST_OUTPUTS:

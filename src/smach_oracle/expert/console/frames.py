@@ -45,14 +45,14 @@ class SensorHandler(ForPages):
         self._gone = True
 
     def sensor(self, number: str) -> Sensor:
-        """By its number."""
+        """By its number. Raises HTTPError 404 where there is none."""
         found = self._room.sensors.find(int(number))
         if found is None:
             raise tornado.web.HTTPError(404)
         return found
 
     def robot(self, number: str) -> RobotSensor:
-        """A sensor that is a robot, by its number."""
+        """A sensor that is a robot, by its number. Raises HTTPError 404 where there is none."""
         found = self.sensor(number)
         if not isinstance(found, RobotSensor):
             raise tornado.web.HTTPError(404)

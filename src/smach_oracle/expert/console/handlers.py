@@ -94,7 +94,7 @@ class Guarded(tornado.web.RequestHandler):
         """Our own check is in `demand_xsrf`."""
 
     def demand_xsrf(self, session: Optional[Session]) -> Session:
-        """The session, of a request that knows its token."""
+        """The session, of a request that knows its token; any other is answered with 403."""
         given = self.request.headers.get('X-Xsrf', '')
         if session is None or not sessions.same(given, sessions.xsrf_token(session, self.gate.secret)):
             raise tornado.web.HTTPError(403)

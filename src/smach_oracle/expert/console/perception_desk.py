@@ -103,7 +103,7 @@ def _points(message: PointCloud2) -> Dict[str, Any]:
 
 
 def outlines(mask: np.ndarray) -> List[List[int]]:
-    """Closed lines x, y, x, y, ... around what is not 0, and around the holes in it."""
+    """Closed lines x, y, x, y, ... (px) around what is not 0 in a mask (h, w) uint8, and around the holes in it."""
     found, _ = cv2.findContours(np.ascontiguousarray(mask), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     lines: List[List[int]] = []
     for line in sorted(found, key=len, reverse=True):

@@ -1,4 +1,4 @@
-"""The node `expert_console`: a web page from which people watch robots and answer their questions."""
+"""The node `expert_console`: a web page from which people watch robots and answer their questions (paper, III)."""
 import secrets
 import socket
 import ssl

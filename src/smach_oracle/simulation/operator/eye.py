@@ -35,7 +35,7 @@ class Eye:
 
 
 def pose_of(message: PoseStamped) -> np.ndarray:
-    """4x4. Raises ValueError for a quaternion of no length."""
+    """4x4, of the message's frame. Raises ValueError for a quaternion of no length."""
     at, turn = message.pose.position, message.pose.orientation
     return from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 

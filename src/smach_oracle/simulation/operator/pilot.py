@@ -34,7 +34,7 @@ class DrivenHand(Protocol):
         """
 
     def grip(self, gap: float, effort: float) -> Grip:
-        """Move the gripper, and wait for its end."""
+        """Move the gripper to `gap` m between its tips, with at most `effort` N, and wait for its end."""
 
 
 class Stuck(Exception):
