@@ -12,6 +12,8 @@ import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
+from .settling import Settling, live_connections
+
 POLL_S = 0.02  # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
 _ACK_S = 3.0  # a goal that nobody acknowledged by then was lost on its way
 _RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
@@ -90,17 +92,32 @@ class GoalLink:
                       for end, kind in (('/result', type(action_spec().action_result)),
                                         ('/feedback', type(action_spec().action_feedback)))]
         self._client = actionlib.ActionClient(name, action_spec)
+        self._settling = Settling()
 
     def ready(self) -> bool:
-        """Whether one live server is connected to all five topics of the action."""
+        """Whether one live server is connected to all five topics of the action.
+
+        Takes a moment where it has just been connected: the result of a goal that ends at once would get lost.
+        """
+        heard = self._heard()
+        if heard:
+            self._settling.wait(heard)
+        return bool(heard)
+
+    def _heard(self) -> List[Any]:
+        """The connections on which a server tells of goals; [] while any topic is without it."""
         client = self._client
-        return any(_reaches(client.pub_goal, server) and _reaches(client.pub_cancel, server)
-                   and server in _live(client.result_sub) and server in _live(client.feedback_sub)
-                   for server in _live(client.status_sub))
+        told = (client.status_sub, client.result_sub, client.feedback_sub)
+        for server in [each.callerid_pub for each in live_connections(client.status_sub)]:
+            heard = [next((each for each in live_connections(topic) if each.callerid_pub == server), None)
+                     for topic in told]
+            if all(heard) and _reaches(client.pub_goal, server) and _reaches(client.pub_cancel, server):
+                return heard
+        return []
 
     def alive(self) -> bool:
         """Whether any server is connected; false within milliseconds of its death."""
-        return bool(_live(self._client.status_sub))
+        return bool(live_connections(self._client.status_sub))
 
     def send(self, goal: Any, now_s: float) -> SentGoal:
         """Send a goal; the caller has seen `ready`."""
@@ -121,14 +138,6 @@ class GoalLink:
 def lost(event: GoalEvent) -> bool:
     """Whether the goal ended because the server no longer knows it (it was restarted)."""
     return event.status == GoalStatus.LOST
-
-
-def _live(subscriber: rospy.Subscriber) -> List[str]:
-    """Names of the publishing nodes; a connection whose socket is gone only waits to be made again."""
-    if subscriber.impl is None:
-        return []
-    return [connection.callerid_pub for connection in subscriber.impl.connections
-            if getattr(connection, 'socket', None) is not None]
 
 
 def _reaches(publisher: rospy.Publisher, subscriber: str) -> bool:

@@ -4,7 +4,8 @@ import time
 import pytest
 from actionlib import CommState
 
-from smach_oracle.ros.goal_link import SentGoal, _reaches
+from smach_oracle.ros import goal_link, settling
+from smach_oracle.ros.goal_link import GoalLink, SentGoal, _reaches
 
 
 class FakeHandle:
@@ -64,3 +65,62 @@ def test_a_connection_to_a_node_that_has_died_reaches_nobody():
     assert _reaches(FakePublisher('/by_hand'), '/by_hand')
     assert not _reaches(FakePublisher('/by_hand', dead=['/by_hand']), '/by_hand')
     assert not _reaches(FakePublisher('/other'), '/by_hand')
+
+
+class FakeConnection:
+
+    def __init__(self, node):
+        self.callerid_pub = node
+        self.socket = object()
+
+
+class FakeSubscriber:
+    """To the nodes named."""
+
+    def __init__(self, *nodes):
+        self.impl = self
+        self.connections = [FakeConnection(node) for node in nodes]
+
+
+class FakeClient:
+
+    def __init__(self):
+        self.pub_goal, self.pub_cancel = FakePublisher('/server'), FakePublisher('/server')
+        self.status_sub, self.result_sub, self.feedback_sub = (FakeSubscriber('/server') for _ in range(3))
+
+
+@pytest.fixture
+def link(monkeypatch):
+    monkeypatch.setattr(settling, 'SETTLE_S', 0.2)
+    link = GoalLink.__new__(GoalLink)
+    link._client, link._settling = FakeClient(), goal_link.Settling()
+    return link
+
+
+def ready_after_s(link):
+    begin = time.monotonic()
+    assert link.ready()
+    return time.monotonic() - begin
+
+
+def test_a_new_connection_is_given_time_to_be_known_to_the_server(link):
+    assert ready_after_s(link) >= 0.2
+    assert ready_after_s(link) < 0.2, 'but once'
+
+
+@pytest.mark.parametrize('made_anew', [
+    lambda client: setattr(client, 'result_sub', FakeSubscriber('/server')),
+    lambda client: setattr(client.result_sub.connections[0], 'socket', object())])
+def test_a_connection_made_anew_is_given_that_time_again(link, made_anew):
+    link.ready()
+    made_anew(link._client)
+    assert ready_after_s(link) >= 0.2
+
+
+@pytest.mark.parametrize('topic', ['status_sub', 'result_sub', 'feedback_sub'])
+def test_a_topic_without_the_server_is_waited_for(link, topic):
+    getattr(link._client, topic).connections[0].callerid_pub = '/another'
+    assert not link.ready()
+    getattr(link._client, topic).connections[0].callerid_pub = '/server'
+    getattr(link._client, topic).connections[0].socket = None
+    assert not link.ready(), 'a connection whose socket is gone'

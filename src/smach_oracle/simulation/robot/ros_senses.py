@@ -13,11 +13,11 @@ from smach_oracle.srv import Snapshot
 
 from ...geometry.transforms import from_quaternion
 from ...ros.images import ImageError, colour_of, depth_of, intrinsics_of
+from ...ros.settling import Settling, live_connections
 from .interface import Frame, RobotError
 
 KEPT = {Image: 4}  # messages of a topic
 KEPT_OTHERS = 200
-SHAKE_S = 0.1  # after a subscriber knows of its publisher, until surely the publisher knows of it
 AGAIN_S = 3.0  # wall s after which joint states that were asked for are asked for anew
 
 
@@ -26,17 +26,19 @@ class Recent:
 
     def __init__(self, topic: str, kind: Any) -> None:
         self.name = rospy.resolve_name(topic)
-        self.greeted = False  # its publisher surely knows of us
+        self._settling = Settling()
         self._arrived = threading.Condition()
         kept = KEPT.get(kind, KEPT_OTHERS)
         self._messages: Deque[Any] = collections.deque(maxlen=kept)
         self._subscriber = rospy.Subscriber(topic, kind, self._heard, queue_size=kept, buff_size=1 << 24,
                                             tcp_nodelay=True)
 
-    @property
     def connected(self) -> bool:
-        """Somebody publishes."""
-        return bool(self._subscriber.get_num_connections())
+        """Whether somebody publishes; takes a moment, where that is new, until whoever does surely knows of us."""
+        connections = live_connections(self._subscriber)
+        if connections:
+            self._settling.wait(connections)
+        return bool(connections)
 
     def at(self, stamp: rospy.Time, timeout_s: float) -> Any:
         """The message with this stamp; waits for it, by the wall's clock. Raises RobotError."""
@@ -147,15 +149,11 @@ class RosSenses:
         return answer.stamp
 
     def _connected(self, topic: Recent) -> None:
-        if topic.connected and topic.greeted:
-            return
         until = time.monotonic() + self._timeout_s
-        while not topic.connected:
+        while not topic.connected():
             if time.monotonic() > until or rospy.is_shutdown():
                 raise RobotError('nobody publishes {}'.format(topic.name))
             time.sleep(0.005)
-        time.sleep(SHAKE_S)
-        topic.greeted = True
 
     def _looked_up(self, target: str, source: str, stamp: rospy.Time) -> np.ndarray:
         """4x4. tf2's own waiting goes by ROS time, which may stand still; this goes by the wall's."""
