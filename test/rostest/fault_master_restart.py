@@ -35,6 +35,7 @@ answer = rospy.ServiceProxy('/task/expert_query/answer', AnswerQuery)
 while not rospy.is_shutdown():
     queries = rospy.wait_for_message('/task/expert_query/open', OpenQueries, 20.0).queries
     if queries:
+        answer.wait_for_service(20.0)
         reply = answer(queries[0].query.query_id, ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='succeeded',
                                                                  by='Ann'))
         print('ANSWERED', reply.ok, reply.message, flush=True)
@@ -45,7 +46,9 @@ LISTENER = '''
 import rospy
 from smach_oracle.msg import OracleEvent
 rospy.init_node('listener')
-rospy.Subscriber('/task/oracle/events', OracleEvent, lambda event: print('EVENT', event.kind, flush=True))
+events = rospy.Subscriber('/task/oracle/events', OracleEvent, lambda event: print('EVENT', event.kind, flush=True))
+while not events.get_num_connections():
+    rospy.sleep(0.05)
 print('LISTENING', flush=True)
 rospy.spin()
 '''
@@ -79,10 +82,10 @@ class MasterRestartTest(unittest.TestCase):
         task = self.ask_at_once()
         before = self.master.system()
         self.restart_master()
-        self.assertTrue(wait_for(self.registered), self.master.system())
+        wait_for(lambda: self.own_names(self.master.system()) == self.own_names(before))
         self.assertEqual(self.own_names(before), self.own_names(self.master.system()))
         front_end = self.python(FRONT_END)
-        self.assertTrue(front_end.says('ANSWERED True'), front_end.output() + task.output())
+        self.assertTrue(front_end.says('ANSWERED True', 40.0), front_end.output() + task.output())
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         task.go_on()
         self.assertEqual(task.wait(), 0)
@@ -100,9 +103,11 @@ class MasterRestartTest(unittest.TestCase):
         task = self.start_task('--config', self.asking())
         self.master.kill()
         task.go_on()  # the state fails now
-        time.sleep(1.0)
+        self.assertTrue(task.says('PICK failed'), task.output())
+        time.sleep(1.0)  # for it to stumble, if it did
         self.assertTrue(task.running(), task.output())
         self.master.start()
+        self.assertTrue(wait_for(self.registered), self.master.system())
         front_end = self.python(FRONT_END)
         self.assertTrue(front_end.says('ANSWERED True', 40.0), front_end.output() + task.output())
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
@@ -113,7 +118,7 @@ class MasterRestartTest(unittest.TestCase):
         listener = self.python(LISTENER)
         self.assertTrue(listener.says('LISTENING'), listener.output())
         front_end = self.python(FRONT_END)
-        self.assertTrue(front_end.says('ANSWERED True'), front_end.output() + task.output())
+        self.assertTrue(front_end.says('ANSWERED True', 40.0), front_end.output() + task.output())
         task.says('OUTCOME')
         self.assertTrue(listener.says('EVENT'), listener.output())
 

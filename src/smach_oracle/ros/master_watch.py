@@ -58,16 +58,18 @@ class MasterLink:
     def register(self, items: Registrations) -> List[Tuple[str, List[str]]]:
         """Register everything; harmless for what the master knows already.
 
+        Topics that others listen to come last: whoever hears from this node may call its services at once.
+
         :returns: for each subscription its topic and the URIs of the publishers that the master knows.
         :raises MasterCallError: naming what the master refused.
         """
         with self._proxy() as master:
-            for topic, kind in items.publications:
-                self._call(master.registerPublisher, topic, kind, self._node_uri)
-            found = [(topic, self._call(master.registerSubscriber, topic, kind, self._node_uri))
-                     for topic, kind in items.subscriptions]
             for service, uri in items.services:
                 self._call(master.registerService, service, uri, self._node_uri)
+            found = [(topic, self._call(master.registerSubscriber, topic, kind, self._node_uri))
+                     for topic, kind in items.subscriptions]
+            for topic, kind in items.publications:
+                self._call(master.registerPublisher, topic, kind, self._node_uri)
             return found
 
     def _call(self, method: Callable[..., Any], name: str, *args: str) -> Any:

@@ -2,7 +2,7 @@
 import pytest
 
 from smach_oracle.ros import master_watch
-from smach_oracle.ros.master_watch import MasterCallError, MasterWatch, Registrations
+from smach_oracle.ros.master_watch import MasterCallError, MasterLink, MasterWatch, Registrations
 
 ITEMS = Registrations([['/task/oracle/events', 'smach_oracle/OracleEvent']],
                       [['/task/expert_query/goal', 'smach_oracle/ExpertQueryActionGoal']],
@@ -105,3 +105,32 @@ def test_a_long_outage_is_told_once(watch, link, monkeypatch):
     for _ in range(10):
         watch.check()
     assert len(said) == 1
+
+
+class FakeMaster:
+    """Notes the calls that register something."""
+
+    def __init__(self):
+        self.calls = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_error):
+        pass
+
+    def __getattr__(self, method):
+        def call(_caller, name, *_more):
+            self.calls.append((method, name))
+            return 1, '', ['http://localhost:2'] if method == 'registerSubscriber' else 0
+        return call
+
+
+def test_who_hears_from_a_node_again_finds_its_services_there(monkeypatch):
+    master = FakeMaster()
+    monkeypatch.setattr(master_watch.xmlrpc.client, 'ServerProxy', lambda *_, **__: master)
+    found = MasterLink('http://localhost:1', '/task', 'http://localhost:3').register(ITEMS)
+    assert found == [('/task/expert_query/goal', ['http://localhost:2'])]
+    assert master.calls == [('registerService', '/task/expert_query/answer'),
+                            ('registerSubscriber', '/task/expert_query/goal'),
+                            ('registerPublisher', '/task/oracle/events')]
