@@ -87,6 +87,7 @@ def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
     """Run the machine once per trial.
 
     :returns: how many trials ended in success.
+    :raises RuntimeError: where the world does not take a seed.
     """
     reset = find_reset()
     successes = 0

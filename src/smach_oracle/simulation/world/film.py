@@ -70,7 +70,11 @@ class FilmedWorld(World):
 
 
 def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
-    """The picture and the frames of one trial. Raises RuntimeError where nothing was carried in it."""
+    """The picture and the frames of one trial, each (h, w, 3) uint8 RGB.
+
+    :param frames_s: frames per simulated s; 0: none.
+    :raises RuntimeError: where nothing was carried in it.
+    """
     world = FilmedWorld(frames_s, task.carried_s)
     try:
         done = rehearse(task.draw(seed, True), world, task.steps)
@@ -84,7 +88,7 @@ def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.
 
 
 def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
-    """Write the frames as a video; whether this OpenCV can."""
+    """Write frames, (h, w, 3) uint8 RGB, one at least, as a video with `frames_s` a second; whether this OpenCV can."""
     height, width = frames[0].shape[:2]
     video = cv2.VideoWriter(path, cv2.VideoWriter_fourcc(*'mp4v'), frames_s, (width, height))
     if not video.isOpened():
