@@ -87,7 +87,7 @@ def test_the_example_runs(tmp_path):
 def test_every_type_in_the_table_of_the_ros_interface_is_there():
     rows = re.findall(r'^\| `~[^|]*\| (action|topic|service) `(\w+)`', README, re.MULTILINE)
     folders = {'action': 'action/{}.action', 'topic': 'msg/{}.msg', 'service': 'srv/{}.srv'}
-    assert len(rows) >= 6
+    assert len(rows) >= 5
     assert all((ROOT / folders[kind].format(name)).is_file() for kind, name in rows)
 
 
@@ -103,6 +103,15 @@ def test_every_folder_and_file_named_in_the_readme_is_there():
     named += re.findall(r'`(requirements[\w.-]*)`', README)
     assert len(named) > 10
     assert not [name for name in named if not (ROOT / name).exists()]
+
+
+def test_every_folder_of_the_checkout_is_among_the_rooms():
+    listed = subprocess.run(['git', 'ls-files'], cwd=str(ROOT), stdout=subprocess.PIPE, check=False).stdout.decode()
+    folders = {name.split('/')[0] for name in listed.splitlines() if '/' in name}
+    if not folders:
+        pytest.skip('no git checkout')
+    rooms = README[README.index('## Rooms'):]
+    assert not [name for name in sorted(folders) if not re.search(r'`{}[/`]'.format(re.escape(name)), rooms)]
 
 
 def test_every_document_is_in_the_index():
