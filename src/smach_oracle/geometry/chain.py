@@ -145,7 +145,10 @@ class Chain:
 
     def solutions(self, pose: np.ndarray, seed: np.ndarray, generator: np.random.Generator, restarts: int = 15,
                   iterations: int = 50) -> np.ndarray:
-        """All solutions (m, n) found from the seed and the restarts, as for inverse(), nearest to the seed first."""
+        """All solutions (m, n) found from the seed and the restarts, as for inverse(), nearest to the seed first.
+
+        :raises ValueError: for a pose or seed that is not finite.
+        """
         return self._solve(pose, seed, generator, restarts, iterations, first=False)
 
     def _solve(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator], restarts: int,

@@ -126,13 +126,16 @@ class OracleContainer(smach.StateMachine):
     # -- structure
 
     def get_children(self) -> Dict[str, smach.State]:
-        """The states by label, ORACLE among them."""
+        """The states by label, ORACLE among them. Raises ConfigError where its name is another's."""
         self._sync_oracle()
         children: Dict[str, smach.State] = super().get_children()
         return children
 
     def get_internal_edges(self) -> List[Tuple[str, str, Optional[str]]]:
-        """All edges (outcome, from, to): the author's, one from every state to ORACLE, and ORACLE's to all."""
+        """All edges (outcome, from, to): the author's, one from every state to ORACLE, and ORACLE's to all.
+
+        :raises ConfigError: where ORACLE's name is another's.
+        """
         self._sync_oracle()
         edges = list(super().get_internal_edges())
         if self._oracle.tree.recover:
@@ -141,7 +144,10 @@ class OracleContainer(smach.StateMachine):
         return edges
 
     def check_consistency(self) -> None:
-        """Raise what a StateMachine raises for an inconsistent machine; ORACLE is brought up to date before."""
+        """Raise what a StateMachine raises for an inconsistent machine; ORACLE is brought up to date before.
+
+        :raises ConfigError: where ORACLE's name is another's.
+        """
         self._sync_oracle()
         super().check_consistency()
 

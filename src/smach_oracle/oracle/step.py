@@ -48,7 +48,10 @@ def _pass_on(machine: Any, ledger: Ledger) -> None:
 
 
 def execute_watched(machine: Any, ledger: Ledger, record: StateRecord, state: Any) -> Any:
-    """Execute a state where more is to be done than to execute it; return its outcome, or an Overrun."""
+    """Execute a state where more is to be done than to execute it; return its outcome, or an Overrun.
+
+    Raises what the state raises.
+    """
     if ledger.deep_copy_keys:
         record.snapshot = ledger.snapshot()
     ledger.emit(EventKind.STATE_START, state=record.label)

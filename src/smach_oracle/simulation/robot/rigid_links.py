@@ -1,4 +1,7 @@
-"""Links of a URDF that cannot move against each other, made one: physics is three times as fast then."""
+"""Links of a URDF that cannot move against each other, made one: physics is three times as fast then.
+
+Lengths are m. An element without a part that is needed, or with what is no number, is a ValueError.
+"""
 import xml.etree.ElementTree as ElementTree
 from typing import Dict, Tuple
 
