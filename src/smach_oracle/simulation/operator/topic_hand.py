@@ -34,7 +34,7 @@ class HandLink:
                                             tcp_nodelay=True)
 
     def wait_for_goal(self, query_id: str, limit_s: float) -> bool:
-        """Wait until the interface works on a question; whether it does. Raises Interrupted where the node goes down."""
+        """Wait until the interface works on a question; whether it does. Raises Interrupted where the node ends."""
         return self._wait(lambda state: state.query_id == query_id, limit_s)
 
     def send(self, command: TeleopCommand) -> TeleopState:
