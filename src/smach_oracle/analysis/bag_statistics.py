@@ -9,6 +9,7 @@ import sys
 from typing import List, Optional, Sequence
 
 from ..oracle.naming import DEFAULT_FAILING_OUTCOMES, FailingNames
+from ..oracle.paths import path_of
 from . import groups as grouping, table
 from .bag_events import BagError
 from .reading import complain, tell_skipped
@@ -34,14 +35,16 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog='bag_statistics', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', help='with bags in it or below it; or a bag')
-    parser.add_argument('--figure', metavar='OUT', help='write the time series to OUT.svg and OUT.png')
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
+                        help='with bags in it or below it; or a bag')
+    parser.add_argument('--figure', metavar='OUT', type=path_of, help='write the time series to OUT.svg and OUT.png')
     parser.add_argument('--columns', type=int, choices=(1, 2), default=1,
                         help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)')
     parser.add_argument('--x-axis', choices=('trials', 'time'), default='trials',
                         help='of the figure: number of the trial, or time since the first (default: trials)')
-    parser.add_argument('--json', metavar='OUT', help='write the table, all trials and the skipped bags as JSON')
-    parser.add_argument('--csv', metavar='OUT', help='write one line a trial')
+    parser.add_argument('--json', metavar='OUT', type=path_of,
+                        help='write the table, all trials and the skipped bags as JSON')
+    parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
     parser.add_argument('--failing-outcomes', nargs='+', metavar='NAME', default=list(DEFAULT_FAILING_OUTCOMES),
                         help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
                             ' '.join(DEFAULT_FAILING_OUTCOMES)))

@@ -8,6 +8,7 @@ import sys
 from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from ..oracle.events import Event, EventKind
+from ..oracle.paths import path_of
 from .bag_events import BagError, Skipped
 from .reading import complain, read_bags, tell_skipped
 from .trials import summarise
@@ -69,7 +70,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog='same_trials', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs=2, metavar='FOLDER', help='with bags in it or below it')
+    parser.add_argument('folders', nargs=2, metavar='FOLDER', type=path_of, help='with bags in it or below it')
     args = parser.parse_args(argv)
     skipped: List[Skipped] = []
     try:

@@ -10,6 +10,7 @@ import os
 import sys
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+from ..oracle.paths import path_of
 from .bag_events import BagError
 from .groups import ENDED_IN_FAILURE, QUESTIONS, RECOVERIES, TRUE_SUCCESS, Arm, Count, find_arms, make_group
 from .table import over_replicates, percent
@@ -103,8 +104,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog='compare_oracles', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', help='with bags in it or below it; or a bag')
-    parser.add_argument('--figure', metavar='OUT', help='write the figure to OUT.svg and OUT.png')
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
+                        help='with bags in it or below it; or a bag')
+    parser.add_argument('--figure', metavar='OUT', type=path_of, help='write the figure to OUT.svg and OUT.png')
     args = parser.parse_args(argv)
     try:
         found = load_trials(args.folders)

@@ -18,6 +18,7 @@ from ..oracle.events import SPENT, Event, EventKind
 from ..oracle.failure_rate import FailureClass, classify, make_estimator
 from ..oracle.history import History
 from ..oracle.naming import is_preempted
+from ..oracle.paths import path_of
 from ..oracle.policy import POLICIES, Action, Chain, Preconditions, Situation, policy_named
 from ..oracle.question import Visit, VisitResult
 from .bag_events import BagError, Skipped
@@ -246,7 +247,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', help='with bags in it or below it')
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it')
     parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
     parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')
     for name in ('moderate_from', 'high_from', 'prior'):

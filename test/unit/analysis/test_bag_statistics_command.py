@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from smach_oracle.analysis import bag_statistics
+from smach_oracle.analysis import bag_statistics, course, sweep, what_if
 
 ROOT = Path(__file__).parents[3]
 
@@ -88,6 +88,16 @@ def test_an_output_that_cannot_be_written_is_an_error(record, tmp_path, capsys):
     for option in ('--json', '--csv', '--figure'):
         assert bag_statistics.main([folder, option, str(tmp_path / 'missing' / 'out')]) == 2
         assert 'missing/out' in capsys.readouterr().err
+
+
+def test_every_path_may_begin_with_the_home_folder(record, tmp_path, monkeypatch, capsys):
+    record('bags', 2)
+    monkeypatch.setenv('HOME', str(tmp_path))
+    assert bag_statistics.main(['~/bags', '--csv', '~/a.csv', '--json', '~/a.json', '--figure', '~/f']) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {'bags', 'a.csv', 'a.json', 'f.svg', 'f.png'}
+    for command, folders in ((sweep, ['~/bags']), (what_if, ['~/bags']), (course, ['~/bags', '~/bags'])):
+        command.main(folders)
+        assert 'no such folder' not in capsys.readouterr().err
 
 
 def test_other_words_for_failure(record, capsys):
