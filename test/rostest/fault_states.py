@@ -11,6 +11,8 @@ from typing import Any
 import rospy
 
 from oracle_support import FrontEnd, Process, oracle_run, recorded_events, script
+from waiting import wait_for
+
 from smach_oracle.msg import ExpertDecision, OracleEvent
 from smach_oracle.srv import AnswerQueryRequest, AnswerQueryResponse
 
@@ -44,13 +46,16 @@ if sys.argv[2:] == ['stay']:
     sys.stdin.readline()
 '''
 ACTION = '''
-import sys, rospy, smach, smach_ros
+import sys, time, rospy, smach, smach_ros
 from smach_oracle.msg import MoveArmsAsideAction
+from smach_ros.action_link import link_to
 rospy.init_node('task')
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('MOVE', smach_ros.SimpleActionState('move', MoveArmsAsideAction,
-                                                               server_wait_timeout=rospy.Duration(3.0)))
+                                                               server_wait_timeout=rospy.Duration(20.0)))
+while not link_to('move', MoveArmsAsideAction).ready():
+    time.sleep(0.02)  # a state's limit counts from its entry: it is for the goal, not for the connections
 sys.stdin.readline()
 print('OUTCOME', sm.execute(), flush=True)
 '''
@@ -154,12 +159,10 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
-        gone = self.expert.claim(1, question.query.query_id, 'Bob', 1.0)  # for a second, never renewed
+        gone = self.expert.claim(1, question.query.query_id, 'Bob', 3.0)  # for so long, never renewed
         self.assertTrue(gone.ok, gone.message)
         self.assertFalse(self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok)
-        rospy.sleep(1.5)
-        taken = self.expert.claim(1, question.query.query_id, 'Ann', 10.0)
-        self.assertTrue(taken.ok, taken.message)
+        self.assertTrue(wait_for(lambda: self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok))
         self.answer(question, kind=ExpertDecision.GOTO, state='PICK')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
 
@@ -170,7 +173,7 @@ class FaultyStatesTest(unittest.TestCase):
 
     def test_an_action_server_that_dies_with_a_goal_is_asked_again_when_it_is_back(self) -> None:
         server = self.server()
-        task = self.start(ACTION, states={'MOVE': {'time_limit_s': 15.0}})
+        task = self.start(ACTION, states={'MOVE': {'time_limit_s': 30.0}})
         task.go_on()
         self.assertTrue(server.says('GOAL'), server.output() + task.output())
         server.stop()  # SIGKILL
