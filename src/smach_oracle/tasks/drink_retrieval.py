@@ -89,8 +89,8 @@ def find_reset() -> rospy.ServiceProxy:
     except rospy.ROSInterruptException:
         raise
     except rospy.ROSException as err:
-        raise SystemExit('drink_retrieval: no world here: nobody offers {} within {:.0f} s. roslaunch starts one, '
-                         'with the task: smach_oracle drink_retrieval.launch'.format(
+        raise SystemExit('drink_retrieval: no world here: nobody offers {} within {:.0f} s; what starts both: '
+                         'roslaunch smach_oracle drink_retrieval.launch'.format(
                              rospy.resolve_name('world/reset'), SERVER_WAIT_S)) from err
     return rospy.ServiceProxy('world/reset', ResetWorld)
 

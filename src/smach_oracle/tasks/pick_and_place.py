@@ -77,8 +77,8 @@ def find_reset() -> rospy.ServiceProxy:
     except rospy.ROSInterruptException:
         raise
     except rospy.ROSException as err:
-        raise SystemExit('pick_and_place: no world here: nobody offers {} within {:.0f} s. roslaunch starts one, '
-                         'with the task: smach_oracle pick_and_place.launch'.format(
+        raise SystemExit('pick_and_place: no world here: nobody offers {} within {:.0f} s; what starts both: '
+                         'roslaunch smach_oracle pick_and_place.launch'.format(
                              rospy.resolve_name('world/reset'), SERVER_WAIT_S)) from err
     return rospy.ServiceProxy('world/reset', ResetWorld)
 
