@@ -188,7 +188,7 @@ class TestExpertProtocol(unittest.TestCase):
 
     def test_the_front_end_of_the_documentation_answers(self):
         with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'expert.md')) as page:
-            code = page.read().split('```python\n')[1].split('```')[0]
+            code = page.read().split('## A front end in')[1].split('```python\n')[1].split('```')[0]
         self.assertLessEqual(len(code.splitlines()), 20)
         asked, _ = self.ask()
         process = subprocess.Popen([sys.executable, '-c', code], stdin=subprocess.PIPE)
