@@ -75,10 +75,18 @@ class Inquiry:
             question = make_question(self._recovery, self._ledger.tree.next_query_id(), self._remaining_s())
             self._query_id = question.query_id
             self._emit(EventKind.QUERY_OPENED, text=question.reason)
+            self._say_that_it_waits(question)
             verdict = self._settled(question)
             if verdict is not None:
                 return verdict._replace(query_id=question.query_id)
             self._pause()
+
+    def _say_that_it_waits(self, question: Question) -> None:
+        """In the log: a machine that stands still for minutes looks as if it hung."""
+        fallback = ' '.join(self._ledger.settings.on_no_answer).strip()
+        limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback) if question.deadline_s else 'it waits on'
+        smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
+            self._ledger.path, self._recovery.label, question.query_id, limit))
 
     def _remaining_s(self) -> float:
         if self._recovery.stopped():

@@ -134,6 +134,17 @@ def test_a_question_nobody_answers_falls_back(fallback, outcome, visits):
     assert bool(machine.of(EventKind.WARNING)) is (fallback in ('goto:NOWHERE', {'give_up': 'nonsense'}))
 
 
+@pytest.mark.parametrize('settings, told', [
+    ({'deadline_s': 7}, 'within 7 s: stop'), ({'deadline_s': 7, 'on_no_answer': 'goto:C'}, 'within 7 s: goto C'),
+    ({'deadline_s': 0}, 'it waits on')])
+def test_the_log_says_that_the_machine_waits_and_for_how_long(log, settings, told):
+    machine, _ = asking(goto('C'), **settings)
+    machine.run()
+    asked = machine.of(EventKind.QUERY_OPENED)[0]
+    assert [text for level, text in log if level == 'warn' and 'the expert is asked' in text] == [
+        'SM_ROOT/B: the expert is asked (question {}); without an answer {}'.format(asked.query_id, told)]
+
+
 def test_falling_back_to_a_state_has_an_end_when_nobody_ever_answers():
     machine = watched(Scripted(*['aborted'] * 100), settings={'on_no_answer': 'goto:A', 'max_recoveries': 2})
     assert machine.run() == 'aborted'
