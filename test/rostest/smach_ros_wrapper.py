@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """ActionServerWrapper as its action clients see it."""
 import threading
-import time
 import unittest
 
 import actionlib
@@ -13,6 +12,7 @@ from actionlib_msgs.msg import GoalStatus
 
 from smach_ros import ActionServerWrapper
 from smach_ros_support import LogWatch
+from waiting import wait_for
 
 KEYS = ['action_goal', 'action_feedback', 'action_result', 'goal', 'result', 'order', 'answer', 'progress']
 OUTCOMES = ['good', 'bad', 'stopped', 'odd']
@@ -30,11 +30,9 @@ class Work(smach.State):
 
 
 def until_preempted(state, ud):
-    for _ in range(500):
-        if state.preempt_requested():
-            state.service_preempt()
-            return 'stopped'
-        time.sleep(0.01)
+    if wait_for(state.preempt_requested):
+        state.service_preempt()
+        return 'stopped'
     return 'good'
 
 
@@ -50,10 +48,15 @@ class WrapperTest(unittest.TestCase):
                                            **arguments)
         self.wrapper.run_server()
         self.client = actionlib.SimpleActionClient(self.name, TestAction)
-        self.assertTrue(self.client.wait_for_server(rospy.Duration(10)))
+        self.assertTrue(self.client.wait_for_server(rospy.Duration(30)))
         return machine
 
-    def ask(self, number, wait_s=10.0):
+    def begin(self, number):
+        """Send a goal, and wait until it is worked on."""
+        self.ask(number, wait_s=0)
+        self.assertTrue(wait_for(lambda: self.client.get_state() == GoalStatus.ACTIVE))
+
+    def ask(self, number, wait_s=30.0):
         self.feedback = []
         self.client.send_goal(TestGoal(number), feedback_cb=lambda message: self.feedback.append(message.feedback))
         self.assertTrue(not wait_s or self.client.wait_for_result(rospy.Duration(wait_s)))
@@ -118,20 +121,18 @@ class WrapperTest(unittest.TestCase):
     def test_cancel_preempts_the_container_each_time(self):
         self.serve(until_preempted)
         for _ in range(3):
-            self.ask(1, wait_s=0)
-            time.sleep(0.3)
+            self.begin(1)
             self.client.cancel_goal()
-            self.assertTrue(self.client.wait_for_result(rospy.Duration(4)))
+            self.assertTrue(self.client.wait_for_result(rospy.Duration(30)))
             self.assertEqual(self.client.get_state(), GoalStatus.PREEMPTED)
 
     def test_newer_goal_preempts_the_one_under_way(self):
         self.serve(lambda state, ud: until_preempted(state, ud) if ud.action_goal.goal == 1 else 'good')
-        self.ask(1, wait_s=0)
-        time.sleep(0.3)
+        self.begin(1)
         other = actionlib.SimpleActionClient(self.name, TestAction)
-        self.assertTrue(other.wait_for_server(rospy.Duration(10)))
+        self.assertTrue(other.wait_for_server(rospy.Duration(30)))
         other.send_goal(TestGoal(2))
-        self.assertTrue(other.wait_for_result(rospy.Duration(4)))
+        self.assertTrue(other.wait_for_result(rospy.Duration(30)))
         self.assertEqual(other.get_state(), GoalStatus.SUCCEEDED)
         self.assertEqual(self.client.get_state(), GoalStatus.PREEMPTED)
 
@@ -139,19 +140,18 @@ class WrapperTest(unittest.TestCase):
         release = threading.Event()
 
         def stubborn(state, ud):
-            release.wait(5)
+            release.wait(60)
             return 'good'
 
         def check(state, ud):
             return 'stopped' if state.preempt_requested() else 'good'
 
-        self.serve(lambda state, ud: (stubborn if ud.action_goal.goal == 1 else check)(state, ud))
-        self.ask(1, wait_s=0)
-        time.sleep(0.3)
+        machine = self.serve(lambda state, ud: (stubborn if ud.action_goal.goal == 1 else check)(state, ud))
+        self.begin(1)
         self.client.cancel_goal()
-        time.sleep(0.3)
+        self.assertTrue(wait_for(machine['S0'].preempt_requested))
         release.set()
-        self.assertTrue(self.client.wait_for_result(rospy.Duration(4)))
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(30)))
         self.assertEqual(self.client.get_state(), GoalStatus.SUCCEEDED)
         self.assertEqual(self.ask(2), GoalStatus.SUCCEEDED)
 
