@@ -30,9 +30,15 @@ def set_bool(request):
 class ServiceStateTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.release = threading.Event()
+        cls.called, cls.release = threading.Event(), threading.Event()
         rospy.Service('switch', SetBool, set_bool)
-        rospy.Service('slow', SetBool, lambda request: (cls.release.wait(20), SetBoolResponse(True, 'late'))[1])
+        rospy.Service('slow', SetBool, cls.answer_late)
+
+    @classmethod
+    def answer_late(cls, request):
+        cls.called.set()
+        cls.release.wait(60)
+        return SetBoolResponse(True, 'late')
 
     def test_answer_goes_to_userdata(self):
         data = userdata(data=True)
@@ -75,7 +81,7 @@ class ServiceStateTest(unittest.TestCase):
         self.assertEqual(state.execute(userdata()), 'succeeded')
         service.shutdown()
         with LogWatch() as log:
-            self.assertEqual(InBackground(state, userdata()).outcome(5.0), 'aborted')
+            self.assertEqual(InBackground(state, userdata()).outcome(), 'aborted')
         self.assertIn('brief', log.text())
         service = rospy.Service('brief', SetBool, set_bool)
         self.addCleanup(service.shutdown)
@@ -97,7 +103,7 @@ class ServiceStateTest(unittest.TestCase):
         run = InBackground(state, userdata())
         time.sleep(0.3)
         state.request_preempt()
-        self.assertEqual(run.outcome(3.0), 'preempted')
+        self.assertEqual(run.outcome(), 'preempted')
         run = InBackground(state, userdata())
         service = rospy.Service('later', SetBool, set_bool)
         self.assertEqual(run.outcome(), 'succeeded')
@@ -106,19 +112,27 @@ class ServiceStateTest(unittest.TestCase):
     def test_service_that_does_not_answer_cannot_hold_a_preempt_for_ever(self):
         state = ServiceState('slow', SetBool, SetBoolRequest(True), preempt_timeout=0.5)
         run = InBackground(state, userdata())
-        time.sleep(0.3)
+        self.assertTrue(self.called.wait(30))
         state.request_preempt()
-        self.assertEqual(run.outcome(5.0), 'preempted')
+        self.assertEqual(run.outcome(), 'preempted')
         self.release.set()
 
     def test_call_that_ends_soon_after_a_preempt_counts(self):
-        rospy.Service('half_second', SetBool, lambda request: (time.sleep(0.5), SetBoolResponse(True, 'kept'))[1])
+        called = threading.Event()
+
+        def half_a_second(request):
+            called.set()
+            time.sleep(0.5)
+            return SetBoolResponse(True, 'kept')
+
+        rospy.Service('half_second', SetBool, half_a_second)
         data = userdata()
-        state = ServiceState('half_second', SetBool, SetBoolRequest(True), response_slots=['message'])
+        state = ServiceState('half_second', SetBool, SetBoolRequest(True), response_slots=['message'],
+                             preempt_timeout=30.0)
         run = InBackground(state, data)
-        time.sleep(0.2)
+        self.assertTrue(called.wait(30))
         state.request_preempt()
-        self.assertEqual(run.outcome(5.0), 'succeeded')
+        self.assertEqual(run.outcome(), 'succeeded')
         self.assertEqual(data.message, 'kept')
         self.assertTrue(state.preempt_requested())
 
@@ -167,11 +181,11 @@ class MonitorStateTest(unittest.TestCase):
     def test_preempt_is_never_lost(self):
         state = MonitorState(self.topic, Int32, lambda ud, message: True)
         state.request_preempt()
-        self.assertEqual(InBackground(state, userdata()).outcome(3.0), 'preempted')
+        self.assertEqual(InBackground(state, userdata()).outcome(), 'preempted')
         for _ in range(3):
             run = self.watch(state, userdata(), [1])
             state.request_preempt()
-            self.assertEqual(run.outcome(3.0), 'preempted')
+            self.assertEqual(run.outcome(), 'preempted')
             self.assertFalse(state.preempt_requested())
 
     def test_preempt_does_not_wait_for_a_slow_callback(self):
@@ -179,13 +193,13 @@ class MonitorStateTest(unittest.TestCase):
 
         def ponder(ud, message):
             busy.set()
-            return release.wait(20)
+            return release.wait(60)
 
         state = MonitorState(self.topic, Int32, ponder)
         run = self.watch(state, userdata(), [1])
-        self.assertTrue(busy.wait(5))
+        self.assertTrue(busy.wait(30))
         state.request_preempt()
-        self.assertEqual(run.outcome(3.0), 'preempted')
+        self.assertEqual(run.outcome(), 'preempted')
         release.set()
 
 
@@ -228,7 +242,7 @@ class ConditionStateTest(unittest.TestCase):
         run = InBackground(state, userdata())
         time.sleep(0.1)
         state.request_preempt()
-        self.assertEqual(run.outcome(3.0), 'preempted')
+        self.assertEqual(run.outcome(), 'preempted')
 
     def test_exception_surfaces(self):
         with self.assertRaisesRegex(smach.InvalidUserCodeError, 'ZeroDivisionError'):
