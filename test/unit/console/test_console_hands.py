@@ -55,7 +55,9 @@ def make_hands(monkeypatch):
     return make
 
 
-def drive(made, sent_s=0.0, browser=1, **more):
+def drive(made, sent_s=None, browser=1, **more):
+    """As a page says it; `sent_s` by its own clock, now where it is not told."""
+    sent_s = time.monotonic() if sent_s is None else sent_s
     return made.drive(Command(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), browser)
 
 

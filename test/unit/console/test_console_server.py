@@ -1,12 +1,13 @@
 """The console's web server attacked over real connections: hosts, origins, cookies, forged requests, roles, floods."""
 import asyncio
 import json
+import time
 
 import console_case
 import tornado.testing
 from console_case import TOKENS
 
-from smach_oracle.expert.console import handlers, page_socket
+from smach_oracle.expert.console import handlers, page_socket, server, sessions
 
 
 class TestRequests(console_case.ConsoleCase):
@@ -43,7 +44,15 @@ class TestRequests(console_case.ConsoleCase):
 
     def test_a_flood_of_requests_is_cut_off(self):
         self.gate.requests._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 3.0)
-        assert [self.ask('/').code for _ in range(4)] == [200, 200, 200, 429]
+        assert [self.ask('/session').code for _ in range(4)] == [200, 200, 200, 429]
+
+    def test_as_many_pages_as_one_browser_may_have_can_be_loaded_at_once(self):
+        files = 1 + sum(path.is_file() for path in server.STATIC.rglob('*'))
+        assert self.gate.files.take('10.0.0.1'), 'the first of them'
+        wanted = page_socket.MOST_OF_A_SESSION * files - 1
+        assert sum(self.gate.files.take('10.0.0.1') for _ in range(wanted)) == wanted
+        self.gate.requests._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 0.0)
+        assert [self.ask(path).code for path in ('/', '/static/app.css', '/session')] == [200, 200, 429]
 
 
 class TestSignIn(console_case.ConsoleCase):
@@ -101,6 +110,40 @@ class TestSignIn(console_case.ConsoleCase):
         assert json.loads(answer.body)['signed_in'] is False
         assert ('sign_out', True, 'viewer', '', None) in self.audit.told
         assert self.begin(Cookie=cookie)[1]['signed_in'] is False, 'a copy of its cookie is good for nothing'
+
+    def test_who_has_not_signed_in_cannot_flood_what_is_known_of_ended_sessions(self):
+        ended, said = self.sign_in('viewer')
+        self.ask('/session', 'DELETE', Cookie=ended, Origin=self.origin, X_Xsrf=said['xsrf'])
+        told, known = len(self.audit.told), len(self.gate._ended)
+        for _ in range(3):
+            cookie, said = self.begin()
+            assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=said['xsrf']).code == 200
+        assert (len(self.audit.told), len(self.gate._ended)) == (told, known)
+
+    def test_sessions_whose_cookie_is_too_old_anyway_are_forgotten(self):
+        self.gate._ended['long ago'] = time.monotonic() - 3600.0 * sessions.HOURS - 1.0
+        self.gate.end(sessions.Session('now', 'viewer'))
+        assert list(self.gate._ended) == ['now']
+
+    @tornado.testing.gen_test
+    async def test_a_page_whose_session_ends_while_it_connects_gets_nothing(self):
+        cookie, said = await self.signed('operator')
+        page = await self.connect(cookie)
+        self.gate.end(next(iter(self.office.open)).session)  # as between its handshake and its list of open pages
+        reply = await self.say(page, do='hello', xsrf=said['xsrf'], expert='ann')
+        assert reply is None or not reply['ok']
+        assert not self.office.sockets
+
+    @tornado.testing.gen_test
+    async def test_a_page_that_takes_its_time_to_go_commands_nothing_any_more(self):
+        page = await self.open_page(*await self.signed('operator'))
+        assert (await self.say(page, 9, do='claim', question='/robot q'))['ok']
+        self.office.close(next(iter(self.office.open)).session)
+        for number in range(3):  # before it has heard that it shall go
+            page.write_message(json.dumps({'id': number, 'do': 'claim', 'question': '/robot q'}))
+        while self.office.open:
+            await asyncio.sleep(0.01)
+        assert len(self.desk.done) == 1
 
     @tornado.testing.gen_test
     async def test_signing_out_closes_the_pages_of_that_browser_alone(self):

@@ -1,7 +1,7 @@
 """What the web server answers: the page, the session, the socket. Every request passes the same gate first."""
-import collections
 import json
-from typing import Any, Callable, Deque, Dict, NamedTuple, Optional
+import time
+from typing import Any, Callable, Dict, NamedTuple, Optional
 
 import tornado.web
 
@@ -21,7 +21,6 @@ HEADERS = {
     'Cross-Origin-Resource-Policy': 'same-origin', 'Cache-Control': 'no-cache',
     'Permissions-Policy': 'camera=(), microphone=(), geolocation=()'}
 LONGEST_BODY = 4096
-MOST_ENDED = 10000  # sessions
 
 
 class Gate:
@@ -33,8 +32,9 @@ class Gate:
         self.audit = audit
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = Buckets(rate=30.0, burst=150.0, for_all=5.0)
+        self.files = Buckets(rate=100.0, burst=1000.0, for_all=5.0)  # a page is some 45 of them; a browser may open many
         self.sign_ins = Buckets(rate=0.2, burst=5.0, for_all=4.0)
-        self._ended: Deque[str] = collections.deque(maxlen=MOST_ENDED)
+        self._ended: Dict[str, float] = {}  # id of a session -> when, s; of those whose cookie might still be good
 
     def session(self, handler: tornado.web.RequestHandler) -> Optional[Session]:
         """The session of a request's cookie; None where it has none of ours."""
@@ -43,10 +43,17 @@ class Gate:
 
     def end(self, session: Session) -> None:
         """Its cookie, of which somebody may have a copy, is good for nothing any more."""
-        self._ended.append(session.id)
+        now_s = time.monotonic()
+        self._ended = {id_: at_s for id_, at_s in self._ended.items() if now_s - at_s < 3600.0 * sessions.HOURS}
+        self._ended[session.id] = now_s
 
     def identity(self, session: Optional[Session]) -> Optional[Identity]:
-        """Who a session speaks for; None before signing in. Without tokens whoever gets here may do everything."""
+        """Who a session speaks for; None before signing in and after signing out.
+
+        Without tokens whoever gets here may do everything.
+        """
+        if session is not None and session.id in self._ended:
+            return None
         if self.settings.tokens is None:
             return Identity('teleoperator') if session else None
         return Identity(session.role, session.name) if session and session.role else None
@@ -164,7 +171,7 @@ class StaticFile(tornado.web.StaticFileHandler):
 
     def prepare(self) -> None:
         """Before anything else."""
-        status = self.gate.refusal(self)
+        status = self.gate.refusal(self, self.gate.files)
         if status:
             raise tornado.web.HTTPError(status)
 
@@ -203,10 +210,11 @@ class SessionHandler(Guarded):
     def delete(self) -> None:
         """Sign out: every page of this browser."""
         session = self.demand_xsrf(self.gate.session(self))
-        self.gate.end(session)
-        self._close(session)
-        self.gate.audit.tell(Person(self.request.remote_ip or '', session.short, session.role, session.name),
-                             'sign_out', True, '')
+        if session.role:  # who has not signed in has nothing to end, and fills neither memory nor audit
+            self.gate.end(session)
+            self._close(session)
+            self.gate.audit.tell(Person(self.request.remote_ip or '', session.short, session.role, session.name),
+                                 'sign_out', True, '')
         self._tell(self._begin(None))
 
     def _begin(self, identity: Optional[Identity]) -> Session:

@@ -123,7 +123,9 @@ class Socket(tornado.websocket.WebSocketHandler):
         self._office.hands.leave(self._number)
 
     async def on_message(self, message: Any) -> None:
-        """One command."""
+        """One command; none of a page that has been told to go, and takes its time."""
+        if self._gone:
+            return
         if not self._bucket(message).take():
             if not self._limits.unruly.take():
                 self.close(TOO_FAST, 'too many commands')
@@ -137,6 +139,10 @@ class Socket(tornado.websocket.WebSocketHandler):
         reply = await self._carry_out(command)
         if command.name != 'drive' or not reply.ok:
             self._reply(command.number, reply)
+
+    @property
+    def _gone(self) -> bool:
+        return self.ws_connection is None or self.ws_connection.is_closing()
 
     def _bucket(self, message: Any) -> Bucket:
         driving = isinstance(message, str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
@@ -167,7 +173,7 @@ class Socket(tornado.websocket.WebSocketHandler):
             return await loop.run_in_executor(self._office.workers, carry_out, command, person, self._number)
         finally:
             self._at_work -= 1
-            if self.ws_connection is None or self.ws_connection.is_closing():  # gone while the robot was asked
+            if self._gone:  # while the robot was asked
                 self._office.desk.leave(self._number)
                 self._office.hands.leave(self._number)
 

@@ -2,6 +2,7 @@
 
 const LONGEST_PAUSE_S = 4;
 const REQUEST_LIMIT_S = 20;
+const SIGNED_OUT = 4001; // as the server closes the sockets of a session that has ended
 
 export class Lost extends Error {}
 
@@ -35,11 +36,13 @@ export class Store {
   }
 }
 
-// `onState` is told: connecting, signed-out, connected, lost; with what the server says of the session.
+// `onState` is told: connecting, signed-out, connected, lost; with what the server says of the session. `onEnd`: that the
+// person has signed out on another page of this browser.
 export class Link {
-  constructor(store, onState) {
+  constructor(store, onState, onEnd) {
     this.store = store;
     this.onState = onState;
+    this.onEnd = onEnd;
     this.waiting = new Map();
     this.number = 0;
     this.pause = 0.3;
@@ -50,6 +53,7 @@ export class Link {
     // signed out: another page of this browser may have signed in meanwhile
     const hurry = () => { if (!this.connected && !document.hidden && (this.timer || this.signedOut)) this.connect(); };
     window.addEventListener('online', hurry);
+    window.addEventListener('focus', hurry);
     document.addEventListener('visibilitychange', hurry);
   }
 
@@ -83,10 +87,11 @@ export class Link {
     address.protocol = address.protocol.replace('http', 'ws');
     const socket = this.socket = new WebSocket(address);
     socket.onmessage = (event) => this.take(JSON.parse(event.data));
-    socket.onclose = () => {
+    socket.onclose = (event) => {
       if (generation !== this.generation) return;
       this.fail();
-      this.again();
+      if (event.code === SIGNED_OUT) this.onEnd();
+      else this.again();
     };
     socket.onopen = async () => {
       try {
@@ -149,10 +154,13 @@ export class Link {
     return answer.status;
   }
 
+  // Whether it could be done.
   async signOut() {
-    await this.fetch('session', { method: 'DELETE' });
-    this.fail();
-    this.connect();
+    this.generation += 1; // the socket may be closed before the answer is here
+    const answer = await this.fetch('session', { method: 'DELETE' }).catch(() => null);
+    if (answer && answer.ok) return true;
+    this.again();
+    return false;
   }
 
   // What this page alone may ask for. Where another page of this browser has begun a new session meanwhile (all of them share

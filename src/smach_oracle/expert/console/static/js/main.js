@@ -15,8 +15,9 @@ class App {
   constructor() {
     this.store = new Store();
     this.alerts = new Alerts();
-    this.link = new Link(this.store, (state, session) => this.onState(state, session));
+    this.link = new Link(this.store, (state, session) => this.onState(state, session), () => this.leave('You have signed out on another page of this browser.'));
     this.link.expert = remembered('expert', '');
+    this.note = takeNote();
     this.state = 'connecting';
     this.session = null;
     this.buildTop();
@@ -104,8 +105,9 @@ class App {
       const status = await this.link.signIn(token.value).catch(() => 0);
       setText(problem, { 0: 'The console does not answer.', 200: '', 401: 'There is no such token.',
         429: 'Too many tries; wait a little.' }[status] ?? 'Refused (' + status + ').');
-    } }, h('h1', {}, 'Sign in'), h('p', { class: 'dim' }, 'This console takes commands to robots. Its token is in the file that it was started with.'),
+    } }, h('h1', {}, 'Sign in'), this.note && h('p', { role: 'status' }, this.note), h('p', { class: 'dim' }, 'This console takes commands to robots. Its token is in the file that it was started with.'),
     h('label', { for: 'token' }, 'Token'), token, problem, h('button', { class: 'primary', id: 'sign-in' }, 'Sign in'));
+    this.note = null;
     replace(document.getElementById('main'), form);
     token.focus();
   }
@@ -124,11 +126,22 @@ class App {
         this.link.connect();
       } }, h('h2', {}, 'Your name'), h('p', { class: 'dim' }, fixed ? 'It goes with your token.' : 'As robots, other experts and the records of trials have it. Whoever has the same name is the same expert.'),
       name, h('p', { class: 'dim' }, 'Role: ' + this.role), h('div', { class: 'row' },
-        this.session.tokens && h('button', { type: 'button', onclick: () => { dialog.close(); this.link.signOut(); } }, 'Sign out'),
+        this.session.tokens && h('button', { type: 'button', onclick: () => { dialog.close(); this.signOut(); } }, 'Sign out'),
         h('span', { class: 'spacer' }), h('button', { class: 'primary', id: 'save-name' }, 'Done'))));
     document.body.append(dialog);
     dialog.showModal();
     name.select();
+  }
+
+  async signOut() {
+    if (await this.link.signOut()) this.leave('You have signed out.');
+    else this.say('The console does not answer: you are still signed in.', 'bad');
+  }
+
+  // Begin anew: nothing of what the person saw or typed stays on the page.
+  leave(why) {
+    leaveNote(why);
+    location.reload();
   }
 
   nextTheme() {
@@ -143,6 +156,19 @@ class App {
   }
 
   say(text, kind) { toast(text, kind); }
+}
+
+// What the page says of itself after it has begun anew.
+function leaveNote(text) {
+  try { sessionStorage.setItem('note', text); } catch (err) { /* it may be refused; a comfort only */ }
+}
+
+function takeNote() {
+  try {
+    const text = sessionStorage.getItem('note');
+    sessionStorage.removeItem('note');
+    return text;
+  } catch (err) { return null; }
 }
 
 const app = new App();
