@@ -2,14 +2,15 @@
 import io
 import json
 import math
-import threading
 import time
+from functools import partial
 
 import pytest
 from expert_fixtures import make_question
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
+from typist import CTRL_C, CTRL_D, CTRL_U, ENTER, typist
 
 import rospy
 from smach_oracle.expert import terminal
@@ -22,7 +23,7 @@ from smach_oracle.oracle.question import InterfaceOffer
 from smach_oracle.ros.question_messages import to_goal
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
 
-ENTER, CTRL_C, CTRL_D = '\r', '\x03', '\x04'
+ASKS, WAITING = '/robot asks about PICK_AND_PLACE', 'No open questions; waiting.'
 
 
 class FakeFrontEnd:
@@ -121,13 +122,10 @@ def goal(query_id='q1', **changes):
     return to_goal(make_question(query_id, **changes), '/robot', rospy.Time(1))
 
 
-def converse(front_end, typed, meanwhile=None, steps=FakeSteps, after_s=0.8):
+def converse(front_end, typed, *script, steps=FakeSteps):
     """Type all that into a terminal; what it has shown when it ends."""
     console = Console(file=io.StringIO(), width=100)
-    with create_pipe_input() as keys:
-        keys.send_text(typed)
-        if meanwhile is not None:
-            threading.Timer(after_s, meanwhile, [keys]).start()
+    with typist(console.file.getvalue, typed, script) as keys:
         Terminal(front_end, console, Prompts(keys, DummyOutput()), steps, standing=FakeStanding).run()
     return console.file.getvalue()
 
@@ -146,8 +144,8 @@ def test_an_answer_by_number_is_sent_with_its_reason_and_what_followed_is_told()
     decision, = front_end.decisions
     assert (decision.kind, decision.state, decision.why) == (ExpertDecision.GOTO, 'DETECT', 'seen on the camera')
     assert front_end.claims[0] == ('q1', False) and front_end.stopped
-    for part in ('/robot asks about PICK_AND_PLACE', '✓ The robot has your answer.', 'The machine goes to DETECT.',
-                 'DETECT runs.', 'No open questions; waiting.'):
+    for part in (ASKS, '✓ The robot has your answer.', 'The machine goes to DETECT.',
+                 'DETECT runs.', WAITING):
         assert part in shown
 
 
@@ -197,11 +195,7 @@ def test_ctrl_c_after_an_answer_does_not_call_it_unsent():
 def test_a_question_that_cannot_be_claimed_yet_is_shown_once_and_claimed_later():
     front_end = FakeFrontEnd(goal())
     front_end.unreachable = 3
-
-    def answer_late(keys):
-        keys.send_text(ENTER.join(['1', '', 'q', '']))
-
-    shown = converse(front_end, '', answer_late, after_s=2.5)
+    shown = converse(front_end, '', (lambda: not front_end.unreachable, ENTER.join(['1', '', 'q', ''])))
     assert shown.count('unable to contact master') == 1
     assert shown.count('/robot asks about PICK_AND_PLACE') == 1
     assert front_end.unreachable == 0 and len(front_end.decisions) == 1
@@ -210,11 +204,10 @@ def test_a_question_that_cannot_be_claimed_yet_is_shown_once_and_claimed_later()
 def test_a_question_settled_elsewhere_ends_the_typing():
     front_end = FakeFrontEnd(goal())
 
-    def bob_answers(keys):
+    def bob_answers():
         front_end.settled[front_end.listed[0].key] = 'bob was first: go to PICK'
-        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
 
-    shown = converse(front_end, 'goto DET', bob_answers)
+    shown = converse(front_end, 'goto DET', (ASKS, bob_answers), (WAITING, CTRL_U + 'q' + ENTER))
     assert 'bob was first: go to PICK' in shown and not front_end.decisions
     assert 'No open questions; waiting.' in shown
 
@@ -223,24 +216,20 @@ def test_a_robot_that_dies_is_waited_for_only_so_long(monkeypatch):
     monkeypatch.setattr(terminal, '_RETURN_S', 1.0)
     front_end = FakeFrontEnd(goal())
 
-    def robot_dies(keys):
+    def robot_dies():
         front_end.alive = False
-        threading.Timer(2.5, keys.send_text, ['q' + ENTER]).start()
 
-    shown = converse(front_end, '', robot_dies)
+    shown = converse(front_end, '', (ASKS, robot_dies), (WAITING, 'q' + ENTER))
     assert '/robot/expert_query is gone.' in shown
     assert shown.index('is gone.') < shown.index('No open questions; waiting.')
 
 
 def test_a_question_taken_over_by_another_is_told_and_can_be_taken_back():
     front_end = FakeFrontEnd(goal())
-
-    def bob_takes_over(keys):
-        front_end.hold('bob')
-        threading.Timer(1.0, keys.send_text, [ENTER.join(['1', 't', '1', '', 'q', ''])]).start()
-
-    shown = converse(front_end, '', bob_takes_over)
-    assert 'bob has taken this question over.' in shown
+    taken = 'bob has taken this question over.'
+    shown = converse(front_end, '', (ASKS, lambda: front_end.hold('bob')),
+                     (taken, ENTER.join(['1', 't', '1', '', 'q', ''])))
+    assert taken in shown
     assert 'bob works on this question; t takes it over.' in shown
     assert front_end.claims[-1] == ('q1', True) and len(front_end.decisions) == 1
 
@@ -262,12 +251,11 @@ def test_a_question_left_to_others_is_offered_again_but_not_opened_by_itself():
 def test_a_question_that_comes_while_waiting_is_shown_at_once():
     front_end = FakeFrontEnd()
 
-    def arrives(keys):
+    def arrives():
         front_end.listed = FakeFrontEnd(goal()).listed
-        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
 
-    shown = converse(front_end, '', arrives, after_s=1.6)
-    assert shown.index('No open questions') < shown.index('/robot asks about PICK_AND_PLACE')
+    shown = converse(front_end, '', (WAITING, arrives), (ASKS, 'q' + ENTER))
+    assert shown.index(WAITING) < shown.index(ASKS)
 
 
 def test_a_robot_without_events_is_said_to_be_silent():
@@ -339,21 +327,22 @@ class WithAnInterface(FakeFrontEnd):
     """Its question's interface runs once it was chosen."""
 
     running = None
+    seen_running = False
 
     def find(self, key):
         if self.running is not None and key in self.settled:
+            self.seen_running = True
             return self.running._replace(status=OpenQuery.INTERFACE_RUNNING)
         return super().find(key)
 
 
-def talk(typed, meanwhile=None):
+def talk(typed, *script):
     front_end = WithAnInterface(goal(interfaces=(InterfaceOffer('assist', '/assist'),)))
     interface = FakeInterface(front_end)
     console = Console(file=io.StringIO(), width=100)
-    with create_pipe_input() as keys:
-        keys.send_text(ENTER.join(typed))
-        if meanwhile is not None:
-            threading.Timer(1.5, meanwhile, [front_end, keys]).start()
+    with typist(console.file.getvalue, ENTER.join(typed),
+                [(partial(awaited, front_end) if callable(awaited) else awaited,
+                  partial(then, front_end) if callable(then) else then) for awaited, then in script]) as keys:
         Terminal(front_end, console, Prompts(keys, DummyOutput()), FakeSteps, interface).run()
     return front_end, interface, console.file.getvalue()
 
@@ -373,9 +362,9 @@ def test_an_interface_is_given_up():
 
 
 def test_an_interface_that_ends_by_itself_ends_the_conversation_with_what_it_said_last():
-    def end(front_end, keys):
+    def end(front_end):
         front_end.running = None
-        threading.Timer(1.0, keys.send_text, ['q' + ENTER]).start()
-    _, interface, shown = talk(['i1', '', ''], end)
+    ended = 'The interface has ended.'
+    _, interface, shown = talk(['i1', '', ''], (lambda front_end: front_end.seen_running, end), (ended, 'q' + ENTER))
     assert interface.done == ['stopped']
-    assert 'Now do the work of PICK' in shown and 'The interface has ended.' in shown
+    assert 'Now do the work of PICK' in shown and ended in shown
