@@ -57,7 +57,7 @@ class Asked(threading.Thread):
         assert threading.current_thread() is self, 'progress is told in the asking thread'
         self.progress.append(what)
 
-    def wait(self, timeout_s=10.0):
+    def wait(self, timeout_s=40.0):
         """Whether ask() has returned within the time."""
         self.join(timeout_s)
         return not self.is_alive()

@@ -100,7 +100,7 @@ class TestExpertProtocol(unittest.TestCase):
         for thread in threads:
             thread.start()
         for thread in threads:
-            thread.join(10.0)
+            thread.join(30.0)
         self.assertTrue(asked.wait())
         winner, = [name for name, response in responses.items() if response.ok]
         loser, = [name for name, response in responses.items() if not response.ok]
@@ -127,13 +127,16 @@ class TestExpertProtocol(unittest.TestCase):
         return self.bob.claim(listed)
 
     def test_a_claim_stays_alive_while_a_person_thinks(self):
-        slow = FrontEnd('slow', [SERVER], lease_s=0.6)
+        lease_s = 2.0
+        slow = FrontEnd('slow', [SERVER], lease_s=lease_s)
         self.addCleanup(slow.stop)
         _, listed = self.ask()
         self.assertTrue(wait_for(lambda: slow.find(listed.key)))
         self.assertTrue(slow.claim(listed).ok)
-        time.sleep(1.5)
-        self.assertEqual(self.listed(self.ann).holder, 'slow')
+        begun_s = time.monotonic()
+        while time.monotonic() < begun_s + 2.0 * lease_s:
+            self.assertEqual(self.listed(self.ann).holder, 'slow')
+            time.sleep(0.05)
 
     def test_nobody_answers_by_the_deadline(self):
         begun_s = time.monotonic()
@@ -182,9 +185,9 @@ class TestExpertProtocol(unittest.TestCase):
     def test_the_open_list_is_published_while_a_question_waits(self):
         self.ask()
         version = self.ann.wait_for_change(-1, 0.0)
-        later = [self.ann.wait_for_change(version, 2.5)]
-        later.append(self.ann.wait_for_change(later[0], 2.5))
-        self.assertEqual(later, [version + 1, version + 2])
+        for _ in range(2):
+            before, version = version, self.ann.wait_for_change(version, 30.0)
+            self.assertGreater(version, before)
 
     def test_the_front_end_of_the_documentation_answers(self):
         with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'expert.md')) as page:
@@ -196,14 +199,14 @@ class TestExpertProtocol(unittest.TestCase):
         self.addCleanup(process.kill)
         process.stdin.write(b'DETECT\n')
         process.stdin.close()
-        self.assertTrue(asked.wait(20.0))
+        self.assertTrue(asked.wait(60.0))
         self.assertEqual((asked.answer.state, asked.answer.by), ('DETECT', 'ann'))
 
     def test_a_front_end_that_starts_late_sees_the_open_questions(self):
         _, listed = self.ask()
         late = FrontEnd('late')
         self.addCleanup(late.stop)
-        self.assertEqual(wait_for_question(late, 5.0).key, listed.key)
+        self.assertEqual(wait_for_question(late, 30.0).key, listed.key)
 
 
 if __name__ == '__main__':
