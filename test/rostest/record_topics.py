@@ -19,7 +19,7 @@ from smach_oracle.msg import OracleEvent, OracleRates, RecorderStatus
 from smach_oracle.oracle.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
 
-WAIT_S = 20.0
+WAIT_S = 40.0
 
 
 def wait_for(condition: Callable[[], Any], what: str) -> None:
@@ -170,7 +170,8 @@ class RecordTopics(unittest.TestCase):
                 done.set()
 
         rospy.Subscriber('/record_topics/oracle/events', OracleEvent, receive)
-        subprocess.run(['rosbag', 'play', '-q', '-d', '1', path], check=True, timeout=WAIT_S)
+        subprocess.run(['rosbag', 'play', '-q', '--wait-for-subscribers', path, '--topics',
+                        '/record_topics/oracle/events'], check=True, timeout=WAIT_S)
         self.assertTrue(done.wait(WAIT_S))
         self.assertEqual(played, list(range(22)))
 
