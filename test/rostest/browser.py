@@ -8,7 +8,9 @@ import tempfile
 import time
 
 from selenium import webdriver
-from selenium.common.exceptions import StaleElementReferenceException, WebDriverException
+from selenium.common.exceptions import (
+    ElementClickInterceptedException, ElementNotInteractableException, StaleElementReferenceException,
+    WebDriverException)
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
@@ -18,6 +20,8 @@ from waiting import wait_for
 FLAGS = ['--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run', '--disable-background-networking',
          '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage', '--disable-extensions',
          '--mute-audio', '--disable-background-timer-throttling']
+# what is about to be replaced, moved, or uncovered
+NOT_YET = (StaleElementReferenceException, ElementClickInterceptedException, ElementNotInteractableException)
 
 
 class Browser:
@@ -53,7 +57,7 @@ class Browser:
         return found
 
     def click(self, selector, limit_s=40.0):
-        """Click what is there, shown and enabled; the page may replace it in between."""
+        """Click what is there, shown and enabled; the page may replace, move or cover it in between."""
         def clicked():
             try:
                 element = self._shown(selector)
@@ -61,7 +65,7 @@ class Browser:
                     return False
                 element.click()
                 return True
-            except StaleElementReferenceException:
+            except NOT_YET:
                 return False
         if not wait_for(clicked, limit_s):
             raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000]))

@@ -16,12 +16,14 @@ from roslib.packages import find_node
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.msg import ConsoleCommand, OpenQueries  # noqa: E402
+from smach_oracle.msg import ConsoleCommand, ExpertDecision, OpenQueries  # noqa: E402
 from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
+from smach_oracle.srv import AnswerQuery  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
     from browser import Browser  # noqa: E402
+    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 ROBOTS = 10
 LEASE_S = 15.0
 ROW = '.question-row[data-key^="/robot_{}/"]'
@@ -93,14 +95,56 @@ class Fleet(unittest.TestCase):
         browser.click('#save-name')
         self.assertTrue(browser.says(name, '#person'))
 
-    def test_1_ten_robots_ask_one_console_and_each_gets_its_own_answer(self):
+    def answer_elsewhere(self, *numbers):
+        """As any other front end does."""
+        before = int(self.browser.text('#tab-questions .badge'))
+        for number in numbers:
+            rospy.ServiceProxy('/robot_{}/expert_query/answer'.format(number), AnswerQuery)(
+                self.open[number][0].query.query_id,
+                ExpertDecision(kind=ExpertDecision.GOTO, state='PLAN_{}'.format(number), by='somebody'))
+        self.assertTrue(self.browser.says(str(before - len(numbers)), '#tab-questions .badge'), 'the page knows')
+
+    def hold(self, selector):
+        """Press the mouse on it."""
+        ActionChains(self.browser.driver, duration=0).click_and_hold(self.browser.find(selector)).perform()
+
+    def let_go(self):
+        ActionChains(self.browser.driver, duration=0).release().perform()
+
+    def test_1_what_is_pressed_or_focused_stays_while_the_questions_of_others_go(self):
         browser = self.browser
         for number in range(ROBOTS):
             browser.find(ROW.format(number), 60.0)
         self.assertTrue(browser.driver.title.startswith('(10)'))
-        self.assertEqual(browser.text('#tab-questions .badge'), '10')
+        self.assertTrue(browser.says('10', '#tab-questions .badge'))
         self.name_oneself('ann')
-        for number in (3, 0, 7, 1, 6, 2, 5, 4):  # not as they have asked
+        self.assertTrue(wait_for(lambda: len(self.open) == ROBOTS))
+        self.hold(ROW.format(5))
+        self.answer_elsewhere(0)
+        self.let_go()
+        self.assertTrue(browser.says('/robot_5 · JOB', '.detail-head'), 'the list does not move under the mouse')
+        self.assertTrue(wait_for(lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(0))))
+        self.assertTrue(browser.says(YOURS))
+        browser.run('document.querySelector(arguments[0]).focus()', ROW.format(6))
+        self.answer_elsewhere(1)
+        self.assertTrue(wait_for(lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(1))))
+        self.assertEqual(browser.run('return document.activeElement.dataset.key.split("/")[1]'), 'robot_6')
+        browser.click('#tab-machines')
+        self.assertTrue(wait_for(lambda: len(browser.run(
+            'return [...document.querySelectorAll(".picker .path")].map((each) => each.title)')) == ROBOTS))
+        named = browser.text('.picker .group:nth-child(8) .robot')
+        self.hold('.picker .group:nth-child(8) .path')
+        self.answer_elsewhere(2)
+        self.assertTrue(wait_for(lambda: rospy.get_param('/robot_2/ended', False)))
+        self.let_go()
+        self.assertTrue(browser.says(named, '.machine-card .head'), 'neither does the tree of machines')
+        browser.click('#tab-questions')
+        self.assertEqual(browser.errors(), [])
+
+    def test_2_ten_robots_ask_one_console_and_each_gets_its_own_answer(self):
+        browser = self.browser
+        by_console = (3, 7, 5, 6, 4)  # not as they have asked
+        for number in by_console:
             browser.click(ROW.format(number))
             self.assertTrue(browser.says('/robot_{} · JOB'.format(number), '.detail-head'))
             self.assertIn('RuntimeError: /robot_{} is stuck'.format(number), browser.text('.failure .text'))
@@ -113,11 +157,11 @@ class Fleet(unittest.TestCase):
         self.assertEqual([self.went(number) for number in range(8)], [[number] for number in range(8)],
                          'each went where it was sent')
         self.assertEqual([self.went(number) for number in (8, 9)], [[], []], 'nobody else did')
-        self.assertEqual([(told[2]) for told in self.first.told() if told[0] == 'answer' and told[3]],
-                         ['/robot_{}'.format(each) for each in (3, 0, 7, 1, 6, 2, 5, 4)])
-        self.assertEqual(browser.text('#tab-questions .badge'), '2')
+        self.assertTrue(wait_for(lambda: [told[2] for told in self.first.told() if told[0] == 'answer' and told[3]] ==
+                                 ['/robot_{}'.format(each) for each in by_console]), self.first.told())
+        self.assertTrue(browser.says('2', '#tab-questions .badge'))
 
-    def test_2_two_consoles_on_one_robot_take_over_is_explicit_and_logged(self):
+    def test_3_two_consoles_on_one_robot_take_over_is_explicit_and_logged(self):
         browser = self.browser
         browser.click(ROW.format(9))
         self.assertTrue(browser.says(YOURS))
@@ -138,10 +182,10 @@ class Fleet(unittest.TestCase):
         self.assertFalse(browser.find('.choice.goto').is_enabled(), 'it is hers no longer')
         self.assertTrue(wait_for(lambda: ('take_over', 'bob') in [(told.command, told.expert)
                                                                   for told in self.audited]), 'for the bag')
-        self.assertIn(('take_over', 'bob', '/robot_9', True), self.second.told())
+        self.assertTrue(wait_for(lambda: ('take_over', 'bob', '/robot_9', True) in self.second.told()))
         self.assertNotIn('take_over', [told[0] for told in self.first.told()])
 
-    def test_3_a_console_that_dies_loses_its_claim_with_the_lease(self):
+    def test_4_a_console_that_dies_loses_its_claim_with_the_lease(self):
         browser = self.browser
         browser.driver.switch_to.window(browser.driver.window_handles[0])
         browser.click(ROW.format(8))
@@ -161,7 +205,8 @@ class Fleet(unittest.TestCase):
         self.assertTrue(browser.says(YOURS), 'without taking anything over')
         browser.click('.choice.goto[data-name=PLAN_8]')
         self.assertTrue(wait_for(lambda: self.went(8) == [8]))
-        self.assertEqual([told[1] for told in self.second.told() if told[0] == 'answer' and told[3]], ['bob', 'bob'])
+        self.assertTrue(wait_for(lambda: [told[1] for told in self.second.told() if told[0] == 'answer' and told[3]] ==
+                                 ['bob', 'bob']), self.second.told())
         self.assertEqual(browser.errors(), [])
 
 

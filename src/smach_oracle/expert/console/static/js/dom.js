@@ -11,7 +11,8 @@ function clean(text) {
 function fill(element, properties, children) {
   for (const [name, value] of Object.entries(properties || {})) {
     if (value === null || value === undefined || (value === false && !name.startsWith('aria-'))) continue;
-    if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
+    if (name === 'key') element.key = value;
+    else if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
     else if (name.startsWith('--')) element.style.setProperty(name, value);
     else element.setAttribute(name, value === true && !name.startsWith('aria-') ? '' : clean(value)); // aria says true and false
   }
@@ -19,14 +20,16 @@ function fill(element, properties, children) {
   return element;
 }
 
-function append(element, children) {
-  for (const child of children.flat(Infinity)) {
-    if (child === null || child === undefined || child === false) continue;
-    element.append(child instanceof Node ? child : clean(child));
-  }
+function nodesOf(children) {
+  return children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false)
+    .map((child) => (child instanceof Node ? child : document.createTextNode(clean(child))));
 }
 
-// h('button', {class: 'x', onclick: f, '--hue': 3}, 'text', other elements)
+function append(element, children) {
+  for (const node of nodesOf(children)) element.append(node);
+}
+
+// h('button', {class: 'x', onclick: f, '--hue': 3}, 'text', other elements); `key`: which one it is, for redraw
 export function h(tag, properties, ...children) {
   return fill(document.createElement(tag), properties, children);
 }
@@ -40,6 +43,82 @@ export function replace(element, ...children) {
   append(element, children);
   return element;
 }
+
+// The element's children are these, in this order. Those that stay are not taken out, not even for a moment: that would cost
+// them focus and scroll position, and the click that has begun on them.
+export function arrange(element, ...children) {
+  whenLetGo(element, () => put(element, nodesOf(children)));
+}
+
+// As if the element's children were replaced by these, which were made anew; but those that are there become like them, each
+// like the one of its kind and `key`. They keep their listeners, which therefore go by the key alone.
+export function redraw(element, ...children) {
+  whenLetGo(element, () => {
+    const before = new Map();
+    for (const node of element.childNodes) {
+      if (!before.has(nameOf(node))) before.set(nameOf(node), []);
+      before.get(nameOf(node)).push(node);
+    }
+    put(element, nodesOf(children).map((node) => alike((before.get(nameOf(node)) || []).shift(), node)));
+  });
+}
+
+function put(element, nodes) {
+  const wanted = new Set(nodes);
+  for (const node of [...element.childNodes]) if (!wanted.has(node)) node.remove();
+  let at = element.firstChild;
+  for (const node of wanted) {
+    if (node === at) at = at.nextSibling;
+    else element.insertBefore(node, at);
+  }
+}
+
+function nameOf(node) { return node.nodeName + ' ' + (node.key === undefined ? '' : node.key); }
+
+function alike(old, fresh) {
+  if (!old) return fresh;
+  if (old.nodeType === Node.TEXT_NODE) {
+    if (old.data !== fresh.data) old.data = fresh.data;
+    return old;
+  }
+  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name) && name !== 'open') old.removeAttribute(name); // what a person has opened stays so
+  for (const { name, value } of fresh.attributes) {
+    if (old.getAttribute(name) === value) continue;
+    if (name === 'style') old.style.cssText = value; // the page's policy allows no other way
+    else old.setAttribute(name, value);
+  }
+  redraw(old, [...fresh.childNodes]);
+  return old;
+}
+
+// What is pressed stays under the pointer until it is let go: around it nothing comes or goes meanwhile.
+const CLICK_MS = 100; // by then the click of what was let go has come
+const PRESSED = 'button, summary, [role="button"], .mark';
+const waiting = new Map(); // element -> its newest change
+let pressed = null;
+let timer = 0;
+
+function whenLetGo(element, change) {
+  waiting.delete(element);
+  if (pressed && element.contains(pressed)) waiting.set(element, change);
+  else change();
+}
+
+function letGo() {
+  clearTimeout(timer);
+  pressed = null;
+  const changes = [...waiting.values()];
+  waiting.clear();
+  for (const change of changes) change();
+}
+
+window.addEventListener('pointerdown', (event) => {
+  letGo();
+  pressed = event.button || !(event.target instanceof Element) ? null : event.target.closest(PRESSED);
+}, true);
+window.addEventListener('click', letGo, true);
+for (const type of ['pointerup', 'pointercancel']) window.addEventListener(type, () => { timer = setTimeout(letGo, CLICK_MS); }, true);
+window.addEventListener('blur', letGo);
 
 // Change an element only where its content differs, so that selections and scroll positions stay.
 export function setText(element, text) {

@@ -1,7 +1,7 @@
 // Driving a robot's hand: hold to move, let go to stop. The server relays what is fresh only, and the robot has a watchdog.
 import { CameraView } from './camera_view.js';
 import { remember, remembered } from './alerts.js';
-import { h, replace, setText } from './dom.js';
+import { h, redraw, replace, setText } from './dom.js';
 import { DriveInput, KEYS, MOVES } from './drive_input.js';
 import { Lost } from './link.js';
 
@@ -110,7 +110,7 @@ export class HandPanel {
     if (key === this.armsKey) return;
     this.armsKey = key;
     this.arms.hidden = arms.length < 2;
-    replace(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { class: 'tool', 'data-arm': arm, 'aria-pressed': String(arm === now), onclick: () => this.chooseArm(arm) }, arm)));
+    redraw(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { key: arm, class: 'tool', 'data-arm': arm, 'aria-pressed': String(arm === now), onclick: () => this.chooseArm(arm) }, arm)));
   }
 
   showScale() {
@@ -176,7 +176,7 @@ export class HandPanel {
     const key = JSON.stringify(facts);
     if (key === this.factsKey) return;
     this.factsKey = key;
-    replace(this.facts, facts.map(([name, value]) => [h('dt', {}, name), h('dd', { class: 'number', 'data-fact': name.toLowerCase() }, value)]));
+    redraw(this.facts, facts.map(([name, value]) => [h('dt', {}, name), h('dd', { class: 'number', 'data-fact': name.toLowerCase() }, value)]));
   }
 
   // The first colour image that there is, unless another one is chosen.

@@ -1,5 +1,5 @@
 // Joint states: a table, and the chosen ones over the last minute.
-import { h, replace, setText } from './dom.js';
+import { arrange, h, replace, setText } from './dom.js';
 import { FrameFeed, numberOf } from './frame_feed.js';
 
 const SPAN_S = 60;
@@ -58,7 +58,7 @@ export class JointsView {
       this.rows.set(name, { cells, button, root: h('tr', {}, h('th', { scope: 'row' }, button), cells) });
       if (!this.chosen.length) this.toggle(name);
     }
-    replace(this.body, [...this.rows.values()].map((row) => row.root));
+    arrange(this.body, [...this.rows.values()].map((row) => row.root));
   }
 
   toggle(name) {

@@ -1,5 +1,5 @@
 // All containers of all robots: one of them drawn, live.
-import { h, replace, setText } from './dom.js';
+import { arrange, h, redraw, replace, setText } from './dom.js';
 import { Graph } from './graph.js';
 import { StateList } from './state_list.js';
 import { remember, remembered } from './alerts.js';
@@ -106,7 +106,7 @@ class Machines {
     }
     const paths = this.paths(this.robot);
     if (!paths.includes(this.path)) this.path = paths[0] || '';
-    replace(this.root, robots.length ? [this.picker, this.body] : this.empty);
+    arrange(this.root, robots.length ? [this.picker, this.body] : this.empty);
     this.fillPicker(robots);
     setText(this.title, this.path || this.robot);
     const live = this.live(this.robot);
@@ -128,10 +128,10 @@ class Machines {
     const key = JSON.stringify(shown);
     if (key === this.pickerKey) return;
     this.pickerKey = key;
-    replace(this.picker, shown.map(([robot, alive, paths]) => h('div', { class: 'group' },
+    redraw(this.picker, shown.map(([robot, alive, paths]) => h('div', { key: robot, class: 'group' },
       h('div', { class: 'robot' + (alive ? '' : ' gone') }, h('span', { class: 'dot' }), robot),
       paths.map(([path, failed, active, current]) => h('button', {
-        class: 'path' + (active ? ' active' : '') + (failed ? ' failed' : ''), role: 'treeitem', 'aria-selected': current,
+        key: path, class: 'path' + (active ? ' active' : '') + (failed ? ' failed' : ''), role: 'treeitem', 'aria-selected': current,
         '--depth': path.split('/').length - 1, onclick: () => this.open(robot, path), title: path }, path.split('/').pop())))));
   }
 }

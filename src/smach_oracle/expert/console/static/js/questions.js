@@ -1,5 +1,5 @@
 // The queue of all robots' open questions, and the one that is worked on.
-import { h, replace, setText, typing } from './dom.js';
+import { h, redraw, replace, setText, typing } from './dom.js';
 import { breakable, chip, duration, percent, rateBar } from './format.js';
 import { Detail } from './question_detail.js';
 
@@ -9,7 +9,6 @@ class Questions {
   constructor(app) {
     this.app = app;
     this.detail = null;
-    this.rows = new Map();
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
@@ -27,7 +26,7 @@ class Questions {
   connected() { if (this.detail) this.detail.connected(); }
 
   tick() {
-    for (const question of this.open) this.showTimes(question);
+    this.showQueue();
     if (this.detail) this.detail.tick();
   }
 
@@ -46,46 +45,24 @@ class Questions {
 
   showQueue() {
     const open = this.open;
-    const keys = new Set(open.map((each) => each.key));
-    for (const key of [...this.rows.keys()]) if (!keys.has(key)) this.rows.delete(key);
-    for (const question of open) {
-      const shown = JSON.stringify([question, this.detail && this.detail.key === question.key, this.app.expert]);
-      const row = this.rows.get(question.key);
-      if (!row || row.shown !== shown) this.rows.set(question.key, Object.assign(this.row(question), { shown }));
-    }
-    const order = open.map((each) => this.rows.get(each.key).root);
-    if (!order.length) {
-      replace(this.queue, h('p', { class: 'empty' }, 'No open questions.'));
-    } else if (order.length !== this.queue.children.length || order.some((root, index) => this.queue.children[index] !== root)) {
-      const focused = document.activeElement && document.activeElement.dataset.key;
-      replace(this.queue, order);
-      const again = focused && this.rows.get(focused);
-      if (again) again.root.focus();
-    }
-    for (const question of open) this.showTimes(question);
+    redraw(this.queue, open.length ? open.map((question) => this.row(question)) : h('p', { class: 'empty' }, 'No open questions.'));
   }
 
   row(question) {
-    const age = h('span', { class: 'dim' });
-    const left = h('span', { class: 'left' });
-    const mine = question.holder && question.holder === this.app.expert;
+    const { key, holder } = question;
+    const mine = holder && holder === this.app.expert;
     const who = question.status === 'interface' ? chip(question.interface + ' runs', 'accent', 'The interface that somebody started for it')
-      : question.holder ? chip(mine ? 'yours' : question.holder, mine ? 'good' : 'warn') : chip('waiting', 'bad');
-    const root = h('button', { class: 'question-row ' + question.status, 'data-key': question.key, 'aria-current': Boolean(this.detail && this.detail.key === question.key), onclick: () => this.choose(question.key) },
+      : holder ? chip(mine ? 'yours' : holder, mine ? 'good' : 'warn') : chip('waiting', 'bad');
+    return h('button', { key, class: 'question-row ' + question.status, 'data-key': key, 'aria-current': Boolean(this.detail && this.detail.key === key), onclick: () => this.choose(key) },
       h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(question.state, '_')), h('span', { class: 'spacer' }), who),
       h('span', { class: 'row dim' }, h('span', { class: 'where' }, question.robot + ' · ' + question.path), h('span', { class: 'spacer' }), h('span', { title: 'How often it fails, as learned' }, rateBar(question.rate, undefined, percent(question.rate) + ' fail'))),
-      h('span', { class: 'row' }, age, h('span', { class: 'spacer' }), left));
-    return { root, age, left };
+      this.times(question));
   }
 
-  showTimes(question) {
-    const row = this.rows.get(question.key);
-    if (!row) return;
+  times({ asked, deadline }) {
     const now = this.app.store.now();
-    setText(row.age, 'asked ' + duration(now - question.asked) + ' ago');
-    if (question.deadline === null) return;
-    setText(row.left, duration(question.deadline - now) + ' left');
-    row.left.classList.toggle('urgent', question.deadline - now < 20);
+    return h('span', { class: 'row' }, h('span', { class: 'dim' }, 'asked ' + duration(now - asked) + ' ago'), h('span', { class: 'spacer' }),
+      deadline !== null && h('span', { class: 'left' + (deadline - now < 20 ? ' urgent' : '') }, duration(deadline - now) + ' left'));
   }
 
   choose(key) {

@@ -1,5 +1,5 @@
 // Trials of bags: what the console has read of them, and one that is opened. A bag is known by the console's number alone.
-import { h, replace } from './dom.js';
+import { h, redraw } from './dom.js';
 
 export class Recorded {
   // `onOpen()`: what was opened is there, or cannot be had
@@ -25,7 +25,7 @@ export class Recorded {
     this.root.hidden = !this.says;
     if (!this.says) return;
     const { note, broken, waiting } = this.section;
-    replace(this.root, waiting > 0 && h('p', { class: 'dim', role: 'status' }, 'Reading bags: ' + waiting + (waiting === 1 ? ' is' : ' are') + ' still to be read.'),
+    redraw(this.root, waiting > 0 && h('p', { class: 'dim', role: 'status' }, 'Reading bags: ' + waiting + (waiting === 1 ? ' is' : ' are') + ' still to be read.'),
       note && h('p', { class: 'dim' }, note), broken.length > 0 && h('details', { class: 'broken-bags' },
         h('summary', {}, broken.length + (broken.length === 1 ? ' bag' : ' bags') + ' could not be read'),
         h('ul', {}, broken.map((bag) => h('li', {}, h('strong', {}, bag.name), ': ', bag.reason)))));

@@ -2,7 +2,7 @@
 import { remember, remembered } from './alerts.js';
 import { CameraView } from './camera_view.js';
 import { CloudView, RobotView } from './cloud_view.js';
-import { h, replace } from './dom.js';
+import { arrange, h, redraw } from './dom.js';
 import { breakable } from './format.js';
 import { JointsView } from './joints_view.js';
 
@@ -34,15 +34,15 @@ class Sensors {
     const shape = JSON.stringify([known, this.wanted]);
     if (shape === this.shape) return;
     this.shape = shape;
-    replace(this.list, known.length ? Object.keys(TITLES).map((kind) => this.group(kind, known.filter((each) => each.kind === kind)))
+    redraw(this.list, known.length ? Object.keys(TITLES).map((kind) => this.group(kind, known.filter((each) => each.kind === kind)))
       : h('p', { class: 'dim' }, 'No sensors yet.'));
     for (const sensor of known) if (this.wanted.includes(nameOf(sensor)) && !this.views.has(nameOf(sensor))) this.open(sensor);
     this.showStage();
   }
 
   group(kind, found) {
-    return found.length > 0 && h('div', { class: 'group' }, h('span', { class: 'robot' }, TITLES[kind]), found.map((sensor) =>
-      h('button', { class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': String(this.wanted.includes(nameOf(sensor))), onclick: () => this.toggle(sensor) },
+    return found.length > 0 && h('div', { key: kind, class: 'group' }, h('span', { class: 'robot' }, TITLES[kind]), found.map((sensor) =>
+      h('button', { key: nameOf(sensor), class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': String(this.wanted.includes(nameOf(sensor))), onclick: () => this.toggle(sensor) },
         breakable(sensor.topic.replace(/^\//, ''), '/'))));
   }
 
@@ -73,13 +73,9 @@ class Sensors {
 
   showStage() {
     const roots = [...this.views.values()].map((view) => view.root);
-    if (!roots.length) {
-      replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, this.known.length ? 'Nothing is looked at' : 'No sensors'),
-        h('p', {}, this.known.length ? 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to a sensor only while somebody looks at it.'
-          : 'Cameras (Image, CompressedImage), point clouds (PointCloud2, or depth with its camera_info), robots (robot_description) and joint states appear here as soon as somebody publishes them.')));
-    } else if (roots.length !== this.stage.children.length || roots.some((root, index) => this.stage.children[index] !== root)) {
-      replace(this.stage, roots);
-    }
+    arrange(this.stage, roots.length ? roots : h('div', { class: 'empty' }, h('h2', {}, this.known.length ? 'Nothing is looked at' : 'No sensors'),
+      h('p', {}, this.known.length ? 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to a sensor only while somebody looks at it.'
+        : 'Cameras (Image, CompressedImage), point clouds (PointCloud2, or depth with its camera_info), robots (robot_description) and joint states appear here as soon as somebody publishes them.')));
     this.stage.dataset.views = roots.length;
   }
 }

@@ -1,5 +1,5 @@
 // A container as a list of its states: for where there is no drawing, and for who prefers it.
-import { h, replace } from './dom.js';
+import { h, redraw } from './dom.js';
 import { CLASSES, chip, percent, rateBar } from './format.js';
 
 export class StateList {
@@ -15,7 +15,7 @@ export class StateList {
     const key = JSON.stringify([robot, data, live]);
     if (key === this.key) return;
     this.key = key;
-    replace(this.body, data ? data.states.map((state) => this.row(robot, data, live || {}, state)) : []);
+    redraw(this.body, data ? data.states.map((state) => this.row(robot, data, live || {}, state)) : []);
   }
 
   row(robot, data, live, { label, nested }) {
@@ -31,7 +31,8 @@ export class StateList {
     });
     const recovered = counts.filter(([, , to]) => to === data.oracle).reduce((sum, row) => sum + row[4], 0);
     if (recovered) edges.push(h('span', { class: 'leads to-oracle' }, 'failure → ', data.oracle, ' ', percent(recovered)));
-    return h('tr', { class: (active ? 'active ' : '') + (failed ? 'failed' : ''), 'data-id': robot + '/' + path + '/' + label },
+    const id = robot + '/' + path + '/' + label;
+    return h('tr', { key: id, class: (active ? 'active ' : '') + (failed ? 'failed' : ''), 'data-id': id },
       h('th', { scope: 'row' }, nested ? h('button', { class: 'link', onclick: () => this.onOpen(path + '/' + label) }, label, ' ›') : label,
         active && chip('active', 'accent'), failed && chip('failed', 'bad')),
       h('td', {}, learned ? rateBar(learned.rate) : '–'),

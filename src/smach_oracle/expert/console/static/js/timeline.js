@@ -1,5 +1,5 @@
 // A trial on a time axis: a lane for each state, one for the oracle, one for the expert.
-import { h, replace, s } from './dom.js';
+import { h, redraw, s } from './dom.js';
 import { duration } from './format.js';
 
 const LANE = 26;
@@ -82,7 +82,7 @@ export class Timeline {
   draw() {
     const width = this.canvas.clientWidth;
     if (!this.events || !this.events.length || width < 50) {
-      replace(this.lanes, h('p', { class: 'empty' }, 'No events.'));
+      redraw(this.lanes, h('p', { class: 'empty' }, 'No events.'));
       this.scale = null;
       this.slider.hidden = this.cursor.hidden = true;
       return;
@@ -99,15 +99,15 @@ export class Timeline {
     this.shownLanes = lanes;
     this.cursor.style.setProperty('--height', height + 'px');
     const marks = ticks(whole, Math.max(2, (width - name) / 62));
-    replace(this.axis, s('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS, 'aria-hidden': true },
+    redraw(this.axis, s('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS, 'aria-hidden': true },
       marks.map((tick) => s('text', { class: 'tick-text', x: Math.min(x(begin + tick), width - 26), y: 16 }, tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick)))));
-    replace(this.lanes, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
+    redraw(this.lanes, s('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img', 'aria-label': 'Events of the trial over time' },
       marks.map((tick) => s('line', { class: 'tick', x1: x(begin + tick), x2: x(begin + tick), y1: 0, y2: height })),
       lanes.map((lane) => s('text', { class: 'lane', x: 0, y: y(lane) + 16 }, short(lane, name), s('title', {}, lane))),
       bars.map((bar) => s('rect', { class: 'bar ' + bar.kind, x: x(bar.from), y: y(bar.lane) + 4, rx: 3, height: LANE - 8,
         width: Math.max(2, x(bar.to) - x(bar.from)) }, s('title', {}, bar.words))),
       this.events.filter((event) => MARKS[event.kind]).map((event) => s('circle', {
-        class: 'mark ' + MARKS[event.kind] + (event.seq === this.picked ? ' picked' : ''), cx: x(event.t), cy: y(laneOf(event)) + LANE / 2, r: 4.5,
+        key: event.seq, class: 'mark ' + MARKS[event.kind] + (event.seq === this.picked ? ' picked' : ''), cx: x(event.t), cy: y(laneOf(event)) + LANE / 2, r: 4.5,
         'data-seq': event.seq, onclick: () => this.onPick(event.seq) }, s('title', {}, event.words)))));
     if (this.t !== undefined) this.place(this.t, this.wordsThere);
   }

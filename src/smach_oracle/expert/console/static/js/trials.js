@@ -1,5 +1,5 @@
 // Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be replayed.
-import { h, replace, setText } from './dom.js';
+import { h, redraw, replace, setText } from './dom.js';
 import { chip, clock, duration, lastLine, percent } from './format.js';
 import { Recorded } from './recorded.js';
 import { Replay } from './replay.js';
@@ -120,7 +120,7 @@ class Trials {
     if (key === this.tableKey) return;
     this.tableKey = key;
     this.table.hidden = !live.length && !bags.length;
-    replace(this.table, live.length > 0 && counted('Trials that ended while this console watched: in how many each happened at least once', live),
+    redraw(this.table, live.length > 0 && counted('Trials that ended while this console watched: in how many each happened at least once', live),
       bags.length > 0 && counted('Trials in the bags: in how many each happened at least once', bags));
   }
 
@@ -128,8 +128,7 @@ class Trials {
     const key = JSON.stringify([all, this.chosen, this.filter.value]);
     if (key === this.listKey) return;
     this.listKey = key;
-    const focused = document.activeElement && document.activeElement.dataset.trial;
-    const row = (trial) => h('button', { class: 'trial', 'aria-current': trial.id === this.chosen, onclick: () => this.choose(trial.id), 'data-trial': trial.id, 'data-number': trial.number },
+    const row = (trial) => h('button', { key: trial.id, class: 'trial', 'aria-current': trial.id === this.chosen, onclick: () => this.choose(trial.id), 'data-trial': trial.id, 'data-number': trial.number },
       h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, trial.experiment), h('span', { class: 'spacer' }), chip(trial.outcome || trial.ending || 'running', ENDINGS[trial.ending])),
       h('span', { class: 'row dim' }, h('span', { class: 'ellipsis' }, trial.robot), h('span', { class: 'spacer' }), clock(trial.start)),
       h('span', { class: 'dim' }, summary(trial)));
@@ -137,14 +136,12 @@ class Trials {
     const old = wanted.filter((trial) => trial.number !== undefined);
     const live = wanted.filter((trial) => trial.number === undefined);
     let day = '';
-    replace(this.list, live.map(row), old.map((trial) => {
+    redraw(this.list, live.map(row), old.map((trial) => {
       const date = new Date(trial.start * 1000).toLocaleDateString();
       const heading = date !== day && h('h4', { class: 'trial-day' }, 'Bags of ', date);
       day = date;
       return [heading, row(trial)];
     }), !wanted.length && h('p', { class: 'dim' }, 'None.'));
-    const again = focused && [...this.list.children].find((each) => each.dataset.trial === focused);
-    if (again) again.focus();
   }
 
   showFacts(trial) {
