@@ -8,8 +8,9 @@ from machines import FakeExpert, Gate, Scripted, Watched, chain_of, goto, in_thr
 
 from smach_oracle.oracle.events import EventKind, FailureKind
 
-LIMITED = {'time_limit_s': 0.1, 'grace_period_s': 5.0}
-ABANDONING = {'time_limit_s': 0.1, 'grace_period_s': 0.1}
+LIMITED = {'time_limit_s': 1.0, 'grace_period_s': 5.0}  # a visit that does nothing keeps it, on a busy machine, too
+AMPLE = {'time_limit_s': 30.0, 'grace_period_s': 5.0}  # where no visit is to overrun it
+ABANDONING = {'time_limit_s': 0.5, 'grace_period_s': 0.1}
 
 
 class Stubborn(Scripted):
@@ -47,7 +48,7 @@ def wait_until(condition, timeout_s=10.0):
 
 def test_a_state_within_its_limit_is_as_any_other():
     state = Scripted(lambda self, ud: setattr(ud, 'x', ud.y + 1) or 'ok', input_keys=['y'], output_keys=['x'])
-    machine = limited(state)
+    machine = limited(state, **AMPLE)
     machine.machine.userdata.y = 1
     assert machine.run() == 'done'
     assert machine.machine.userdata.x == 2
@@ -57,7 +58,7 @@ def test_a_state_without_a_limit_runs_in_the_machines_own_thread_and_one_with_a_
     threads = []
     state = Scripted(*[lambda self, ud: threads.append(threading.current_thread()) or 'ok'] * 2)
     watched(state).run()
-    limited(state).run()
+    limited(state, **AMPLE).run()
     assert threads[0] is threading.current_thread()
     assert threads[1] is not threads[0]
 
@@ -68,7 +69,7 @@ def test_an_overrun_is_a_failure_and_the_state_is_preempted():
     assert machine.run() == 'done'
     failure = machine.of(EventKind.FAILURE)[0]
     assert failure.failure_kind == FailureKind.TIME_LIMIT
-    assert failure.text == 'overran its time limit of 0.1 s and ended when it was preempted'
+    assert failure.text == 'overran its time limit of 1 s and ended when it was preempted'
     assert machine.visits() == ['A', 'A', 'B']
     assert machine.machine['A'].preempt_requested() is False
 
@@ -159,7 +160,7 @@ def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too():
 
 def test_once_its_thread_has_ended_the_state_is_entered_again():
     state = Stubborn()
-    machine = limited(state, expert=FakeExpert(supersede('ok')), **ABANDONING)
+    machine = limited(state, expert=FakeExpert(supersede('ok')), time_limit_s=1.0, grace_period_s=0.1)
     assert machine.run() == 'done'
     state.let_go.set()
     wait_until(lambda: not machine.machine._oracle.tree.workers.blocked(state))
@@ -169,14 +170,14 @@ def test_once_its_thread_has_ended_the_state_is_entered_again():
 
 
 def test_an_exception_in_the_worker_is_the_states_exception():
-    machine = limited(Scripted(ValueError('no grasp')), max_recoveries=0, **LIMITED)
+    machine = limited(Scripted(ValueError('no grasp')), max_recoveries=0, **AMPLE)
     with pytest.raises(smach.InvalidUserCodeError, match='(?s)Traceback.*no grasp'):
         machine.run()
 
 
 @pytest.mark.parametrize('stop', [KeyboardInterrupt, SystemExit])
 def test_ctrl_c_in_the_worker_reaches_the_machine(stop):
-    machine = limited(Scripted(stop()))
+    machine = limited(Scripted(stop()), **AMPLE)
     with pytest.raises(stop):
         machine.run()
     assert machine.machine.is_running() is False
@@ -216,7 +217,7 @@ def test_a_preempt_reaches_a_state_in_a_worker():
 
 def test_an_overrun_under_a_preempt_ends_the_machine_as_preempted():
     state = Stubborn()
-    machine = limited(state, time_limit_s=0.4, grace_period_s=0.1)
+    machine = limited(state, time_limit_s=1.0, grace_period_s=0.1)
     run = in_thread(machine.run)
     wait_until(lambda: state.runs)
     machine.machine.request_preempt()
@@ -225,7 +226,7 @@ def test_an_overrun_under_a_preempt_ends_the_machine_as_preempted():
 
 
 def test_an_overrun_that_nobody_resolves_stops_with_the_machines_failing_outcome():
-    machine = limited(Scripted(Gate()), max_recoveries=0, **LIMITED)
+    machine = limited(Scripted(Gate()), max_recoveries=0, time_limit_s=0.1)
     assert machine.run() == 'aborted'
 
 
@@ -258,5 +259,5 @@ def test_context_variables_reach_the_worker():
     variable = contextvars.ContextVar('v', default='unset')
     seen = []
     variable.set('set')
-    limited(Scripted(lambda self, ud: seen.append(variable.get()) or 'ok')).run()
+    limited(Scripted(lambda self, ud: seen.append(variable.get()) or 'ok'), **AMPLE).run()
     assert seen == ['set']
