@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from recorded import active, events, finished, messages, numbers
+from waiting import wait_for
 
 from smach_oracle.oracle.events import EventKind, EventSource
 from smach_oracle.ros import bag_writer
@@ -47,7 +48,7 @@ class Watched:
         self.emit(EventKind.TRIAL_END)
 
     def wait_for(self, state):
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 40.0
         while not any(status.state == state for status in self.statuses):
             assert time.monotonic() < deadline, 'the operator was never told {}'.format(state)
             time.sleep(0.02)
@@ -157,7 +158,7 @@ def test_a_trial_goes_on_in_a_new_bag_when_the_disk_works_again(tmp_path, monkey
     watched = Watched(tmp_path)
     watched.start('long')
     watched.emit(EventKind.STATE_START, 20)
-    time.sleep(1.0)
+    watched.wait_for_disk('long', 21)
     real = os.pwrite
 
     def broken(*_):
@@ -185,7 +186,7 @@ def test_the_robot_goes_on_when_the_folder_vanishes(tmp_path):
     watched = Watched(folder)
     watched.start('vanished')
     watched.emit(EventKind.STATE_START, 10)
-    time.sleep(0.6)
+    watched.wait_for_disk('vanished', 11)
     shutil.rmtree(str(folder))
     watched.emit(EventKind.TRIAL_END)
     watched.wait_for(RecorderState.DROPPING)
@@ -250,7 +251,7 @@ def test_a_hung_disk_holds_the_robot_up_only_for_a_while(tmp_path, hanging_disk)
     watched.emit(EventKind.STATE_START, 500)
     assert time.monotonic() - began < 1.0  # known to hang: not waited for again
     hanging_disk.end()
-    time.sleep(0.5)
+    assert wait_for(lambda: [text for text in watched.said if 'answers again' in text])
     watched.emit(EventKind.TRIAL_END)
     watched.close()
     watched.check_that_nothing_is_unaccounted_for()

@@ -5,6 +5,7 @@ import time
 import pytest
 import smach
 from smach_states import Fixed, Scripted, UntilPreempted, concurrence, machine, that_name
+from waiting import wait_for
 
 
 def preempt(sm_holder, serviced):
@@ -190,10 +191,11 @@ def test_a_paused_machine_enters_no_state_until_resumed():
     sm = machine(('A', Scripted(enter), {'failed': 'A'}))
     thread = threading.Thread(target=sm.execute, daemon=True)
     thread.start()
-    time.sleep(0.15)
+    assert wait_for(lambda: entered and sm.pause_requested())
+    time.sleep(0.15)  # for it to go on all the same
     assert entered == [1] and sm.is_running() and sm.pause_requested()
     sm.request_resume()
-    thread.join(5.0)
+    thread.join(30.0)
     assert entered == [1, 1] and not sm.is_running()
 
 
