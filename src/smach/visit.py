@@ -24,11 +24,6 @@ class Visit(object):
         self.texts: Dict[Any, Any] = {}  # (target, log line of the transition to it) by outcome
         self.remapper = ConstantsRemapper(*parts, constants) if constants else Remapper(*parts)
 
-    def is_up_to_date(self, state: Any, userdata: Any, remapping: Mapping[str, str]) -> bool:
-        """Whether nothing the view was made of has been exchanged."""
-        return (self.state is state and self.userdata is userdata and self.remapping is remapping
-                and self.input_keys is state._input_keys and self.output_keys is state._output_keys)
-
     def text_of(self, label: str, outcome: str, target: Optional[str]) -> str:
         """The log line of a transition, made once and kept."""
         text = "State machine transitioning '%s':'%s'-->'%s'" % (label, outcome, target)
