@@ -2,7 +2,7 @@
 
 Prints, for each setting that trials were run with, in how many the expert was asked, the oracle recovered, the trial
 truly succeeded, with 95% intervals over trials and, where there are several, over replicates; and draws interventions
-as a function of the memory N (the paper: "since this memory is a tunable parameter, the frequency of expert
+as a function of the memory N (paper, section IV-A: "since this memory is a tunable parameter, the frequency of expert
 intervention can be set"). Exit code: 0, all bags were read; 1, some were skipped; 2, there was nothing to count.
 """
 import argparse
