@@ -168,8 +168,5 @@ class FrontEnd:
             return None
         return wait_for(find, limit_s)
 
-    def none_open(self, limit_s: float = 10.0) -> bool:
-        return bool(wait_for(lambda: not self._open, limit_s))
-
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
