@@ -10,7 +10,6 @@ import argparse
 import os
 import queue
 import signal
-import socket
 import statistics
 import subprocess
 import sys
@@ -71,9 +70,8 @@ class Processes:
 
     def start_master(self):
         """Start a master on a free port, for us and for all that is started after it; wait until it answers."""
-        with socket.socket() as probe:
-            probe.bind(('localhost', 0))
-            port = probe.getsockname()[1]
+        from smach_oracle.simulation.experiment.launching import free_port
+        port = free_port()
         uri = 'http://localhost:{}'.format(port)
         os.environ['ROS_MASTER_URI'] = uri
         self.start(['roscore', '-p', str(port)])

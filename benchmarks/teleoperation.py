@@ -93,9 +93,8 @@ def main():
     parser.add_argument('--stops', type=int, default=7, help='of each kind (default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='fail outside of the limits')
     options = parser.parse_args()
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        port = probe.getsockname()[1]
+    from smach_oracle.simulation.experiment.launching import free_port
+    port = free_port()
     os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
     robot = subprocess.Popen(['roslaunch', '-p', str(port), os.path.join(FIXTURES, 'console_drive_pr2.test')],
                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -64,7 +64,7 @@ def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
     (installed / 'flaky.py').write_text(SCRIPT)
     # without a master, as before the robot is switched on, is not what oracle_run is for: start one on a free port
     command = '''
-        port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("localhost", 0)); print(s.getsockname()[1])')
+        port=$(python3 -c 'from smach_oracle.simulation.experiment.launching import free_port; print(free_port())')
         export ROS_MASTER_URI=http://localhost:$port ROS_HOSTNAME=localhost ROS_LOG_DIR="$PWD/log"
         roscore -p $port >/dev/null 2>&1 & core=$!; trap 'kill -INT $core; wait $core || true' EXIT
         until rosnode list >/dev/null 2>&1; do sleep 0.2; done

@@ -13,6 +13,7 @@ import pytest
 
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.oracle.events import Event, EventKind
+from smach_oracle.simulation.experiment import launching
 from smach_oracle.simulation.experiment.command import alone_in, parse, stop_all
 from smach_oracle.simulation.experiment.interrupts import Interrupted, Interrupts
 from smach_oracle.simulation.experiment.launching import MARK, end_marked, environment_of, free_port, marked
@@ -202,6 +203,16 @@ def test_a_job_is_alone_with_its_master_whatever_the_shell_is_set_to(monkeypatch
     assert not {'ROS_NAMESPACE', 'ROS_IP'} & set(environment)
     assert (environment['OMP_NUM_THREADS'], environment['OPENBLAS_NUM_THREADS']) == ('3', '1')
     assert environment[MARK] == str(tmp_path) and environment['PATH'] == os.environ['PATH']
+
+
+@pytest.mark.parametrize('words, kept', [
+    ('32768\t60999\n', range(32768, 61000)), ('15000 65000', range(15000, 65001)), ('1024 65535', range(0)),
+    ('nonsense', range(32768, 61000))])
+def test_a_free_port_is_none_that_the_system_gives_by_chance(tmp_path, monkeypatch, words: str, kept: range) -> None:
+    (tmp_path / 'range').write_text(words)
+    monkeypatch.setattr(launching, 'GIVEN_BY_CHANCE', tmp_path / 'range')
+    ports = {launching.free_port() for _ in range(50)}
+    assert all(port in launching.PORTS and port not in kept for port in ports)
 
 
 def test_a_free_port_can_be_bound() -> None:

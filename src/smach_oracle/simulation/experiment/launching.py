@@ -15,7 +15,8 @@ MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the j
 NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
 STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
 KILL_S = 10.0  # for the kernel to take away what was killed
-BELOW_EPHEMERAL = (20000, 32000)  # ports; what the system gives to others by itself begins above (Linux: 32768)
+PORTS = range(20000, 65536)  # of which those are used that the system does not give to others by itself
+GIVEN_BY_CHANCE = Path('/proc/sys/net/ipv4/ip_local_port_range')  # the first and the last of these (Linux)
 _PR_SET_PDEATHSIG = 1
 
 
@@ -88,8 +89,10 @@ def end_with_parent() -> None:
 def free_port() -> int:
     """A TCP port of the loopback interface that nobody listens on, nor is given by chance before it is used."""
     chance = random.SystemRandom()
+    given = given_by_chance()
+    ports = [port for port in PORTS if port not in given] or PORTS
     while True:
-        port = chance.randrange(*BELOW_EPHEMERAL)
+        port = chance.choice(ports)
         with socket.socket() as probe:
             try:
                 probe.bind(('localhost', port))
@@ -98,6 +101,15 @@ def free_port() -> int:
                     raise
                 continue
             return port
+
+
+def given_by_chance() -> range:
+    """The ports that the system gives to who asks for any; Linux's own where it does not say."""
+    try:
+        first, last = map(int, GIVEN_BY_CHANCE.read_text(encoding='ascii').split())
+    except (OSError, ValueError):
+        first, last = 32768, 60999
+    return range(first, last + 1)
 
 
 def marked(mark: str) -> List[int]:
