@@ -52,7 +52,7 @@ class RatesPublisher:
         self._publisher = rospy.Publisher(topic, OracleRates, queue_size=10, latch=True)
         self._period_s = period_s
         self._wake = threading.Condition()
-        # Of two threads the one that looked last also publishes last: its message stays latched. Re-entrant, as a signal
+        # Of two threads the one that looked last publishes last: its message stays latched. Re-entrant, as a signal
         # handler may end a trial in the thread that publishes.
         self._publishing = threading.RLock()
         self._pending: Dict[int, Any] = {}  # id(container) -> weak reference

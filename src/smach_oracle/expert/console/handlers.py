@@ -32,7 +32,7 @@ class Gate:
         self.audit = audit
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = Buckets(rate=30.0, burst=150.0, for_all=5.0)
-        self.files = Buckets(rate=100.0, burst=1000.0, for_all=5.0)  # a page is some 45 of them; a browser may open many
+        self.files = Buckets(rate=100.0, burst=1000.0, for_all=5.0)  # a page is some 45; a browser may open many
         self.sign_ins = Buckets(rate=0.2, burst=5.0, for_all=4.0)
         self._ended: Dict[str, float] = {}  # id of a session -> when, s; of those whose cookie might still be good
 
