@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+import xml.etree.ElementTree as ElementTree
 
 import pytest
 from house import ROOT
@@ -100,6 +101,13 @@ def test_a_mark_that_nobody_carries_kills_nobody():
 
 def test_every_rostest_is_run():
     assert len(rostest_checks(ROOT)) == len(list((ROOT / 'test/rostest').glob('*.test'))) > 0
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'test/rostest').glob('*.test')), ids=lambda path: path.stem)
+def test_a_rostest_that_hangs_is_ended_by_rostest_which_tells_the_case(path):
+    tests = list(ElementTree.parse(str(path)).getroot().iter('test'))
+    limits_s = [float(test.get('time-limit', 60.0)) for test in tests]
+    assert sum(limits_s) + 60.0 <= checks.MAX_ROSTEST_S, 'no time is left for roslaunch to start and end its nodes'
 
 
 @pytest.mark.parametrize('results, ok, told', [
