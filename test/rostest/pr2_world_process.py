@@ -91,9 +91,9 @@ class Pr2WorldProcess(unittest.TestCase):
         rospy.Subscriber('head_camera/rgb/image_raw', Image, images.append)
         self.assertTrue(wait_for(lambda: len(images) >= 2, LIMIT_S), process.output())
         # it may fall behind on a busy machine; it never runs ahead
-        sim, wall = rospy.get_time(), time.monotonic()
-        self.assertTrue(wait_for(lambda: rospy.get_time() - sim > 1.0, LIMIT_S))
-        self.assertGreater(time.monotonic() - wall, 0.6)
+        wall, sim = time.monotonic(), rospy.get_time()
+        self.assertTrue(wait_for(lambda: rospy.get_time() - sim > 5.0, LIMIT_S))
+        self.assertGreater(time.monotonic() - wall, 4.4)  # it catches up on 0.25 s at the most
         self.reset(3)
         self.ends(process, signal.SIGTERM)
         self.assertEqual(len(self.lines()), 1)
