@@ -49,7 +49,7 @@ def do(job: Job, interfaces: Interfaces, eye: Eye) -> str:
     try:
         wrong = _shown(job, interfaces, eye) if job.means.means == SHOW else _driven(job, interfaces, eye)
         if not wrong:
-            wrong = settling.finish(SUCCESS, 'by the scripted expert')
+            wrong = settling.finish(SUCCESS, 'by the scripted operator')
     except (Interrupted, rospy.ServiceException) as err:
         wrong = str(err)
     if wrong:
