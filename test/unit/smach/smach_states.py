@@ -53,7 +53,7 @@ class Counting(smach.State):
 class UntilPreempted(smach.State):
     """Ends 'preempted' once asked to, or 'done' after ``time_s``."""
 
-    def __init__(self, time_s=5.0):
+    def __init__(self, time_s=30.0):
         smach.State.__init__(self, outcomes=['done', 'preempted'])
         self.time_s = time_s
         self.started = threading.Event()

@@ -94,7 +94,7 @@ def test_an_exception_in_the_termination_callback_surfaces_after_the_others_ende
     begin = time.monotonic()
     with pytest.raises(smach.InvalidUserCodeError, match='child termination callback'):
         both.execute()
-    assert time.monotonic() - begin < 2.0 and both.get_active_states() == []
+    assert time.monotonic() - begin < 10.0 and both.get_active_states() == []
 
 
 def test_a_childs_exception_preempts_the_others_and_surfaces_when_they_have_ended(said):
@@ -102,7 +102,7 @@ def test_a_childs_exception_preempts_the_others_and_surfaces_when_they_have_ende
     begin = time.monotonic()
     with pytest.raises(smach.InvalidStateError):
         concurrence({'A': Scripted(lambda state, ud: other.started.wait(5.0) and 1 // 0), 'B': other}).execute()
-    assert time.monotonic() - begin < 2.0
+    assert time.monotonic() - begin < 10.0
     assert any('ZeroDivisionError' in text for text in that_name(['A'], said('err')))
 
 
@@ -281,7 +281,7 @@ def test_ctrl_c_stops_a_concurrence_in_a_machine_at_once():
         time.sleep(0.3)
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
-        rest, _ = process.communicate(timeout=10.0)
+        rest, _ = process.communicate(timeout=60.0)
     finally:
         process.kill()
-    assert 'interrupted False False' in rest and time.monotonic() - begin < 3.0
+    assert 'interrupted False False' in rest and time.monotonic() - begin < 10.0

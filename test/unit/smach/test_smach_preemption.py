@@ -130,7 +130,7 @@ def test_a_request_reaches_a_machine_that_only_rushes_from_state_to_state():
     threading.Timer(0.05, sm.request_preempt).start()
     begin = time.monotonic()
     assert sm.execute() == 'preempted'
-    assert time.monotonic() - begin < 2.0
+    assert time.monotonic() - begin < 10.0
 
 
 class LateLock(object):
@@ -222,7 +222,7 @@ def test_a_preempt_pending_when_a_concurrence_starts_reaches_its_children():
     holder.append(outer)
     begin = time.monotonic()
     assert outer.execute() == 'preempted'
-    assert time.monotonic() - begin < 2.0
+    assert time.monotonic() - begin < 10.0
 
 
 def test_states_start_unpreempted_and_a_request_can_be_recalled():
