@@ -124,6 +124,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.assertEqual(told['/alpha/interface_output'].lines, ['ready'], 'what interfaces print is in the bag')
         self.assertEqual(told['/alpha/failure_frames'].topics, [CAMERA])
         type(self).console.stop()
+        self.assertTrue(browser.says('connection lost', '#status'))
         type(self).console = self.start_console()
         self.assertTrue(browser.says('live', '#status', 40.0))
         browser.click('#tab-trials')

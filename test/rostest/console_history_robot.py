@@ -5,9 +5,12 @@ Of PICK's preconditions one function looks at a parameter, one raises, one hangs
 """
 import threading
 
+import rosgraph
 import rospy
 import smach
 from console_robot import Work, chain
+from sensor_msgs.msg import Image
+from waiting import wait_for
 
 from smach_oracle import OracleContainer
 
@@ -28,11 +31,29 @@ def door_is_shut(_userdata):
     threading.Event().wait()
 
 
+class Detect(Work):
+    """Needs the cameras: what they see when PICK fails has then been heard."""
+
+    def execute(self, ud):
+        for topic in rospy.get_param('~failure_cameras', []):
+            wait_for(lambda each=topic: self.is_listened_to(each), 60.0)
+            rospy.wait_for_message(topic, Image, 60.0)
+        return super().execute(ud)
+
+    @staticmethod
+    def is_listened_to(topic):
+        """By the oracle of this node."""
+        listening = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
+        return rospy.get_name() in listening.get(topic, [])
+
+
 def main():
     """One trial after the other."""
     rospy.init_node('robot')
 
     def make(label):
+        if label == 'DETECT':
+            return Detect(label, [], 0.1)
         return Work(label, ['PICK'], 0.1, ['grasp', 'fits', 'tries'] if label == 'PICK' else [])
     sm = chain(['DETECT', 'PICK', 'PLACE'], make)
     sm.userdata.grasp, sm.userdata.fits, sm.userdata.tries = [1, 2], False, 3

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Joy
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm, Person  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from waiting import least_of, wait_for  # noqa: E402
 
 STOPS_WITHIN_S = 0.1
 SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it
@@ -40,35 +40,34 @@ class JoyTeleoperation(unittest.TestCase):
             time.sleep(0.02)
         self.assertGreater(self.arm.moved_s, begun_s + 0.3)
 
-    def stopped_after(self):
-        """Seconds from now until the arm moved last."""
-        now_s = time.monotonic()
-        time.sleep(1.0)  # as long as nothing may move
-        return self.arm.moved_s - now_s
+    def assert_stops(self, within_s, move, let_go):
+        def measure():
+            self.push_until_it_moves(*move)
+            begun_s = time.monotonic()
+            # two processes have a part in it, and this one, each of which a busy machine keeps waiting
+            return self.arm.stands_after(let_go, within_s + 0.5) - 3 * self.lag.most_s(begun_s - 0.1)
+        self.assertLess(least_of(measure, within_s), within_s)
+
+    def let_go(self, *axes):
+        self.push(axes or [0] * 6, [0, 0])
 
     def test_it_moves_while_the_button_is_held_and_stops_when_it_is_let_go(self):
         before = self.ann.tool()
-        self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
-        self.push([0, 0, 1, 0, 0, 0], [0, 0])
-        self.assertLess(self.stopped_after(), STOPS_WITHIN_S + 3 * self.lag.most_s(time.monotonic() - 1.2))
+        self.assert_stops(STOPS_WITHIN_S, ([0, 0, 1, 0, 0, 0], [1, 0]), lambda: self.let_go(0, 0, 1, 0, 0, 0))
         way = self.ann.tool() - before
         self.assertGreater(way[2], 0.02)
         self.assertLess(abs(way[0]) + abs(way[1]), 0.1 * way[2])
         self.assertEqual(self.ann.states[-1].operator, '')
 
     def test_a_joystick_that_falls_silent_has_let_go(self):
-        self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])
-        self.assertLess(self.stopped_after(), SILENCE_S + STOPS_WITHIN_S + 3 * self.lag.most_s(time.monotonic() - 1.2))
+        self.assert_stops(SILENCE_S + STOPS_WITHIN_S, ([0, 0, -1, 0, 0, 0], [1, 0]), lambda: None)
 
     def test_each_axis_moves_the_hand_its_own_way(self):
         self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])  # from the stretched arm of another test
-        self.push([0] * 6, [0, 0])
-        self.stopped_after()
+        self.arm.stands_after(self.let_go)
         for axis in (0, 1, 2):
             before = self.ann.tool()
-            self.push_until_it_moves([0.5 if each == axis else 0.04 for each in range(6)], [1, 0])
-            self.push([0] * 6, [0, 0])
-            self.assertLess(self.stopped_after(), STOPS_WITHIN_S + 3 * self.lag.most_s(time.monotonic() - 1.2))
+            self.assert_stops(STOPS_WITHIN_S, ([0.5 if each == axis else 0.04 for each in range(6)], [1, 0]), self.let_go)
             way = self.ann.tool() - before
             self.assertGreater(way[axis] / np.linalg.norm(way), 0.99, (axis, way))
 

@@ -53,6 +53,13 @@ class FakeArm:
             self._positions = np.array(READY)
         self.tell()
 
+    def stands_after(self, let_go, rest_s=0.4):
+        """s after `let_go` has returned at which it moved last; waits until it has rested so long."""
+        let_go()
+        begun_s = time.monotonic()
+        assert wait_for(lambda: time.monotonic() - max(self.moved_s, begun_s) > rest_s), 'it does not stand'
+        return self.moved_s - begun_s
+
     def tell(self):
         with self._lock:
             positions = [float('nan')] * 7 if self.odd else self._positions.tolist()
