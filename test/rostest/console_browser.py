@@ -17,8 +17,6 @@ from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
 
-if WITH_BROWSER:
-    pass  # noqa: E402
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'
 
@@ -165,6 +163,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         for page in (second, first):
             browser.driver.switch_to.window(page)
             self.assertTrue(browser.says('Sign in', 'h1'), 'to sign out ends all pages of this browser')
+            self.assertTrue(browser.says('You have signed out' + (' on another page' if page == first else '.')))
+            self.assertEqual(browser.text('#nav'), '', 'nothing leads back to what was shown before')
         self.sign_in(self.token_of('viewer', tokens))
         browser.click('#tab-questions')
         browser.click(QUESTION)
