@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
 """SimpleActionState against servers that die, freeze, vanish or ignore what they are told."""
-import threading
 import time
 import unittest
 
@@ -10,22 +9,11 @@ import smach
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus
 
-from smach_ros import SimpleActionState, goal_run, server_watch
+from smach_ros import goal_run, server_watch
 from smach_ros.action_link import link_to
 from smach_ros_action_node import Behaviour
-from smach_ros_support import ActionNodeProcess, InBackground, LogWatch, userdata
+from smach_ros_support import ActionNodeProcess, InBackground, LogWatch, TellingState, userdata
 from waiting import wait_for
-
-
-class TellingState(SimpleActionState):
-    """Says when its server has begun with the goal; until then nothing is to be seen of how it treats a cancel."""
-
-    def __init__(self, *arguments, **keywords):
-        SimpleActionState.__init__(self, *arguments, **keywords)
-        self.active = threading.Event()
-
-    def _goal_active_cb(self):
-        self.active.set()
 
 
 class ActionFaultsTest(unittest.TestCase):

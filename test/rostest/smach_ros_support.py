@@ -8,6 +8,8 @@ import time
 
 import smach
 
+from smach_ros import SimpleActionState
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 
@@ -30,6 +32,17 @@ class ActionNodeProcess(object):
             self.process.kill()
         if self.process is not None:
             self.process.wait(10)
+
+
+class TellingState(SimpleActionState):
+    """Says when its server has begun with the goal; until then nothing is to be seen of how it treats a cancel."""
+
+    def __init__(self, *arguments, **keywords):
+        SimpleActionState.__init__(self, *arguments, **keywords)
+        self.active = threading.Event()
+
+    def _goal_active_cb(self):
+        self.active.set()
 
 
 def userdata(**items):
