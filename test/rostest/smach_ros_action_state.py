@@ -186,7 +186,7 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertEqual(action_state(150).execute(userdata()), 'succeeded')
 
     def test_overridden_callbacks_are_told_everything(self):
-        for _ in range(3):  # status, feedback and result come by a topic each: one that is late is not told after the end
+        for _ in range(3):  # status, feedback and result come by a topic each: what is late is not told
             state = HooksState()
             self.assertEqual(state.execute(userdata()), 'succeeded')
             told, end = state.seen[:-1], state.seen[-1]
