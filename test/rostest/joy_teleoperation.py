@@ -67,7 +67,8 @@ class JoyTeleoperation(unittest.TestCase):
         self.arm.stands_after(self.let_go)
         for axis in (0, 1, 2):
             before = self.ann.tool()
-            self.assert_stops(STOPS_WITHIN_S, ([0.5 if each == axis else 0.04 for each in range(6)], [1, 0]), self.let_go)
+            tilted = [0.5 if each == axis else 0.04 for each in range(6)]
+            self.assert_stops(STOPS_WITHIN_S, (tilted, [1, 0]), self.let_go)
             way = self.ann.tool() - before
             self.assertGreater(way[axis] / np.linalg.norm(way), 0.99, (axis, way))
 
