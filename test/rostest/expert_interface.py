@@ -98,6 +98,7 @@ class TestInterfaces(unittest.TestCase):
 
     def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
         impatient = ExpertQueryClient(SERVER, server_wait_s=2.0)
+        self.addCleanup(impatient.close)
         begun_s = time.monotonic()
         with self.assertRaises(InterfaceError):
             self.run_interface(impatient)
