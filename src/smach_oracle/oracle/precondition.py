@@ -36,11 +36,14 @@ class PreconditionRunner:
             running.request_preempt()
 
     def run(self, spec: PreconditionSpec) -> str:
-        """Return '' where the precondition is met, else why not."""
+        """Return '' where the precondition is met, else why not; what it wrote until then is taken back."""
+        begun = self._gate.begin()
         try:
             self._achieve(spec)
         except NotMet as why:
+            self._gate.take_back(begun)
             return str(why)
+        self._gate.keep(begun)
         return ''
 
     def _achieve(self, spec: PreconditionSpec) -> None:

@@ -31,6 +31,31 @@ class Gate(MutableMapping):
         other.written = self.written
         return other
 
+    def begin(self) -> Tuple[Dict[str, Any], Set[str]]:
+        """Begin to write what may be taken back; returns what `keep` or `take_back` needs."""
+        with self._lock:
+            before = set(self.written)
+            self.written.clear()
+            return dict(self._machine.userdata._data), before
+
+    def keep(self, begun: Tuple[Dict[str, Any], Set[str]]) -> None:
+        """What was written since `begin` stays."""
+        with self._lock:
+            self.written.update(begun[1])
+
+    def take_back(self, begun: Tuple[Dict[str, Any], Set[str]]) -> None:
+        """Each key written since `begin` is again what it was; what was changed inside an object stays changed."""
+        values, before = begun
+        data = self._machine.userdata._data
+        with self._lock:
+            for key in self.written:
+                if key in values:
+                    data[key] = values[key]
+                else:
+                    data.pop(key, None)
+            self.written.clear()
+            self.written.update(before)
+
     def shut(self) -> None:
         """Let no write pass from now on."""
         with self._lock:

@@ -87,6 +87,47 @@ def test_what_a_state_precondition_wrote_survives():
     assert seen[1] == {'x': 'achieved'}
 
 
+@pytest.mark.parametrize('userdata', ['restore', 'keep'])
+def test_what_a_precondition_that_was_not_met_wrote_is_taken_back(userdata):
+    """Such as an action state does: it has outputs of an aborted goal, too."""
+    for end in ('aborted', ValueError('x')):
+        def fail(state, ud, end=end):
+            ud.x, ud.new = 'nothing was found', 'neither'
+            del ud._data['x']
+            if isinstance(end, Exception):
+                raise end
+            return end
+        expert = FakeExpert(supersede('ok'))
+        machine, _ = run([writes('x', 'half done', 'aborted')], [Scripted(fail, **IO)], expert=expert,
+                         userdata=userdata, max_recoveries=1)
+        assert machine.of(EventKind.PRECONDITION_END)[0].outcome == 'not met'
+        assert machine.machine.userdata._data == {'x': 'at the start' if userdata == 'restore' else 'half done'}
+
+
+def test_of_two_preconditions_the_one_that_was_met_keeps_what_it_wrote():
+    def both(ud):
+        ud.x = 'achieved'
+        return True
+
+    def neither(ud):
+        ud.x = ud.new = 'half achieved'
+        return False
+    _, seen = run(['aborted', 'aborted'], [both, neither])
+    assert seen[-1] == {'x': 'achieved'}
+
+
+def test_a_check_that_is_false_leaves_nothing_and_what_achieves_it_does():
+    def check(ud):
+        ud.new = 'looked'
+        return False
+
+    def achieve(ud):
+        ud.x = 'achieved'
+        return True
+    _, seen = run(['aborted'], [(check, achieve)])
+    assert seen[1] == {'x': 'achieved'}
+
+
 def test_what_a_nested_machine_as_precondition_wrote_survives():
     inner = chain_of(Scripted(writes('x', 'achieved', 'ok'), **IO), output_keys=['x'])
     machine = chain_of(Scripted(), Scripted(writes('x', 'half done', 'aborted'), **IO), Scripted())
