@@ -70,6 +70,14 @@ class Browser:
         if not wait_for(clicked, limit_s):
             raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000]))
 
+    def tap(self, selector):
+        """With a finger, in the middle of what is there and shown."""
+        x, y = self.run('arguments[0].scrollIntoView({ block: "center" });'
+                        'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
+                        'return [x + width / 2, y + height / 2]', self.find(selector))
+        for kind, points in (('touchStart', [{'x': x, 'y': y}]), ('touchEnd', [])):
+            self.driver.execute_cdp_cmd('Input.dispatchTouchEvent', {'type': kind, 'touchPoints': points})
+
     def says(self, text, selector='body', limit_s=40.0):
         """Whether an element comes to hold a text."""
         return bool(wait_for(lambda: text in self.text(selector), limit_s))

@@ -31,7 +31,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         cls.audited, cls.events = [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
-        cls.begin('console_robot.py', 'PICK', '0.1', '0', '3')
+        cls.begin('console_robot.py', 'PICK', '0.1', '0', '4')
 
     @classmethod
     def tearDownClass(cls):
@@ -109,6 +109,22 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
         self.assertIn(('take_over', 'bob', True), [(told.command, told.expert, told.ok) for told in self.audited])
 
+    def test_3_on_a_phone_two_taps_answer_and_what_happens_next_is_at_the_top(self):
+        browser = self.browser
+        browser.click('.follow-up .primary')
+        browser.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
+            'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True})
+        self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})
+        browser.tap(QUESTION)
+        self.assertTrue(browser.says(YOURS))
+        self.assertTrue(browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'), 'how often it helped before')
+        self.assertTrue(wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled()))
+        browser.tap('.choice.goto[data-name=PLACE]')
+        self.assertTrue(browser.says('The trial ended with succeeded.', '.follow-up'))
+        top, bottom = browser.run('const box = document.querySelector(".follow-up").getBoundingClientRect();'
+                                  'return [box.top, box.bottom]')
+        self.assertTrue(0 < top < bottom < 844, (top, bottom))
+
     def test_4_machines_and_trials_are_shown(self):
         browser = self.browser
         browser.click('#tab-machines')
@@ -120,6 +136,9 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('with oracle', '.panel.trials table'))
         browser.click('.trial:first-child')
         self.assertTrue(browser.says('failed', '.event-log'))
+        added = ('return import("/static/js/format.js").then(({ added }) => '
+                 '["It warns: no cup", "PICK failed."].map((words) => added({ words, text: "no cup" })))')
+        self.assertEqual(browser.run(added), ['', ' no cup'], 'nothing is told twice')
         browser.find('.timeline .mark')
         self.assertEqual(browser.errors(), [])
 

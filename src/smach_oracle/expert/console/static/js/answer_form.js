@@ -1,6 +1,6 @@
 // Everything that may be answered, each a button: one press sends it. Keys: 1 to 9 a state, s the first supersede,
 // i the first interface, g give up.
-import { h } from './dom.js';
+import { h, whenLetGo } from './dom.js';
 import { CLASSES, breakable, chip, percent, rateBar } from './format.js';
 import { OutputField } from './output_field.js';
 import { Preconditions } from './preconditions.js';
@@ -38,7 +38,9 @@ export class AnswerForm {
 
   // How the preconditions stand, by state; `now`: the server's clock.
   stand(conditions, now) {
-    for (const [state, standing] of this.standings) standing.show((conditions || {})[state], now);
+    whenLetGo(this.root, () => {
+      for (const [state, standing] of this.standings) standing.show((conditions || {})[state], now);
+    });
   }
 
   press(key) {

@@ -98,7 +98,8 @@ const waiting = new Map(); // element -> its newest change
 let pressed = null;
 let timer = 0;
 
-function whenLetGo(element, change) {
+// Change what is in an element, unless something in it is pressed: then as soon as that is let go.
+export function whenLetGo(element, change) {
   waiting.delete(element);
   if (pressed && element.contains(pressed)) waiting.set(element, change);
   else change();

@@ -1,6 +1,6 @@
 // What the robot does after an answer.
 import { h, redraw, setText } from './dom.js';
-import { lastLine } from './format.js';
+import { added } from './format.js';
 
 const TOLD = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end', 'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure', 'trial_end', 'query_opened']);
 const LONGEST = 8;
@@ -39,8 +39,7 @@ export class FollowUp {
     const answered = this.events.findIndex((event) => event.kind === 'query_answered' && event.query === this.question.id);
     if (answered < 0) return;
     const told = this.events.slice(answered + 1).filter((event) => TOLD.has(event.kind)).slice(0, LONGEST);
-    redraw(this.steps, told.map((event) => h('li', { class: event.kind }, event.words || event.kind,
-      event.text && event.text !== event.words && h('span', { class: 'dim' }, ' ' + lastLine(event.text)))));
+    redraw(this.steps, told.map((event) => h('li', { class: event.kind }, event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
     const again = told.find((event) => event.kind === 'query_opened');
     setText(this.hint, again ? 'It asks again; the question is in the list.' : '');
   }

@@ -36,6 +36,12 @@ export function lastLine(text) {
   return text.trim().split('\n').pop().slice(-300);
 }
 
+// What the text of an event adds to its words.
+export function added(event) {
+  const text = lastLine(event.text || '');
+  return text && !(event.words || '').includes(text) ? ' ' + text : '';
+}
+
 // A bar for a failure rate, green to red; `share` is what is filled, where it is not the rate itself.
 export function rateBar(rate, share, text) {
   if (rate === null || rate === undefined) return h('span', { class: 'rate unknown' }, '–');

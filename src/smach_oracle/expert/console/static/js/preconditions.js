@@ -15,7 +15,7 @@ export class Preconditions {
       return { root, sign, word, why };
     });
     this.age = h('span', { class: 'dim age' });
-    this.root = h('span', { class: 'preconditions' }, 'preconditions', this.names = h('span', {}, ': ' + names.join(', ')), this.age, this.items.map((item) => item.root));
+    this.root = h('span', { class: 'preconditions' }, 'preconditions', this.age, this.items.map((item) => item.root)); // a line each from the first: what is below stays where it is
   }
 
   // Nothing but their names where the robot tells nothing. `checks`: [{name, holds, text, looked}] in the same order.
@@ -31,9 +31,7 @@ export class Preconditions {
       const shown = 'precondition ' + (check ? kind : '') + (stale ? ' stale' : '');
       if (item.root.className !== shown) item.root.className = shown;
       setText(item.why, check && check.holds !== true && check.text ? ': ' + (check.text.startsWith(check.name + ' ') ? check.text.slice(check.name.length + 1) : check.text).replace('running ' + check.name + ' ', 'running it ') : '');
-      item.root.hidden = !check;
     });
-    this.names.hidden = Boolean(checks);
     setText(this.age, checks && oldest < Infinity ? (age < 1 ? 'as of now' : 'as of ' + duration(age) + ' ago') : '');
   }
 }

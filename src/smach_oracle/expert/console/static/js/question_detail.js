@@ -45,7 +45,7 @@ export class Detail {
     const question = this.question;
     return h('section', { class: 'card failure' }, h('p', { class: 'what' }, question.state, ' ', question.what, '.'),
       question.text && h('pre', { class: 'text' }, question.text),
-      h('dl', {}, fact('Failure rate', [rateBar(question.rate), ' ', chip(CLASSES[question.class] || '?', 'class-' + question.class), question.continuous && chip('continuous', 'warn', 'It failed again without a success in between')]),
+      h('dl', {}, fact('Failure rate', h('span', { class: 'chips' }, rateBar(question.rate), chip(CLASSES[question.class] || '?', 'class-' + question.class), question.continuous && chip('continuous', 'warn', 'It failed again without a success in between'))),
         fact('Asked because', question.reason), fact('Recoveries spent', question.recoveries),
         question.tried.length > 0 && fact('The oracle tried', h('ol', { class: 'tried' }, question.tried.map((step) => h('li', {}, step)))),
         question.deadline !== null && fact('If nobody answers', question.fallback || 'the fallback happens')));
@@ -126,13 +126,8 @@ export class Detail {
     try {
       const reply = await this.app.link.request('answer', Object.assign({ question: this.key }, answer));
       if (reply.ok) {
-        this.settled = 'yours';
         this.held = false;
-        this.followUp = followUp;
-        followUp.begin(answer);
-        replace(this.answers, followUp.root);
-        this.root.classList.add('answered');
-        this.answers.scrollIntoView({ block: 'nearest' });
+        this.turnTo(followUp, answer);
       } else {
         this.problem = reply.message;
       }
@@ -180,12 +175,18 @@ export class Detail {
   // Tell what the robot does after an interface that somebody else may have started.
   follow() {
     if (this.followUp) return;
-    this.settled = 'yours';
-    this.followUp = new FollowUp(this.app, this.question, this.onLeave);
-    this.followUp.begin({ kind: 'interface', name: this.now ? this.now.interface : '' });
-    replace(this.answers, this.followUp.root);
-    this.root.classList.add('answered');
+    this.turnTo(new FollowUp(this.app, this.question, this.onLeave), { kind: 'interface', name: this.now ? this.now.interface : '' });
     this.show();
+  }
+
+  // What the robot does takes the place of what it could do; where the page is narrow it comes first.
+  turnTo(followUp, answer) {
+    this.settled = 'yours';
+    this.followUp = followUp;
+    followUp.begin(answer);
+    replace(this.answers, followUp.root);
+    this.root.classList.add('answered');
+    this.root.scrollIntoView({ block: 'start' });
   }
 
   // What the interface that runs prints, its end, and the controls of the hand that it moves.

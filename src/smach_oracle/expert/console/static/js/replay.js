@@ -1,7 +1,7 @@
 // One trial, to be replayed: a cursor on its time axis, the machine as it stood then, and what happened in words.
 import { Course, activePath, liveAt } from './course.js';
 import { h, replace, setText, typing } from './dom.js';
-import { chip, lastLine } from './format.js';
+import { added, chip } from './format.js';
 import { MachineView } from './machines.js';
 import { StillView } from './situation_camera.js';
 import { Timeline } from './timeline.js';
@@ -239,7 +239,7 @@ export class Replay {
 }
 
 function said(event) {
-  return (event.words || event.kind) + (event.text && event.text !== event.words && event.kind === 'failure' ? ' ' + lastLine(event.text) : '');
+  return (event.words || event.kind) + (event.kind === 'failure' ? added(event) : '');
 }
 
 function seconds(number) {

@@ -1,6 +1,6 @@
 // Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be replayed.
 import { h, redraw, replace, setText } from './dom.js';
-import { chip, clock, duration, lastLine, percent } from './format.js';
+import { added, chip, clock, duration, percent } from './format.js';
 import { Recorded } from './recorded.js';
 import { Replay } from './replay.js';
 
@@ -163,8 +163,7 @@ class Trials {
     this.logged = this.events.length;
     for (const event of fresh) {
       this.log.prepend(h('li', { 'data-seq': event.seq, class: 'event ' + event.kind, onclick: () => this.replay.pick(event.seq) },
-        h('span', { class: 'number dim' }, '+' + (event.t - begin).toFixed(2) + ' s'), h('span', {}, event.words || event.kind,
-          event.text && event.text !== event.words ? h('span', { class: 'dim' }, ' ' + lastLine(event.text)) : null)));
+        h('span', { class: 'number dim' }, '+' + (event.t - begin).toFixed(2) + ' s'), h('span', {}, event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
     }
     while (this.log.childElementCount > SHOWN_EVENTS) this.log.lastElementChild.remove();
     const { robot } = this.trial;
