@@ -37,6 +37,14 @@ def test_without_the_interface_the_state_is_tried_again_and_then_an_earlier_one(
         'PICK', 'DETECT', 'PICK', 'DETECT']
 
 
+def test_what_is_not_worth_more_tries_is_left_undone():
+    means = Means('retry', otherwise='DETECT', leave='PLACE', tries=1)
+    assert [decide(means, situation('PICK', tried)).goto for tried in range(6)] == [
+        'PICK', 'DETECT', 'PICK', 'DETECT', 'PLACE', 'PLACE']
+    means = Means('take', otherwise='DETECT', leave='PLACE', tries=2)
+    assert [decide(means, situation('PICK', tried)).goto for tried in (5, 6)] == ['DETECT', 'PLACE']
+
+
 @pytest.mark.parametrize('means, offered, lacking', [
     ('take', ['hand', 'perception'], 'manipulation'), ('show', [], 'perception'), ('put_down', BOTH, ''),
     ('retry', [], '')])

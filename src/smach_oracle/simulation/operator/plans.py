@@ -12,7 +12,8 @@ DEFAULT = 'default'
 SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
 # and the interface of each, by the name under which the oracle's settings offer it
 MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
-_TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise')
+_TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave')
+_ROUNDS = 2  # of tries and going back, before a state is left undone
 
 
 class Means(NamedTuple):
@@ -27,6 +28,7 @@ class Means(NamedTuple):
     hidden: str = ''  # show: state to go to where nothing of it can be seen
     lost: str = ''  # put_down: state to go to where the hand holds nothing
     otherwise: str = ''  # state to go to after `tries` tries; '' : the failed one itself
+    leave: str = ''  # state to go on to, this one left undone, where all that was tried twice; '' : never
     tries: int = 2
 
 
@@ -78,6 +80,8 @@ def decide(means: Means, situation: Situation) -> Decision:
         return Decision(goto=next((each for each in (state, situation.state) if each in situation.states), ''), why=why)
 
     interface = MEANS[means.means]
+    if means.leave and situation.tried >= _ROUNDS * (means.tries + 1):
+        return go(means.leave, 'it is left as it is')
     if interface not in situation.interfaces:
         tired = situation.tried % (means.tries + 1) == means.tries
         return go(means.otherwise if tired else '', 'once more' if not tired else 'from further back')
