@@ -132,6 +132,13 @@ class TheEye(ConsolePage, unittest.TestCase):
             'const view = document.querySelector(".camera-view .picture");'
             'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, 1).data[0] > 20')))
         self.assertEqual(self.camera._rgb.get_num_connections(), 1)
+        browser.driver.delete_all_cookies()  # as when a session has become too old while its page was open
+        self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
+        self.assertTrue(wait_for(lambda: browser.run(
+            'const view = document.querySelector(".camera-view .picture");'
+            'const [red, , blue] = view.getContext("2d").getImageData(320, 336, 1, 1).data; return blue > red + 40')))
+        self.camera.show([TABLE, CAN, BOX])
+        self.assertTrue(any('401' in entry for entry in browser.errors()), 'it was refused once')
         browser.click('.camera-view .view-close')
         self.assertTrue(wait_for(lambda: self.camera._rgb.get_num_connections() == 0, 30.0), 'nobody looks any more')
 
@@ -150,7 +157,8 @@ class TheEye(ConsolePage, unittest.TestCase):
     def test_5_the_robot_stands_in_its_cloud_and_moves_as_its_joints_say(self):
         browser, canvas = self.browser, '.cloud-view .cloud'
         self.assertTrue(wait_for(
-            lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(canvas, 'points') == 20000))
+            lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(canvas, 'points') == 20000),
+            (self.drawn(canvas, 'triangles'), self.drawn(canvas, 'points'), browser.text('.cloud-view')))
         before = browser.run(PICTURE, canvas)[0]
         self.joints.publish(JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))
         self.assertTrue(wait_for(lambda: browser.run(PICTURE, canvas)[0] != before))

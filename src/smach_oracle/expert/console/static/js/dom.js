@@ -93,7 +93,7 @@ function alike(old, fresh) {
 
 // What is pressed stays under the pointer until it is let go: around it nothing comes or goes meanwhile.
 const CLICK_MS = 100; // by then the click of what was let go has come
-const PRESSED = 'button, summary, [role="button"], .mark';
+const PRESSED = 'button, summary, [role="button"], .mark, .event';
 const waiting = new Map(); // element -> its newest change
 let pressed = null;
 let timer = 0;

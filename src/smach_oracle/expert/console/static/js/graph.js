@@ -1,6 +1,6 @@
 // One container drawn from the positions that dot gave the server. ORACLE is a rail at the right side: every state's
 // edge to it and back is a short line, pale until it was used.
-import { h, s } from './dom.js';
+import { h, s, whenLetGo } from './dom.js';
 import { hue, percent, times } from './format.js';
 
 const RAIL_GAP = 96;
@@ -150,7 +150,7 @@ export class Graph {
     const key = focus + ' ' + this.follow;
     if (this.follow && key !== this.focusKey) {
       this.focusKey = key;
-      this.place();
+      whenLetGo(this.layer, () => this.place());
     }
   }
 

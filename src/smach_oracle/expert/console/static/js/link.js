@@ -88,10 +88,10 @@ export class Link {
     const socket = this.socket = new WebSocket(address);
     socket.onmessage = (event) => this.take(JSON.parse(event.data));
     socket.onclose = (event) => {
+      if (event.code === SIGNED_OUT && !this.leaving) this.onEnd();
       if (generation !== this.generation) return;
       this.fail();
-      if (event.code === SIGNED_OUT) this.onEnd();
-      else this.again();
+      this.again();
     };
     socket.onopen = async () => {
       try {
@@ -156,21 +156,24 @@ export class Link {
 
   // Whether it could be done.
   async signOut() {
-    this.generation += 1; // the socket may be closed before the answer is here
+    this.leaving = true; // the socket may be closed before the answer is here
     const answer = await this.fetch('session', { method: 'DELETE' }).catch(() => null);
-    if (answer && answer.ok) return true;
-    this.again();
-    return false;
+    this.leaving = Boolean(answer && answer.ok);
+    return this.leaving;
   }
 
-  // What this page alone may ask for. Where another page of this browser has begun a new session meanwhile (all of them share
-  // the cookie), it is asked for once more in the name of that.
+  // What this page alone may ask for. Where there is a new session meanwhile, begun by another page of this browser (all of
+  // them share the cookie) or because the old one had become too old, it is asked for once more in the name of that.
   async fetch(path, options) {
     const { xsrf } = this.session;
     const ask = () => fetch(path, Object.assign({ cache: 'no-store' }, options, { headers: { 'X-Xsrf': this.session.xsrf } }));
     const answer = await ask();
-    if (answer.status !== 403) return answer;
+    if (answer.status !== 403 && answer.status !== 401) return answer;
     if (this.session.xsrf === xsrf) Object.assign(this.session, await this.whoAmI());
+    if (!this.session.signed_in && this.connected && !this.leaving) {
+      this.fail();
+      this.connect(); // which asks for the token
+    }
     return this.session.xsrf === xsrf ? answer : ask();
   }
 }

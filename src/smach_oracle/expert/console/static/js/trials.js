@@ -1,5 +1,5 @@
 // Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be replayed.
-import { h, redraw, replace, setText } from './dom.js';
+import { h, redraw, replace, setText, whenLetGo } from './dom.js';
 import { added, chip, clock, duration, percent } from './format.js';
 import { Recorded } from './recorded.js';
 import { Replay } from './replay.js';
@@ -158,17 +158,20 @@ class Trials {
     if (!this.events.length) return;
     const last = this.events[this.events.length - 1].t;
     const running = !this.bag && !this.trial.ending && !this.trial.outcome;
-    const begin = this.events[0].t;
+    whenLetGo(this.log, () => this.showLog());
+    const { robot } = this.trial;
+    this.replay.set(this.chosen, this.events, running ? Math.max(last, this.app.store.now()) : last,
+      this.bag ? (path) => this.recorded.opened.graphs[path] : (path) => this.app.store.get('graph ' + robot + ' ' + path), running, this.bag && this.recorded.opened.stills);
+  }
+
+  showLog() {
     const fresh = this.events.slice(this.logged);
     this.logged = this.events.length;
     for (const event of fresh) {
       this.log.prepend(h('li', { 'data-seq': event.seq, class: 'event ' + event.kind, onclick: () => this.replay.pick(event.seq) },
-        h('span', { class: 'number dim' }, '+' + (event.t - begin).toFixed(2) + ' s'), h('span', {}, event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
+        h('span', { class: 'number dim' }, '+' + (event.t - this.events[0].t).toFixed(2) + ' s'), h('span', {}, event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
     }
     while (this.log.childElementCount > SHOWN_EVENTS) this.log.lastElementChild.remove();
-    const { robot } = this.trial;
-    this.replay.set(this.chosen, this.events, running ? Math.max(last, this.app.store.now()) : last,
-      this.bag ? (path) => this.recorded.opened.graphs[path] : (path) => this.app.store.get('graph ' + robot + ' ' + path), running, this.bag && this.recorded.opened.stills);
   }
 
   // The event under the cursor, in the log.
