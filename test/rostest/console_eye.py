@@ -177,6 +177,17 @@ class TheEye(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000), 'with the robot')
         self.assertEqual(browser.errors(), [])
 
+    def test_6_with_a_cloud_that_came_before_its_transform_the_robot_stands_as_soon_as_that_is_known(self):
+        browser, view = self.browser, '.cloud-view[data-topic="/early"]'
+        early = rospy.Publisher('early', PointCloud2, queue_size=1, latch=True)
+        early.publish(cloud_message(np.random.default_rng(1).uniform(-1, 1, (500, 3)), Header(frame_id='early')))
+        browser.click('.sensor-list [data-topic="/early"]')
+        self.assertTrue(browser.says('No transform from early', view), browser.text(view))
+        self.assertEqual(self.drawn(view + ' .cloud', 'triangles'), 0)
+        self.camera.tell_place('early')
+        self.assertTrue(wait_for(lambda: self.drawn(view + ' .cloud', 'triangles') > 10000), browser.text(view))
+        browser.click('.sensor-list [data-topic="/early"]')
+
     def test_7_a_robot_description_that_would_do_harm_is_told_in_a_sentence(self):
         rospy.set_param('/evil/robot_description', '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>')
         evil = '[data-topic="/evil/robot_description"]'

@@ -31,15 +31,19 @@ class PublishedCamera:
         self._info = rospy.Publisher(topic[0] + 'camera_info', CameraInfo, queue_size=1)
         self._lock = threading.Lock()
         self._transforms = tf2_ros.StaticTransformBroadcaster()
-        place = TransformStamped(Header(frame_id='base_footprint'), OPTICAL,
-                                 Transform(Vector3(*POSE[:3, 3]), Quaternion(*quaternion(POSE))))
-        self._transforms.sendTransform([place])
+        self.tell_place()
         self.show(bodies)
         self.shots = 0
         if streams:
             threading.Thread(target=self._stream, daemon=True).start()
         else:
             self._service = rospy.Service('world/snapshot', Snapshot, self._snap)
+
+    def tell_place(self, *more) -> None:
+        """Where its frame is, and that these are there, too."""
+        place = Transform(Vector3(*POSE[:3, 3]), Quaternion(*quaternion(POSE)))
+        self._transforms.sendTransform([TransformStamped(Header(frame_id='base_footprint'), frame, place)
+                                        for frame in (OPTICAL,) + more])
 
     def show(self, bodies) -> None:
         self._seen = see(bodies, POSE, np.random.default_rng(5))

@@ -64,7 +64,7 @@ export class FrameFeed {
       { signal: this.controller.signal });
     if (answer.status === 204) {
       this.say(after ? 'Nothing new comes.' : 'Nothing comes.');
-      return after;
+      return this.astray ? 0 : after; // the last one again: its place may be known by now
     }
     if (answer.status === 422) {
       this.say(await answer.text());
@@ -76,6 +76,7 @@ export class FrameFeed {
     }
     const told = answer.headers.get('X-Facts');
     const facts = told ? JSON.parse(told) : await answer.json();
+    this.astray = Boolean(facts.astray);
     await this.take(answer, facts);
     this.times.push(performance.now());
     this.say('');
