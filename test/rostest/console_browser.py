@@ -140,6 +140,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
                  '["It warns: no cup", "PICK failed."].map((words) => added({ words, text: "no cup" })))')
         self.assertEqual(browser.run(added), ['', ' no cup'], 'nothing is told twice')
         browser.find('.timeline .mark')
+        self.assertTrue(wait_for(lambda: not browser.text('.trial-detail p').startswith('0 s')), 'it runs on')
         self.assertEqual(browser.errors(), [])
 
     def test_5_every_command_about_a_trial_is_in_its_bag(self):

@@ -148,7 +148,7 @@ class Trials {
     if (!trial) return;
     this.trial = trial;
     setText(this.title, trial.experiment + ' · ' + clock(trial.start));
-    setText(this.facts, summary(trial) + (trial.lost ? ' · ' + trial.lost + ' events missing' : '') + (trial.detailed ? '' : ' · its events are no longer kept') + (trial.bag ? ' · ' + trial.bag : ''));
+    setText(this.facts, summary(trial, this.app.store.now()) + (trial.lost ? ' · ' + trial.lost + ' events missing' : '') + (trial.detailed ? '' : ' · its events are no longer kept') + (trial.bag ? ' · ' + trial.bag : ''));
     this.showEvents();
   }
 
@@ -157,7 +157,7 @@ class Trials {
     this.replay.root.hidden = !this.events.length;
     if (!this.events.length) return;
     const last = this.events[this.events.length - 1].t;
-    const running = !this.bag && !this.trial.ending && !this.trial.outcome;
+    const running = !this.bag && runs(this.trial);
     whenLetGo(this.log, () => this.showLog());
     const { robot } = this.trial;
     this.replay.set(this.chosen, this.events, running ? Math.max(last, this.app.store.now()) : last,
@@ -184,7 +184,7 @@ class Trials {
     if (top < this.log.scrollTop || top + this.marked.offsetHeight > this.log.scrollTop + this.log.clientHeight) this.log.scrollTop = top - this.log.clientHeight / 2;
   }
 
-  tick() { if (this.trial && !this.bag && !this.trial.ending && !this.trial.outcome) this.showEvents(); }
+  tick() { if (this.trial && !this.bag && runs(this.trial)) this.showFacts(this.trial); }
 }
 
 function counted(caption, table) {
@@ -195,10 +195,13 @@ function counted(caption, table) {
       share({ trials: row.endings.failure }, row.runs)))));
 }
 
-function summary(trial) {
-  const parts = [duration(trial.end - trial.start)];
+function runs(trial) { return trial.number === undefined && !trial.ending && !trial.outcome; }
+
+// `now`: by the server's clock; without it nothing is said of how long a trial has run that has not ended.
+function summary(trial, now) {
+  const parts = runs(trial) ? [now && duration(now - trial.start)].filter(Boolean) : [duration(trial.end - trial.start)];
   for (const [number, one, many] of [[trial.failures, 'failure', 'failures'], [trial.recoveries, 'recovery', 'recoveries'], [trial.questions, 'question', 'questions']]) {
     if (number) parts.push(number + ' ' + (number === 1 ? one : many));
   }
-  return parts.join(' · ');
+  return parts.join(' · ') || 'no failure yet';
 }
