@@ -10,12 +10,13 @@ from std_msgs.msg import Header
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal, PickGoal
 from smach_oracle.simulation.robot import door, kitchen_skills
-from smach_oracle.simulation.robot.arm import Means, SkillError
+from smach_oracle.simulation.robot.arm import Arm, Means, SkillError
 from smach_oracle.simulation.robot.collision import installed_model
 from smach_oracle.simulation.robot.door_view import DoorNotSeen, find_door
 from smach_oracle.simulation.robot.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
 from smach_oracle.simulation.robot.kitchen_skills import KitchenSkills
 from smach_oracle.simulation.robot.pick import Slipped
+from smach_oracle.simulation.robot.travel import carry, stow
 from smach_oracle.simulation.world import drink_rehearsal
 from smach_oracle.simulation.world.direct import DirectRobot
 from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
@@ -172,6 +173,38 @@ def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monke
     with pytest.raises(SkillError, match='caught behind'):
         door.open_door(Means(robot, installed_model()), Kitchen(), 'right')
     assert world.true_base()[0, 3] < 0.4 - 0.3
+    world.close()
+
+
+@pytest.mark.parametrize('hand', [(0.45, 0.28, 0.88), (0.60, -0.30, 1.0)])
+def test_a_hand_in_the_way_goes_to_its_side_before_the_other_shuts_the_door(hand):
+    """As a person may leave it, who took the drink out."""
+    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
+    robot = DirectRobot(world)
+    means = Means(robot, installed_model())
+    robot.torso(drink_rehearsal.TORSO_HEIGHT)
+    stow(means, ('left',), {})
+    with Arm(means, 'right', {}, 1) as limb:
+        limb.go(limb.reach(from_rpy(hand, yaw=0.3))[0])
+    door.close_door(means, Kitchen(), 'left')
+    assert world.body_joint('fridge', DOOR_JOINT) < 2 * door.STEP
+    world.close()
+
+
+def test_what_a_person_put_into_a_hand_that_is_not_level_stays_upright():
+    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
+    means = Means(DirectRobot(world), installed_model())
+    with Arm(means, 'right', {}, 1) as limb:
+        limb.go(limb.reach(from_rpy((0.55, -0.20, 0.95), pitch=0.3, yaw=0.5))[0])
+        before = limb.pose()
+        carry(limb, level=False)
+        after = limb.pose()
+    assert after[1, 3] < -0.25
+    held = kitchen_skills.unknown_held(means, 'right')
+    upright = held.grasp @ held.tool_from_object
+    assert np.allclose(upright[:3, :3], np.eye(3)) and np.allclose(upright[:3, 3], after[:3, 3])
+    hanging = np.linalg.inv(before)[:3, 2]  # the vertical, in the tool
+    assert np.degrees(np.arccos((after[:3, :3] @ hanging)[2])) < 1.0
     world.close()
 
 

@@ -26,6 +26,7 @@ PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on fr
 WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
+BEFORE_CHEST = (0.30, 0.20)  # m ahead at least, m to its side at most: a hand there is in the other arm's way
 AWAY = 0.16  # m that the base takes the hand back from the bar
 AWAY_FOR_GOOD = 0.40  # m, after a failure
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
@@ -120,10 +121,12 @@ def _stand_before(means: Means, kitchen: Kitchen) -> DoorView:
 
 
 def _clear_of_door(means: Means, arm: str) -> None:
-    """Take a hand that reaches ahead into the door's way to the side, with what it may hold."""
+    """Take a hand that is in the way of the door, or of the arm that pushes it, to its side, with what it may hold."""
     with Arm(means, arm, {}, seed_of(arm, read_joints(means.robot))) as limb:
-        if limb.pose()[0, 3] > AHEAD:
-            carry(limb)
+        ahead, left = limb.pose()[:2, 3]
+        beside = left if arm == 'left' else -left
+        if ahead > AHEAD or (ahead > BEFORE_CHEST[0] and beside < BEFORE_CHEST[1]):
+            carry(limb, level=False)
 
 
 def _step_back(means: Means, length: float) -> None:

@@ -1,11 +1,9 @@
 """The skills of the second use case over messages: the refrigerator's door, picking inside it, handing over."""
-import numpy as np
-
 from smach_oracle.msg import (CloseDoorGoal, CloseDoorResult, HandOverGoal, HandOverResult, OpenDoorGoal,
                               OpenDoorResult, PickGoal, PickResult)
 
-from ...geometry.transforms import transform
-from .arm import Means, read_joints
+from ...geometry.transforms import inverse, transform
+from .arm import Arm, Means, read_joints, seed_of
 from .door import close_door, open_door
 from .drink import things_on_shelf
 from .frames import box_in_base, pose_in_base, pose_message
@@ -59,11 +57,13 @@ class KitchenSkills(Manipulation):
         arm = known_arm(goal.arm)
         palm = pose_in_base(goal.pose, self.means.robot, 'pose')[:3, 3]
         say('handing over')
-        hand_over(self.means, arm, palm, self.held.get(arm) or unknown_held())
+        hand_over(self.means, arm, palm, self.held.get(arm) or unknown_held(self.means, arm))
         self.held.pop(arm, None)
         return HandOverResult()
 
 
-def unknown_held() -> Held:
-    """Something of the usual size, held level about its middle: nothing else is known of what a person put there."""
-    return Held(np.eye(4), transform(), USUAL, FIRM)
+def unknown_held(means: Means, arm: str) -> Held:
+    """Something of the usual size, upright as the hand is now, held about its middle: what a person put there."""
+    with Arm(means, arm, {}, seed_of(arm)) as limb:
+        tool = limb.pose()
+    return Held(tool, inverse(tool) @ transform(tool[:3, 3]), USUAL, FIRM)

@@ -3,7 +3,7 @@ from typing import Iterable, Mapping
 
 import numpy as np
 
-from ...geometry.transforms import from_rpy
+from ...geometry.transforms import from_rpy, transform, yaw_of
 from .arm import Arm, Means, SkillError, Unreachable, read_joints, seed_of
 from .interface import RobotError
 from .kitchen import MapBox
@@ -31,16 +31,20 @@ def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None
                 limb.go(TRAVEL[arm])
 
 
-def carry(limb: Arm) -> None:
-    """Take the hand to the robot's side, level in the end, the elbow low and out of the camera's view.
+def carry(limb: Arm, level: bool = True) -> None:
+    """Take the hand to the robot's side, the elbow low and out of the camera's view.
 
+    :param level: whether the hand is level in the end; if not, it is turned about the vertical alone, so that what it
+        holds is as upright as it is now.
     :raises SkillError: where the arm does not get there.
     """
-    height = min(max(limb.pose()[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
+    now = limb.pose()
+    height = min(max(now[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
+    tilt = np.eye(4) if level else transform(rotation=from_rpy((0, 0, 0), yaw=-yaw_of(now))[:3, :3] @ now[:3, :3])
     for x, y, yaw in CARRIES:
         side = 1.0 if limb.name == 'right' else -1.0
         try:
-            found = limb.reach(from_rpy((x, side * y, height), yaw=side * yaw), near=TRAVEL[limb.name])
+            found = limb.reach(from_rpy((x, side * y, height), yaw=side * yaw) @ tilt, near=TRAVEL[limb.name])
         except Unreachable:
             continue
         if found:
