@@ -101,14 +101,21 @@ class Toggle:
     def __init__(self, settings: JoySettings) -> None:
         self._settings = settings
         self._down = False
+        self._counts = False  # it was pressed while the dead-man was held
         self._closes = False
 
     def applied(self, wish: Wish, buttons: Sequence[int]) -> Wish:
-        """A wish, with what the button has to say of the gripper; it counts only while the dead-man is held."""
-        was_down, self._down = self._down, wish.held and _pressed(buttons, self._settings.toggle)
-        if not self._down:
+        """A wish, with what the button has to say of the gripper.
+
+        A press counts if the dead-man is held when it begins, and is repeated while both are held: a moment without the
+        dead-man in the midst of a press is no new one, and does not open the hand.
+        """
+        was_down, self._down = self._down, _pressed(buttons, self._settings.toggle)
+        if self._down and not was_down:
+            self._counts = wish.held
+            self._closes = self._closes != wish.held
+        if not (self._down and self._counts and wish.held):
             return wish
-        self._closes = self._closes if was_down else not self._closes
         return wish._replace(gripper=0.0 if self._closes else self._settings.gripper_open)
 
 

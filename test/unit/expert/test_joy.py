@@ -49,6 +49,25 @@ def test_one_button_closes_and_opens_the_gripper_by_turns_while_the_dead_man_is_
         None, 0.0, 0.0, None, 0.07, None, None, None, 0.0]
 
 
+@pytest.mark.parametrize('messages, gripper', [
+    # a moment without the dead-man, with the button down throughout
+    ([([], [1, 1]), ([], [0, 1]), ([], [1, 1])], [0.0, None, 0.0]),
+    ([([], [1, 1]), ([], [0, 1]), ([], [1, 1]), ([], [1, 0]), ([], [1, 1])], [0.0, None, 0.0, None, 0.07]),
+    # a moment with an axis that is no number
+    ([([0.0], [1, 1]), ([math.nan], [1, 1]), ([0.0], [1, 1])], [0.0, None, 0.0]),
+    # pressed before the dead-man
+    ([([], [0, 1]), ([], [1, 1]), ([], [1, 1])], [None, None, None]),
+    ([([], [1, 1]), ([], [1, 0]), ([], [0, 1]), ([], [1, 1]), ([], [1, 0]), ([], [1, 1])],
+     [0.0, None, None, None, None, 0.07]),
+    # let go without the dead-man: the next press is a new one
+    ([([], [1, 1]), ([], [0, 1]), ([], [0, 0]), ([], [1, 1])], [0.0, None, None, 0.07])])
+def test_the_gripper_turns_round_only_at_a_press_that_begins_with_the_dead_man_held(messages, gripper):
+    settings = JoySettings.from_dict(dict(GIVEN, axes={'x': [0, 0.2]}, buttons={'dead_man': 0, 'toggle': 1},
+                                          gripper_open=0.07))
+    toggle = Toggle(settings)
+    assert [toggle.applied(wish_of(settings, axes, buttons), buttons).gripper for axes, buttons in messages] == gripper
+
+
 @pytest.mark.parametrize('key, changes', [
     ('~axes', {'axes': {}}), ('~axes/up', {'axes': {'up': [0, 1]}}), ('~axes/x', {'axes': {'x': 0}}),
     ('~axes/x', {'axes': {'x': [-1, 0.1]}}), ('~axes/x', {'axes': {'x': [0, 50.0]}}), ('~buttons', {'buttons': {}}),
