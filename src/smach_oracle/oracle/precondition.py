@@ -6,7 +6,7 @@ from .events import FailureKind
 from .failure import failure_kind, route_of
 from .naming import is_preempted
 from .precondition_spec import PreconditionKind, PreconditionSpec
-from .userdata import Gate, behind, view_of
+from .userdata import Gate, WriteWatch, behind, view_of
 
 
 class NotMet(Exception):
@@ -19,10 +19,11 @@ class PreconditionRunner:
     `cancel` may be called from any thread, at any time: the state that runs is preempted, nothing more begins.
     """
 
-    def __init__(self, machine: Any, ledger: Any, gate: Gate) -> None:
+    def __init__(self, machine: Any, ledger: Any, watch: WriteWatch) -> None:
         self._machine = machine
         self._ledger = ledger
-        self._gate = gate
+        self._watch = watch
+        self._gate = watch.gate
         self._lock = threading.Lock()
         self._running: Optional[Any] = None
         self._cancelled = False
@@ -37,20 +38,21 @@ class PreconditionRunner:
 
     def run(self, spec: PreconditionSpec) -> str:
         """Return '' where the precondition is met, else why not; what it wrote until then is taken back."""
-        begun = self._gate.begin()
+        begun = self._watch.begin()
         try:
             self._achieve(spec)
         except NotMet as why:
-            self._gate.take_back(begun)
+            self._watch.take_back(begun)
             return str(why)
-        self._gate.keep(begun)
         return ''
 
     def _achieve(self, spec: PreconditionSpec) -> None:
         if spec.kind is PreconditionKind.PAIR:
             check, achieve = spec.target
-            if self.run(check):
-                self._achieve(achieve)
+            try:
+                self._achieve(check)
+            except NotMet:
+                self._achieve(achieve)  # it may need what the check has found
         elif spec.kind is PreconditionKind.CALLABLE:
             self._call(spec)
         elif spec.kind is PreconditionKind.STATE:

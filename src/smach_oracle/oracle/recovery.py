@@ -31,7 +31,7 @@ class Recovery:
         self.tried: List[str] = []
         self.reason = ''
         self.watch = WriteWatch(self.machine, ledger.deep_copy_keys)
-        self._preconditions = PreconditionRunner(self.machine, ledger, self.watch.gate)
+        self._preconditions = PreconditionRunner(self.machine, ledger, self.watch)
 
     @property
     def label(self) -> str:

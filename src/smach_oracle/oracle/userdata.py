@@ -7,7 +7,7 @@ import copy
 import pickle
 import threading
 from collections.abc import MutableMapping
-from typing import Any, Callable, Dict, Iterable, Iterator, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Set, Tuple
 
 import smach
 
@@ -30,31 +30,6 @@ class Gate(MutableMapping):
         other = Gate(self._machine, self._on_late_write)
         other.written = self.written
         return other
-
-    def begin(self) -> Tuple[Dict[str, Any], Set[str]]:
-        """Begin to write what may be taken back; returns what `keep` or `take_back` needs."""
-        with self._lock:
-            before = set(self.written)
-            self.written.clear()
-            return dict(self._machine.userdata._data), before
-
-    def keep(self, begun: Tuple[Dict[str, Any], Set[str]]) -> None:
-        """What was written since `begin` stays."""
-        with self._lock:
-            self.written.update(begun[1])
-
-    def take_back(self, begun: Tuple[Dict[str, Any], Set[str]]) -> None:
-        """Each key written since `begin` is again what it was; what was changed inside an object stays changed."""
-        values, before = begun
-        data = self._machine.userdata._data
-        with self._lock:
-            for key in self.written:
-                if key in values:
-                    data[key] = values[key]
-                else:
-                    data.pop(key, None)
-            self.written.clear()
-            self.written.update(before)
 
     def shut(self) -> None:
         """Let no write pass from now on."""
@@ -135,6 +110,15 @@ def _copied(value: Any) -> Any:
         return value
 
 
+class Begun(NamedTuple):
+    """Userdata at a moment: values, copies and fingerprints of the deep-copied keys, the keys written until then."""
+
+    data: Dict[str, Any]
+    copies: Dict[str, Any]
+    prints: Dict[str, Optional[bytes]]
+    written: Set[str]
+
+
 class WriteWatch:
     """Tells which keys of a container's userdata change between its making and `written`, whoever writes them.
 
@@ -148,6 +132,26 @@ class WriteWatch:
         self.gate = Gate(machine)
         self._before = dict(machine.userdata._data)
         self._prints = {key: _fingerprint(self._before[key]) for key in self._deep if key in self._before}
+
+    def begin(self) -> Begun:
+        """Begin with what may be taken back."""
+        data = dict(self._machine.userdata._data)
+        copies = {key: _copied(data[key]) for key in self._deep if key in data}
+        return Begun(data, copies, {key: _fingerprint(data[key]) for key in copies}, set(self.gate.written))
+
+    def take_back(self, begun: Begun) -> None:
+        """Userdata is again what it was, and does not count as written; objects that were changed inside stay changed,
+        but for the deep-copied keys."""
+        data = self._machine.userdata._data
+        for key, value in begun.data.items():
+            if key in begun.prints and _fingerprint(value) != begun.prints[key]:
+                if self._before.get(key) is value and self._prints.get(key) == begun.prints[key]:
+                    self._before[key] = begun.copies[key]
+                value = begun.copies[key]
+            data[key] = value
+        for key in set(data).difference(begun.data):
+            del data[key]
+        self.gate.written.intersection_update(begun.written)
 
     def written(self) -> Set[str]:
         """Return the keys set, deleted or changed so far."""

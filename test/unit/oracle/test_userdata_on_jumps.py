@@ -116,16 +116,41 @@ def test_of_two_preconditions_the_one_that_was_met_keeps_what_it_wrote():
     assert seen[-1] == {'x': 'achieved'}
 
 
-def test_a_check_that_is_false_leaves_nothing_and_what_achieves_it_does():
+@pytest.mark.parametrize('achieves', [True, False])
+def test_what_a_check_found_is_there_for_what_achieves_it(achieves):
     def check(ud):
-        ud.new = 'looked'
+        ud.new = 'found'
         return False
 
     def achieve(ud):
-        ud.x = 'achieved'
-        return True
+        ud.x = ud.new
+        return achieves
     _, seen = run(['aborted'], [(check, achieve)])
-    assert seen[1] == {'x': 'achieved'}
+    assert seen[1] == ({'x': 'found', 'new': 'found'} if achieves else {'x': 'at the start'})
+
+
+def test_what_an_unmet_precondition_wrote_past_its_view_is_taken_back():
+    machine = machine_of(Scripted('aborted', **IO), [lambda ud: setattr(holder[0].userdata, 'x', 'half achieved')])
+    holder = [machine.machine]
+    machine.run()
+    assert machine.machine.userdata.x == 'at the start'
+
+
+def test_what_an_unmet_precondition_changed_inside_a_deep_copied_key_is_taken_back():
+    machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
+    machine.userdata.x = ['at the start']
+    Watched(machine, preconditions={'B': [lambda ud: ud.x.append('half achieved')]},
+            settings={'deep_copy_keys': ['x'], 'userdata': 'restore'}).run()
+    assert machine.userdata.x == ['at the start']
+
+
+def test_what_a_met_one_changed_there_before_stays():
+    machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
+    machine.userdata.x = ['at the start']
+    Watched(machine, preconditions={'B': [lambda ud: ud.x.append('achieved') or True,
+                                          lambda ud: ud.x.append('half achieved')]},
+            settings={'deep_copy_keys': ['x']}).run()
+    assert machine.userdata.x == ['at the start', 'achieved']
 
 
 def test_what_a_nested_machine_as_precondition_wrote_survives():
