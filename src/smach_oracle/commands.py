@@ -15,7 +15,10 @@ def run(module: str) -> None:
         main = import_module('smach_oracle.' + module).main
     except ImportError as err:
         from smach_oracle.oracle.packages import lacking
-        sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), lacking(err)))
+        told = lacking(err)
+        if not told:
+            raise
+        sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), told))
         sys.exit(LACKING)
     code = main()
     if code:

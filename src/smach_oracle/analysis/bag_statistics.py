@@ -70,4 +70,3 @@ def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> 
         suffix = '' if len(series) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_', '_'.join(told)).strip('_')
         for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
-

@@ -36,7 +36,7 @@ def tell_skipped(skipped: Sequence[Skipped]) -> int:
 
 def complain(command: str, why: Union[str, Exception]) -> int:
     """Tell on standard error why a command has nothing to say; returns the exit code."""
-    text = lacking(why) if isinstance(why, ImportError) else str(why)
+    text = isinstance(why, ImportError) and lacking(why) or str(why)
     sys.stdout.flush()
     sys.stderr.write('{}: {}\n'.format(command, text))
     return NOTHING_COUNTED

@@ -1,7 +1,8 @@
 """The executive. Imports smach and the standard library only; its pure parts do not even import smach.
 
 Pure: errors, events, question, naming, failure_rate, history, policy, precondition_spec, config, config_values,
-state_record. `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
+state_record, packages, paths. `OracleContainer` is imported when it is first asked for, so that the pure parts need no
+smach.
 """
 from typing import Any
 

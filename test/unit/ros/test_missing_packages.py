@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from smach_oracle import commands
+from smach_oracle.analysis.reading import complain
 from smach_oracle.oracle.packages import lacking
 
 SCRIPTS = Path(__file__).resolve().parents[3] / 'scripts'
@@ -57,12 +59,24 @@ def test_every_command_starts_in_the_one_way():
 
 @pytest.mark.parametrize('name, words', [
     ('cv2.gapi', 'opencv-python-headless'), ('yaml', 'PyYAML'), ('rosbags.rosbag1', 'pip install rosbags'),
-    ('sensor_msgs.msg', 'setup.bash'), ('smach_oracle.msg', 'setup.bash'), ('tf2_ros', 'setup.bash')])
+    ('message_filters', 'setup.bash'), ('sensor_msgs.msg', 'setup.bash'),
+    ('smach_oracle.msg', 'setup.bash'), ('tf2_ros', 'setup.bash')])
 def test_packages_have_the_names_that_install_them(name, words):
-    assert words in lacking(ImportError('No module named {!r}'.format(name), name=name))
+    assert words in lacking(ModuleNotFoundError('No module named {!r}'.format(name), name=name))
 
 
-@pytest.mark.parametrize('name', ['smach_oracle.oracle.nothing', None])
-def test_an_error_of_our_own_is_no_missing_package(name):
-    with pytest.raises(ImportError, match='broken'):
-        lacking(ImportError('broken', name=name))
+@pytest.mark.parametrize('err', [
+    ModuleNotFoundError('broken', name='smach_oracle.oracle.nothing'), ModuleNotFoundError('broken'),
+    ModuleNotFoundError('broken', name='_curses'), ImportError('cannot import name', name='cv2')])
+def test_what_no_package_would_cure_is_no_missing_package(err):
+    assert lacking(err) == ''
+
+
+def test_such_an_error_is_raised_where_a_command_starts_and_told_where_bags_are_read(monkeypatch, capsys):
+    def broken(name):
+        raise ImportError('the C extension is broken')
+    monkeypatch.setattr(commands, 'import_module', broken)
+    with pytest.raises(ImportError, match='is broken'):
+        commands.run('analysis.sweep')
+    assert complain('what_if', ImportError('the C extension is broken')) == 2
+    assert capsys.readouterr().err == 'what_if: the C extension is broken\n'

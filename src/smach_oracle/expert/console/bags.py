@@ -66,7 +66,7 @@ class BagShelf:
         try:
             self._reader = EventReader(MOST_EVENTS)
         except ImportError as err:  # it needs rosbags, which not every robot has
-            self._notes = [lacking(err)]
+            self._notes = [lacking(err) or str(err)]
             self.draw(0)
             return
         while not rospy.is_shutdown():

@@ -178,7 +178,7 @@ def main(argv: Optional[List[str]] = None) -> int:
                 print('Going on in {}'.format(output))
             jobs = run(args.plan, output, args.jobs, args.hung_after)
     except ImportError as err:  # bags are read with a package that not every robot has
-        print('run_trials: {}'.format(lacking(err)), file=sys.stderr)
+        print('run_trials: {}'.format(lacking(err) or err), file=sys.stderr)
         return LACKING
     except (ExperimentError, OSError) as err:
         print('run_trials: {}'.format(err), file=sys.stderr)
