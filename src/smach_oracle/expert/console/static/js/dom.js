@@ -118,7 +118,12 @@ window.addEventListener('pointerdown', (event) => {
   pressed = event.button || !(event.target instanceof Element) ? null : event.target.closest(PRESSED);
 }, true);
 window.addEventListener('click', letGo, true);
-for (const type of ['pointerup', 'pointercancel']) window.addEventListener(type, () => { timer = setTimeout(letGo, CLICK_MS); }, true);
+for (const type of ['pointerup', 'pointercancel']) {
+  window.addEventListener(type, () => {
+    clearTimeout(timer); // of another finger
+    timer = setTimeout(letGo, CLICK_MS);
+  }, true);
+}
 window.addEventListener('blur', letGo);
 
 // Change an element only where its content differs, so that selections and scroll positions stay.
