@@ -32,7 +32,7 @@ export function breakable(name, sign) {
 }
 
 // Of a traceback that is the line that says what happened.
-export function lastLine(text) {
+function lastLine(text) {
   return text.trim().split('\n').pop().slice(-300);
 }
 
