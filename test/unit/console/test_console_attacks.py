@@ -71,8 +71,8 @@ class TestOdd(console_case.ConsoleCase):
                           Forwarded='for=10.2.0.{}'.format(number)).code for number in range(4)]
         assert codes == [200, 200, 429, 429]
 
-    def cookie_of(self, secret, clock=time.time):
-        text = sessions.to_text(sessions.Session('known-to-the-attacker', 'teleoperator', ''))
+    def cookie_of(self, secret, clock=time.time, text=None):
+        text = text or sessions.to_text(sessions.Session('known-to-the-attacker', time.time(), 'teleoperator'))
         value = tornado.web.create_signed_value(secret, self.gate.cookie, text, clock=clock)
         return '{}={}'.format(self.gate.cookie, value.decode())
 
@@ -81,6 +81,11 @@ class TestOdd(console_case.ConsoleCase):
         assert self.begin(Cookie=self.cookie_of('another secret'))[1]['signed_in'] is False
         assert self.begin(Cookie=self.cookie_of(self.gate.secret, lambda: time.time() - 13 * 3600))[1][
             'signed_in'] is False
+
+    def test_a_session_counts_from_its_own_beginning_and_one_that_says_none_is_none(self):
+        for text in (sessions.to_text(sessions.Session('x', time.time() - 13 * 3600, 'teleoperator')),
+                     '["x", "teleoperator", ""]'):
+            assert self.begin(Cookie=self.cookie_of(self.gate.secret, text=text))[1]['signed_in'] is False, text
 
     def test_a_session_that_an_attacker_has_begun_is_not_the_one_that_is_signed_in(self):
         planted, said = self.begin()

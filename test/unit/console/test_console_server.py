@@ -122,7 +122,7 @@ class TestSignIn(console_case.ConsoleCase):
 
     def test_sessions_whose_cookie_is_too_old_anyway_are_forgotten(self):
         self.gate._ended['long ago'] = time.monotonic() - 3600.0 * sessions.HOURS - 1.0
-        self.gate.end(sessions.Session('now', 'viewer'))
+        self.gate.end(sessions.Session('now', time.time(), 'viewer'))
         assert list(self.gate._ended) == ['now']
 
     @tornado.testing.gen_test

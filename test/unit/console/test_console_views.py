@@ -182,7 +182,11 @@ def test_robots_are_found_by_name_and_type_and_the_oldest_of_many_that_are_gone_
 def test_a_session_survives_its_cookie_and_nothing_else_becomes_one():
     session = sessions.new_session()
     assert sessions.from_text(sessions.to_text(session).encode()) == session
-    for text in (None, b'', b'{', b'[]', b'[1,2,3]', b'["a","root",""]', b'{"id": 1}', b'["a","operator"]'):
-        assert sessions.from_text(text) is None
+    assert sessions.from_text(b'["a",1.0,"operator",""]') == sessions.Session('a', 1.0, 'operator')
+    for text in (None, b'', b'{', b'[]', b'[1,2,3,4]', b'["a",1.0,"root",""]', b'{"id": 1}', b'["a",1.0,"operator"]',
+                 b'["a","operator",""]', b'["a","1.0","operator",""]', b'["a",true,"operator",""]',
+                 b'["a",null,"operator",""]', b'["a",NaN,"operator",""]', b'["a",Infinity,"operator",""]',
+                 b'["a",1e999,"operator",""]', b'[["a"],1.0,"operator",""]', b'["a",1.0,["operator"],""]'):
+        assert sessions.from_text(text) is None, text
     assert sessions.xsrf_token(session, 'a') != sessions.xsrf_token(session, 'b')
     assert session.id not in session.short

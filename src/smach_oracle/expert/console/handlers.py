@@ -39,7 +39,7 @@ class Gate:
     def session(self, handler: tornado.web.RequestHandler) -> Optional[Session]:
         """The session of a request's cookie; None where it has none of ours."""
         session = sessions.from_text(handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
-        return None if session is None or session.id in self._ended else session
+        return None if session is None or session.id in self._ended or session.left_s <= 0.0 else session
 
     def end(self, session: Session) -> None:
         """Its cookie, of which somebody may have a copy, is good for nothing any more."""
@@ -48,15 +48,16 @@ class Gate:
         self._ended[session.id] = now_s
 
     def identity(self, session: Optional[Session]) -> Optional[Identity]:
-        """Who a session speaks for; None before signing in and after signing out.
+        """Who a session speaks for; None before signing in, after signing out, and where it has become too old.
 
-        Without tokens whoever gets here may do everything.
+        Without tokens whoever gets here may do everything, for as long as the page is open.
         """
         if session is not None and session.id in self._ended:
             return None
         if self.settings.tokens is None:
             return Identity('teleoperator') if session else None
-        return Identity(session.role, session.name) if session and session.role else None
+        signed_in = session is not None and session.role and session.left_s > 0.0
+        return Identity(session.role, session.name) if session and signed_in else None
 
     def refusal(self, handler: tornado.web.RequestHandler, limits: Optional[Buckets] = None) -> int:
         """The status with which a request is refused; 0 where it may go on. `limits`: of its own, where it has any."""
@@ -203,19 +204,22 @@ class SessionHandler(Guarded):
         if identity is None:
             self.gate.audit.tell(person, 'sign_in', False, 'no such token')
             raise tornado.web.HTTPError(401)
+        self._end(session)  # another page of this browser may have signed in meanwhile
         session = self._begin(identity)
         self.gate.audit.tell(Person(person.client, session.short, *identity), 'sign_in', True, '')
         self._tell(session)
 
     def delete(self) -> None:
         """Sign out: every page of this browser."""
-        session = self.demand_xsrf(self.gate.session(self))
+        self._end(self.demand_xsrf(self.gate.session(self)))
+        self._tell(self._begin(None))
+
+    def _end(self, session: Session) -> None:
         if session.role:  # who has not signed in has nothing to end, and fills neither memory nor audit
             self.gate.end(session)
             self._close(session)
             self.gate.audit.tell(Person(self.request.remote_ip or '', session.short, session.role, session.name),
                                  'sign_out', True, '')
-        self._tell(self._begin(None))
 
     def _begin(self, identity: Optional[Identity]) -> Session:
         session = sessions.new_session(identity)

@@ -24,12 +24,14 @@ from .trial_log import TrialLog
 MOST_SOCKETS = 64
 MOST_OF_A_SESSION = 16  # tabs of one browser
 HELLO_LIMIT_S = 10.0
+LONGEST_UNSEEN_S = 60.0  # how old its session is, is looked at again: clocks are set, machines sleep
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
 TOO_FAST = 4008
 FORGED = 4003
 SIGNED_OUT = 4001
+TOO_OLD = 4002  # the page asks for the token by itself, and keeps what the person was typing
 
 
 class Office:
@@ -110,10 +112,20 @@ class Socket(tornado.websocket.WebSocketHandler):
         self.set_nodelay(True)
         self._office.open.add(self)
         asyncio.get_running_loop().call_later(HELLO_LIMIT_S, self._demand_hello)
+        self._look_at_age()
 
     def _demand_hello(self) -> None:
         if self._person is None:
             self.close(FORGED, 'no hello')
+
+    def _look_at_age(self) -> None:
+        if self._gone or self.session is None or self._gate.settings.tokens is None:
+            return
+        if self._gate.identity(self.session) is None:
+            self.close(TOO_OLD, 'sign in again')
+            return
+        pause_s = min(self.session.left_s, LONGEST_UNSEEN_S)
+        asyncio.get_running_loop().call_later(pause_s, self._look_at_age)
 
     def on_close(self) -> None:
         """Claims run out unless the page comes back."""

@@ -2,18 +2,21 @@
 import hashlib
 import hmac
 import json
+import math
 import secrets
+import time
 from typing import NamedTuple, Optional
 
 from .access import ROLES, Identity
 
-HOURS = 12
+HOURS = 12  # then a session ends
 
 
 class Session(NamedTuple):
     """What the cookie says."""
 
     id: str
+    began_s: float  # since the epoch, as it outlives the server
     role: str = ''  # '' before signing in
     name: str = ''
 
@@ -22,10 +25,15 @@ class Session(NamedTuple):
         """A name for it that gives nothing away."""
         return hashlib.sha256(self.id.encode()).hexdigest()[:8]
 
+    @property
+    def left_s(self) -> float:
+        """For how long it is still good, s; below 0 where it has become too old."""
+        return self.began_s + 3600.0 * HOURS - time.time()
+
 
 def new_session(identity: Optional[Identity] = None) -> Session:
     """A session with an id of its own; also at signing in, so that nobody is given somebody else's."""
-    return Session(secrets.token_urlsafe(18), *(identity or Identity('')))
+    return Session(secrets.token_urlsafe(18), time.time(), *(identity or Identity('')))
 
 
 def to_text(session: Session) -> str:
@@ -39,9 +47,10 @@ def from_text(text: Optional[bytes]) -> Optional[Session]:
         values = json.loads(text or b'null')
     except ValueError:
         return None
-    if not isinstance(values, list) or len(values) != 3 or not all(isinstance(value, str) for value in values):
+    if not isinstance(values, list) or [type(value) for value in values] != [str, float, str, str]:
         return None
-    return Session(*values) if values[1] in ROLES + ('',) else None
+    session = Session(*values)
+    return session if math.isfinite(session.began_s) and session.role in ROLES + ('',) else None
 
 
 def xsrf_token(session: Session, secret: str) -> str:
