@@ -149,6 +149,12 @@ export class Link {
   }
 
   async signIn(token) {
+    const known = await this.whoAmI(); // another page of this browser may have signed in, and would be signed out now
+    Object.assign(this.session, known);
+    if (known.signed_in) {
+      this.connect();
+      return 200;
+    }
     const answer = await this.fetch('session', { method: 'POST', body: JSON.stringify({ token }) });
     if (answer.ok) this.connect();
     return answer.status;
@@ -169,7 +175,10 @@ export class Link {
     const ask = () => fetch(path, Object.assign({ cache: 'no-store' }, options, { headers: { 'X-Xsrf': this.session.xsrf } }));
     const answer = await ask();
     if (answer.status !== 403 && answer.status !== 401) return answer;
-    if (this.session.xsrf === xsrf) Object.assign(this.session, await this.whoAmI());
+    if (this.session.xsrf === xsrf) {
+      const known = await this.whoAmI();
+      Object.assign(this.session, known); // that of now: meanwhile it may be another one
+    }
     if (!this.session.signed_in && this.connected && !this.leaving) {
       this.fail();
       this.connect(); // which asks for the token
