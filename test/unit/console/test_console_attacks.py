@@ -85,7 +85,8 @@ class TestOdd(console_case.ConsoleCase):
     def test_a_session_counts_from_its_own_beginning_and_one_that_says_none_is_none(self):
         for text in (sessions.to_text(sessions.Session('x', time.time() - 13 * 3600, 'teleoperator')),
                      '["x", "teleoperator", ""]'):
-            assert self.begin(Cookie=self.cookie_of(self.gate.secret, text=text))[1]['signed_in'] is False, text
+            answer = self.ask('/session', Cookie=self.cookie_of(self.gate.secret, text=text))
+            assert json.loads(answer.body)['signed_in'] is False and 'Set-Cookie' in answer.headers, text
 
     def test_a_session_that_an_attacker_has_begun_is_not_the_one_that_is_signed_in(self):
         planted, said = self.begin()

@@ -83,6 +83,10 @@ class TestWithoutTokens(console_case.ConsoleCase):
         page = await self.open_page(cookie, json.loads(answer.body))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sessions, 'HOURS', 0)
-            next(iter(self.office.open))._look_at_age()
+            socket, = self.office.open
+            look, again = socket._look_at_age, []
+            patch.setattr(socket, '_look_at_age', lambda: again.append(True))
+            look()
             assert (await self.say(page, 9, do='watch', trial=''))['ok'], 'a hand that it drives goes on'
+            assert not again
             assert await self.refused(cookie) == 401, 'a request gets a new session'
