@@ -14,7 +14,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm  # noqa: E402
-from waiting import least_of, wait_for  # noqa: E402
+from waiting import assert_soon, wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
 
@@ -51,9 +51,9 @@ class TheHand(ConsolePage, unittest.TestCase):
         return wait_for(lambda: self.arm.moved_s > begun_s + 0.2)
 
     def late_s(self, let_go):
-        """How long it still moves, without what a busy machine adds: three processes have a part in it."""
+        """How long it still moves, and what a busy machine may add to that: three processes have a part in it."""
         asked_s = time.monotonic()
-        return self.arm.stands_after(let_go) - 3 * self.lag.most_s(asked_s - 0.1)
+        return self.arm.stands_after(let_go), 3 * self.lag.most_s(asked_s - 0.1)
 
     def assert_stops(self, move, let_go, afterwards=lambda: None):
         def measure():
@@ -61,7 +61,7 @@ class TheHand(ConsolePage, unittest.TestCase):
             late_s = self.late_s(let_go)
             afterwards()
             return late_s
-        self.assertLess(least_of(measure, STOPS_WITHIN_S), STOPS_WITHIN_S)
+        assert_soon(measure, STOPS_WITHIN_S)
 
     def assert_moves_nothing(self, what):
         moved_s = self.arm.moved_s
@@ -204,7 +204,8 @@ class TheHand(ConsolePage, unittest.TestCase):
 
     def test_6_a_browser_that_is_killed_at_the_wheel_stops_and_leaves_it_to_others(self):
         self.drive_by_key()
-        self.assertLess(self.late_s(self.browser.kill), STOPS_WITHIN_S)
+        late_s, added_s = self.late_s(self.browser.kill)
+        self.assertLess(late_s - added_s, STOPS_WITHIN_S)
         self.assertTrue(wait_for(lambda: self.told('leave_wheel')[-1:]
                                  and self.told('leave_wheel')[-1].message == 'the page is gone'))
         self.browser.close()

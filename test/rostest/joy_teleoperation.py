@@ -13,7 +13,7 @@ from sensor_msgs.msg import Joy
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm, Person  # noqa: E402
-from waiting import least_of, wait_for  # noqa: E402
+from waiting import assert_soon, wait_for  # noqa: E402
 
 STOPS_WITHIN_S = 0.1
 SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it
@@ -45,8 +45,8 @@ class JoyTeleoperation(unittest.TestCase):
             self.push_until_it_moves(*move)
             begun_s = time.monotonic()
             # two processes have a part in it, and this one, each of which a busy machine keeps waiting
-            return self.arm.stands_after(let_go, within_s + 0.5) - 3 * self.lag.most_s(begun_s - 0.1)
-        self.assertLess(least_of(measure, within_s), within_s)
+            return self.arm.stands_after(let_go, within_s + 0.5), 3 * self.lag.most_s(begun_s - 0.1)
+        assert_soon(measure, within_s)
 
     def let_go(self, *axes):
         self.push(axes or [0] * 6, [0, 0])
