@@ -68,6 +68,12 @@ function put(element, nodes) {
   for (const node of [...element.childNodes]) if (!wanted.has(node)) node.remove();
   let at = element.firstChild;
   for (const node of wanted) {
+    if (node.parentNode === element && node.contains(document.activeElement)) { // it keeps the focus; those before it move
+      for (let next; at !== node; at = next) {
+        next = at.nextSibling;
+        element.append(at);
+      }
+    }
     if (node === at) at = at.nextSibling;
     else element.insertBefore(node, at);
   }
