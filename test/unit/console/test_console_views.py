@@ -12,6 +12,7 @@ from smach_oracle.expert.console import sections as sections_module
 from smach_oracle.expert.console.checks import Output
 from smach_oracle.expert.console.desk import BadOutput, items
 from smach_oracle.expert.console.helped import Score
+from smach_oracle.expert.console.questions import QuestionBoard
 from smach_oracle.expert.console.robot import Robot
 from smach_oracle.expert.console.sections import Sections
 from smach_oracle.expert.console.trial_log import TrialLog
@@ -44,6 +45,28 @@ def test_a_question_is_told_whole():
     assert told['supersede'][0] == {'outcome': 'succeeded', 'target': 'PLACE'}
     assert told['outputs'] == ['grasped']
     assert told['interfaces'] == [{'name': 'assist', 'description': 'do it by hand'}]
+
+
+class FakeFrontEnd:
+    servers = ()
+    connected = None
+
+    def __init__(self):
+        self.asked = {}
+
+    def questions(self):
+        return sorted((Listed('/robot/expert_query', goal(query_id=name), OpenQuery.PENDING, '', asked_s, math.inf)
+                       for name, asked_s in self.asked.items()), key=lambda listed: listed.asked_s)
+
+
+def test_questions_of_one_second_keep_their_places_though_each_list_tells_their_ages_anew():
+    front_end, sections = FakeFrontEnd(), Sections()
+    board = QuestionBoard(front_end, TrialLog())
+    for front_end.asked in ({'q1': 10.0, 'q2': 10.1}, {'q1': 10.2, 'q2': 10.1}, {'q1': 10.2, 'q2': 9.9, 'q3': 9.0}):
+        board.draw(sections)
+        shown = [view['key'].split()[1] for view in sections.since(0)[1]['questions']]
+        assert [key for key in shown if key != 'q3'] == ['q1', 'q2']
+    assert shown == ['q3', 'q1', 'q2']
 
 
 def test_userdata_is_shown_by_kind():

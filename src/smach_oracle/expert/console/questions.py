@@ -23,7 +23,7 @@ class QuestionBoard:
     def draw(self, sections: Sections) -> None:
         """Bring the section up to date."""
         listed = self._front_end.questions()
-        views = [self._view(each) for each in listed]
+        views = sorted((self._view(each) for each in listed), key=lambda view: (view['asked'], view['key']))
         self._times = {view['key']: {'asked': view['asked'], 'deadline': view['deadline']} for view in views}
         sections.put('questions', views)
         sections.put('servers', self._servers())
