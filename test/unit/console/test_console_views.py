@@ -64,7 +64,7 @@ def test_questions_of_one_second_keep_their_places_though_each_list_tells_their_
     board = QuestionBoard(front_end, TrialLog())
     for front_end.asked in ({'q1': 10.0, 'q2': 10.1}, {'q1': 10.2, 'q2': 10.1}, {'q1': 10.2, 'q2': 9.9, 'q3': 9.0}):
         board.draw(sections)
-        shown = [view['key'].split()[1] for view in sections.since(0)[1]['questions']]
+        shown = [view['key'].split()[1] for view in json.loads(dict(sections.since(0)[1])['questions'])]
         assert [key for key in shown if key != 'q3'] == ['q1', 'q2']
     assert shown == ['q3', 'q1', 'q2']
 
