@@ -46,13 +46,13 @@ class Experiment(unittest.TestCase):
         self.bags = self.output / 'with_oracle' / 'replicate_0'
 
     def finish(self, process: 'subprocess.Popen[str]') -> str:
-        text = process.communicate(timeout=150)[0]
+        text = process.communicate(timeout=300)[0]
         self.assertEqual(process.returncode, 0, text)
         self.assertEqual(processes_of(self.output), [])
         return text
 
     def some_trials(self, count: int) -> None:
-        self.assertTrue(wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 90.0), 'no trials')
+        self.assertTrue(wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 240.0), 'no trials')
 
     def test_killed_in_the_middle_it_goes_on_as_if_nothing_had_happened(self) -> None:
         whole = Path(str(self.output) + ' of another run')
