@@ -15,28 +15,31 @@ ChildTerminationCallback = Callable[[Outcomes], Union[bool, None, Sequence[str]]
 class Concurrence(Container):
     """Executes all children in parallel and ends when all have ended.
 
-    The outcome is, in this order: what ``outcome_cb({label: outcome})`` returns, if anything; the entry of
-    ``outcome_map`` ({outcome: {label: child outcome, ...}}) whose conditions all hold, the one with most conditions if
-    several do; 'preempted', if that is an outcome, the container was preempted and all children serviced it;
-    ``default_outcome``.
+    The outcome is, in this order: what ``outcome_cb({label: outcome})`` returns, if anything; the
+    entry of ``outcome_map`` ({outcome: {label: child outcome, ...}}) whose conditions all hold, the
+    one with most conditions if several do; 'preempted', if that is an outcome, the container was
+    preempted and all children serviced it; ``default_outcome``.
 
-    ``child_termination_cb({label: outcome or None})`` is called whenever a child ends; returning True preempts the
-    children still running, returning a list of labels preempts those.
+    ``child_termination_cb({label: outcome or None})`` is called whenever a child ends; returning
+    True preempts the children still running, returning a list of labels preempts those.
     """
 
-    def __init__(self, outcomes: Sequence[str], default_outcome: str, input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), outcome_map: Optional[Mapping[str, Mapping[str, str]]] = None,
+    def __init__(self, outcomes: Sequence[str], default_outcome: str,
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
+                 outcome_map: Optional[Mapping[str, Mapping[str, str]]] = None,
                  outcome_cb: Optional[OutcomeCallback] = None,
                  child_termination_cb: Optional[ChildTerminationCallback] = None) -> None:
         Container.__init__(self, outcomes, input_keys, output_keys)
         self._states: Dict[str, State] = {}
         self._remappings: Dict[str, Mapping[str, str]] = {}
         self._default_outcome = default_outcome
-        self._outcome_map: Mapping[str, Mapping[str, str]] = {} if outcome_map is None else outcome_map
+        self._outcome_map: Mapping[str, Mapping[str,
+                                                str]] = {} if outcome_map is None else outcome_map
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
         self._run: Optional[ParallelRun] = None  # while it executes
-        # A preempt nobody serviced stays visible to the parent after the run, but it is not meant for the next run.
+        # A preempt nobody serviced stays visible to the parent after the run, but it is not meant
+        # for the next run.
         self._preempt_is_over = False
         self._check_outcome_policy(outcomes)
 
@@ -46,9 +49,11 @@ class Concurrence(Container):
         default = self._default_outcome
         errors = []
         if not isinstance(default, str) or (default not in registered and default not in outcomes):
-            errors.append("The default outcome '%s' is not among its outcomes %s." % (default, allowed))
-        errors.extend("The outcome map leads to '%s', which is not among its outcomes %s." % (outcome, allowed)
-                      for outcome in self._outcome_map if outcome not in registered and outcome not in outcomes)
+            errors.append("The default outcome '%s' is not among its outcomes %s." %
+                          (default, allowed))
+        errors.extend("The outcome map leads to '%s', which is not among its outcomes %s." %
+                      (outcome, allowed) for outcome in self._outcome_map
+                      if outcome not in registered and outcome not in outcomes)
         errors.extend('%s is not callable: %r.' % (name, callback)
                       for name, callback in (('outcome_cb', self._outcome_cb),
                                              ('child_termination_cb', self._child_termination_cb))
@@ -64,13 +69,16 @@ class Concurrence(Container):
         """Add a state to the innermost open concurrence and return it."""
         concurrence = Concurrence._currently_opened_container()
         if label in concurrence._states:
-            smach.logwarn("Concurrence already has a state '%s'; the new one takes its place." % label)
+            smach.logwarn("Concurrence already has a state '%s'; the new one takes its place." %
+                          label)
         concurrence._states[label] = state
         concurrence._remappings[label] = {} if remapping is None else remapping
         return state
 
     def check_consistency(self) -> None:
-        """Raise KeyError for an unknown label in the outcome map, InvalidTransitionError for an unknown outcome."""
+        """Raise KeyError for an unknown label in the outcome map, InvalidTransitionError for an
+        unknown outcome.
+        """
         for conditions in self._outcome_map.values():
             for label, outcome in conditions.items():
                 registered = self[label].get_registered_outcomes()
@@ -84,10 +92,12 @@ class Concurrence(Container):
     def execute(self, parent_ud: Any = None) -> str:
         """Run all children to their ends and return the outcome.
 
-        Raises InvalidStateError if there are none or one of them raised, InvalidUserCodeError if a callback did.
+        :raises InvalidStateError: if there are none, or one of them raised.
+        :raises InvalidUserCodeError: if a callback raised.
         """
         if not self._states:
-            raise smach.InvalidStateError('This concurrence has no states; they are added inside `with concurrence:`.')
+            raise smach.InvalidStateError(
+                'This concurrence has no states; they are added inside `with concurrence:`.')
         self._copy_input_keys(parent_ud, self.userdata)
         smach.loginfo('Concurrence starting with userdata: \n\t%s' % list(self.userdata.keys()))
         self.call_start_cbs()
@@ -118,8 +128,9 @@ class Concurrence(Container):
 
     def _execute_child(self, label: str) -> Any:
         state = self._states[label]
-        return state.execute(smach.Remapper(self.userdata, state.get_registered_input_keys(),
-                                            state.get_registered_output_keys(), self._remappings[label]))
+        return state.execute(
+            smach.Remapper(self.userdata, state.get_registered_input_keys(),
+                           state.get_registered_output_keys(), self._remappings[label]))
 
     def _child_began(self, label: str) -> None:
         self.call_transition_cbs()
@@ -140,10 +151,11 @@ class Concurrence(Container):
             run.preempt()
 
     def _settle_preempt(self, run: ParallelRun) -> bool:
-        """Whether this container was preempted and its children serviced that; leaves no request with any child.
+        """Whether this container was preempted and its children serviced that; leaves no request
+        with any child.
 
-        A preempt that came when no child was running any more reached nobody. It stays with the container, so that its
-        parent sees that it was not serviced.
+        A preempt that came when no child was running any more reached nobody. It stays with the
+        container, so that its parent sees that it was not serviced.
         """
         deaf = [label for label in self._states if self._states[label].preempt_requested()]
         for label in deaf:
@@ -151,7 +163,8 @@ class Concurrence(Container):
         if not self.preempt_requested():
             return False
         for label in deaf:
-            smach.logwarn("State '%s' of the concurrence has ended without servicing its preempt." % label)
+            smach.logwarn("State '%s' of the concurrence has ended without servicing its preempt." %
+                          label)
         if deaf or not run.preempted:
             return False
         smach.loginfo('Concurrence serviced preempt.')
@@ -160,7 +173,8 @@ class Concurrence(Container):
 
     def _raise_error_of(self, run: ParallelRun) -> None:
         if isinstance(run.error, smach.InvalidStateError):
-            raise smach.InvalidStateError('A state of the concurrence raised an exception.') from run.error
+            raise smach.InvalidStateError(
+                'A state of the concurrence raised an exception.') from run.error
         if run.error is not None:
             raise run.error
 
@@ -183,7 +197,9 @@ class Concurrence(Container):
         return outcome
 
     def _mapped_outcome(self, outcomes: Outcomes) -> Optional[str]:
-        """The entry of the outcome map with most conditions of those that hold; the first of several such."""
+        """The entry of the outcome map with most conditions of those that hold; the first of
+        several such.
+        """
         holding = [(len(conditions), outcome) for outcome, conditions in self._outcome_map.items()
                    if all(outcomes[label] == wanted for label, wanted in conditions.items())]
         return max(holding, key=lambda entry: entry[0])[1] if holding else None
@@ -210,7 +226,9 @@ class Concurrence(Container):
         return list(self._states)
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
-        """Add the keys of ``userdata`` to the container's; all states are initial ones, whatever is asked for."""
+        """Add the keys of ``userdata`` to the container's; all states are initial ones, whatever is
+        asked for.
+        """
         if set(initial_states) != set(self._states):
             smach.logwarn('A concurrence begins in all its states %s; it cannot begin in %s alone.'
                           % (list(self._states), initial_states))
@@ -224,7 +242,8 @@ class Concurrence(Container):
 
     def get_internal_edges(self) -> List[Edge]:
         """Each condition of the outcome map as (child outcome, label, container outcome)."""
-        return [(outcome, label, container_outcome) for container_outcome, conditions in self._outcome_map.items()
+        return [(outcome, label, container_outcome)
+                for container_outcome, conditions in self._outcome_map.items()
                 for label, outcome in conditions.items()]
 
     # -- copies

@@ -1,6 +1,8 @@
-"""What the four kinds of container have in common: construction in ``with`` blocks, callbacks, userdata at the border.
+"""What the four kinds of container have in common: construction in ``with`` blocks, callbacks,
+userdata at the border.
 
-Containers are states, so they nest. While a container is open, ``StateMachine.add(...)`` and its like add to it.
+Containers are states, so they nest. While a container is open, ``StateMachine.add(...)`` and its
+like add to it.
 """
 import contextlib
 import threading
@@ -21,7 +23,9 @@ _PAUSE_POLL_S = 0.02
 
 
 class Container(State):
-    """Base class of StateMachine, Concurrence and Iterator (and Sequence, which is a StateMachine)."""
+    """Base class of StateMachine, Concurrence and Iterator (and Sequence, which is a
+    StateMachine).
+    """
 
     # All open containers of the process, the innermost last; one thread builds at a time.
     _construction_stack: List['Container'] = []
@@ -46,7 +50,9 @@ class Container(State):
 
     @classmethod
     def _currently_opened_container(cls) -> Any:
-        """The innermost open container; InvalidStateError if there is none, or none of this class."""
+        """The innermost open container; InvalidStateError if there is none, or none of this
+        class.
+        """
         if not Container._construction_stack:
             raise smach.InvalidStateError(
                 'No container is open; states are added inside `with container:`.')
@@ -62,14 +68,17 @@ class Container(State):
         Container._construction_stack.append(self)
 
     def close(self) -> None:
-        """End what open() began; an inconsistency is logged here, long before the container runs."""
+        """End what open() began; an inconsistency is logged here, long before the container
+        runs.
+        """
         self._pop_construction_stack()
         self._is_consistent()
 
     def _pop_construction_stack(self) -> None:
         stack = Container._construction_stack
         if not stack or stack[-1] is not self:
-            raise smach.InvalidStateError('This container is not open, so there is nothing to close.')
+            raise smach.InvalidStateError(
+                'This container is not open, so there is nothing to close.')
         stack.pop()
         Container._construction_lock.release()
 
@@ -84,7 +93,9 @@ class Container(State):
 
     @contextlib.contextmanager
     def opened(self, **kwargs: Any) -> Iterator['Container']:
-        """``with container.opened(...)``: open for the block, with arguments for subclasses in _context_kwargs."""
+        """``with container.opened(...)``: open for the block, with arguments for subclasses in
+        _context_kwargs.
+        """
         self._context_kwargs = kwargs  # type: ignore[assignment]
         with self:
             yield self
@@ -104,7 +115,9 @@ class Container(State):
                      % ''.join(traceback.format_exception(exc_type, exc_val, exc_tb)))
 
     def check_consistency(self) -> None:
-        """Raise InvalidStateError or InvalidTransitionError if the container cannot run; overridden."""
+        """Raise InvalidStateError or InvalidTransitionError if the container cannot run;
+        overridden.
+        """
         raise NotImplementedError()
 
     def _is_consistent(self) -> bool:
@@ -129,7 +142,9 @@ class Container(State):
         raise NotImplementedError()
 
     def set_initial_state(self, initial_states: List[str], userdata: Any) -> None:
-        """Begin at these labels from now on, with the keys of ``userdata`` added to the container's."""
+        """Begin at these labels from now on, with the keys of ``userdata`` added to the
+        container's.
+        """
         raise NotImplementedError()
 
     def get_active_states(self) -> List[str]:
@@ -142,16 +157,21 @@ class Container(State):
 
     # -- callbacks
 
-    def register_start_cb(self, start_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
+    def register_start_cb(self, start_cb: Callable[..., object],
+                          cb_args: Sequence[Any] = ()) -> None:
         """Call ``start_cb(userdata, initial_states, *cb_args)`` when the container starts."""
         self._start_cbs.append((start_cb, cb_args))
 
-    def register_transition_cb(self, transition_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
+    def register_transition_cb(
+        self, transition_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
         """Call ``transition_cb(userdata, active_states, *cb_args)`` after each transition."""
         self._transition_cbs.append((transition_cb, cb_args))
 
-    def register_termination_cb(self, termination_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
-        """Call ``termination_cb(userdata, terminal_states, outcome, *cb_args)`` when the container ends."""
+    def register_termination_cb(
+        self, termination_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
+        """Call ``termination_cb(userdata, terminal_states, outcome, *cb_args)`` when the container
+        ends.
+        """
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
@@ -180,21 +200,27 @@ class Container(State):
     # -- userdata at the border
 
     def _copy_input_keys(self, parent_ud: Any, ud: Any) -> None:
-        """Copy this container's input keys from the parent's userdata; a missing one is a warning."""
+        """Copy this container's input keys from the parent's userdata; a missing one is a
+        warning.
+        """
         if parent_ud is not None:
             _copy_keys(self.get_registered_input_keys(), parent_ud, ud, 'input')
 
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
-        """Copy this container's output keys to the parent's userdata; a missing one is a warning."""
+        """Copy this container's output keys to the parent's userdata; a missing one is a
+        warning.
+        """
         if parent_ud is not None:
             _copy_keys(self.get_registered_output_keys(), ud, parent_ud, 'output')
 
     # -- pause
 
     def request_pause(self) -> None:
-        """Hold before the next state is entered, here and in running containers inside, until request_resume().
+        """Hold before the next state is entered, here and in running containers inside, until
+        request_resume().
 
-        The states that are being executed go on to their end. A preempt or a shutdown ends the pause.
+        The states that are being executed go on to their end. A preempt or a shutdown ends the
+        pause.
         """
         self._pause_requested = True
         for child in self._active_children():
@@ -232,4 +258,5 @@ def _copy_keys(keys: Sequence[str], source: Any, target: Any, kind: str) -> None
         try:
             target[key] = source[key]
         except KeyError:
-            smach.logwarn("The container's %s key '%s' has no value; it is not copied." % (kind, key))
+            smach.logwarn("The container's %s key '%s' has no value; it is not copied." %
+                          (kind, key))

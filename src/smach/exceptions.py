@@ -4,7 +4,8 @@ SmachError
 ├── InvalidStateError          a label or state that a container cannot take, or a child that failed
 ├── InvalidTransitionError     an outcome or a transition target that nobody registered
 ├── InvalidConstructionError   a container used outside of its ``with`` block
-└── InvalidUserCodeError       a state's or callback's own code raised, or broke its userdata contract
+└── InvalidUserCodeError       a state's or callback's own code raised, or broke its userdata
+contract
 """
 import smach
 
@@ -13,7 +14,9 @@ __all__ = ['SmachError', 'InvalidTransitionError', 'InvalidStateError', 'Invalid
 
 
 class SmachError(Exception):
-    """Root of all errors this package raises on its own account; each one is logged where it is made."""
+    """Root of all errors this package raises on its own account; each one is logged where it is
+    made.
+    """
 
     def __init__(self, *args: object) -> None:
         super().__init__(*args)

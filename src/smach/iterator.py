@@ -1,6 +1,7 @@
 """A container that executes one state once for each item of a list."""
 import traceback
-from typing import Any, Callable, Dict, Iterable, Iterator as Iterator_, List, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Union
+from typing import Iterator as Iterator_
 
 import smach
 from smach.container import Container, Edge
@@ -14,14 +15,16 @@ Items = Union[Iterable[Any], Callable[[], Iterable[Any]]]
 class Iterator(Container):
     """Executes its contained state per item, the item in userdata under ``it_label``.
 
-    ``it`` is an iterable, or a callable that returns one and is called when execution begins. The iteration stops at an
-    outcome of the contained state that is a break outcome, or at a preempt, and ends with that outcome; when the items
-    run out it ends with ``exhausted_outcome``. Either is mapped through ``final_outcome_map``. The contained state
-    works on the iterator's own userdata: there is no remapping, and nothing needs to be declared.
+    ``it`` is an iterable, or a callable that returns one and is called when execution begins. The
+    iteration stops at an outcome of the contained state that is a break outcome, or at a preempt,
+    and ends with that outcome; when the items run out it ends with ``exhausted_outcome``. Either is
+    mapped through ``final_outcome_map``. The contained state works on the iterator's own userdata:
+    there is no remapping, and nothing needs to be declared.
     """
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
-                 it: Items = (), it_label: str = 'it_data', exhausted_outcome: str = 'exhausted') -> None:
+    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), it: Items = (), it_label: str = 'it_data',
+                 exhausted_outcome: str = 'exhausted') -> None:
         Container.__init__(self, outcomes, input_keys, output_keys)
         self.register_outcomes([exhausted_outcome])
         self._items: Items = it
@@ -49,17 +52,21 @@ class Iterator(Container):
                             final_outcome_map: Optional[Mapping[str, str]] = None) -> None:
         """Set the state that the innermost open iterator executes.
 
-        Of ``loop_outcomes`` (go on with the next item) and ``break_outcomes`` (stop) one is enough: the other are the
-        remaining outcomes of the state. Without either, every outcome stops.
+        Of ``loop_outcomes`` (go on with the next item) and ``break_outcomes`` (stop) one is enough:
+        the other are the remaining outcomes of the state. Without either, every outcome stops.
         """
         iterator = Iterator._currently_opened_container()
         if loop_outcomes and break_outcomes:
-            smach.logwarn('An iterator was given loop_outcomes as well as break_outcomes; either follows from '
-                          'the other.')
+            smach.logwarn(
+                'An iterator was given loop_outcomes as well as break_outcomes; either follows '
+                'from '
+                'the other.')
         outcomes = state.get_registered_outcomes()
         iterator._state_label = label
         iterator._state = state
-        iterator._break_outcomes = list(break_outcomes) or [name for name in outcomes if name not in loop_outcomes]
+        iterator._break_outcomes = list(break_outcomes) or [
+            name for name in outcomes if name not in loop_outcomes
+        ]
         iterator._loop_outcomes = (list(loop_outcomes) if not break_outcomes
                                    else [name for name in outcomes if name not in break_outcomes])
         iterator._final_outcome_map = dict(final_outcome_map or {})
@@ -70,7 +77,9 @@ class Iterator(Container):
     # -- execution
 
     def execute(self, parent_ud: Any = None) -> str:
-        """Go through the items and return the outcome; InvalidUserCodeError if the state or the iterable raised."""
+        """Go through the items and return the outcome; InvalidUserCodeError if the state or the
+        iterable raised.
+        """
         self._is_running = True
         try:
             self._copy_input_keys(parent_ud, self.userdata)
@@ -81,7 +90,8 @@ class Iterator(Container):
         finally:
             self._is_running = False
         outcome = self._final_outcome_map.get(last_outcome, last_outcome)
-        # The label itself, not a list of one: it is what callbacks of an iterator have always been given.
+        # The label itself, not a list of one: it is what callbacks of an iterator have always been
+        # given.
         self.call_termination_cbs(self._state_label, outcome)
         self._copy_output_keys(self.userdata, parent_ud)
         return outcome
@@ -90,7 +100,9 @@ class Iterator(Container):
         return iter(self._items() if callable(self._items) else self._items)
 
     def _iterate(self, items: Iterator_[Any]) -> str:
-        """Execute the state until something stops it; return its last outcome, or that of exhaustion."""
+        """Execute the state until something stops it; return its last outcome, or that of
+        exhaustion.
+        """
         outcome = self._exhausted_outcome
         while not smach.is_shutdown():
             self._wait_while_paused()
@@ -99,8 +111,9 @@ class Iterator(Container):
             except StopIteration:
                 return self._exhausted_outcome
             except Exception as err:
-                raise smach.InvalidUserCodeError("Could not get the next item of iterator container's '%s': %s"
-                                                 % (self._items, traceback.format_exc())) from err
+                raise smach.InvalidUserCodeError(
+                    "Could not get the next item of iterator container's '%s': %s" %
+                    (self._items, traceback.format_exc())) from err
             smach.loginfo('Iterating %s of %s' % (item, self._items))
             self.userdata[self._items_label] = item
             outcome = self._execute_state()
@@ -110,13 +123,17 @@ class Iterator(Container):
         return outcome
 
     def _stops_at(self, outcome: str) -> bool:
-        """Whether to leave the remaining items; an outcome the state never registered is logged, as nobody maps it."""
+        """Whether to leave the remaining items; an outcome the state never registered is logged, as
+        nobody maps it.
+        """
         if outcome in self._break_outcomes:
             return True
         if outcome in self._loop_outcomes:
             return False
-        smach.logerr("Iterator state '%s' returned outcome '%s', which is neither a loop nor a break outcome: %s."
-                     % (self._state_label, outcome, 'stopping' if self._loop_outcomes else 'going on'))
+        smach.logerr(
+            "Iterator state '%s' returned outcome '%s', which is neither a loop nor a break "
+            "outcome: %s."
+            % (self._state_label, outcome, 'stopping' if self._loop_outcomes else 'going on'))
         return bool(self._loop_outcomes)
 
     def _execute_state(self) -> str:
@@ -124,7 +141,8 @@ class Iterator(Container):
         if state is None:
             raise smach.InvalidStateError('This iterator has no state to repeat; give it one with '
                                           'Iterator.set_contained_state().')
-        if self.preempt_requested():  # before the first item: later ones are not reached with a preempt pending
+        # before the first item: later ones are not reached with a preempt pending
+        if self.preempt_requested():
             state.request_preempt()
         try:
             outcome: str = state.execute(self.userdata)
@@ -132,8 +150,9 @@ class Iterator(Container):
             smach.logerr("Could not execute iterator state '%s'" % self._state_label)
             raise
         except Exception as err:
-            raise smach.InvalidUserCodeError("Could not execute iterator state '%s' of type '%s': %s" % (
-                self._state_label, state, traceback.format_exc())) from err
+            raise smach.InvalidUserCodeError(
+                "Could not execute iterator state '%s' of type '%s': %s" %
+                (self._state_label, state, traceback.format_exc())) from err
         return outcome
 
     # -- preemption
@@ -145,7 +164,9 @@ class Iterator(Container):
             self._state.request_preempt()
 
     def _end_preempt(self) -> None:
-        """Stopping is servicing; a state that did not notice must not find the old request in its next run."""
+        """Stopping is servicing; a state that did not notice must not find the old request in its
+        next run.
+        """
         self._preempt_requested = False
         if self._state is not None and self._state.preempt_requested():
             self._state.recall_preempt()
@@ -169,10 +190,13 @@ class Iterator(Container):
         return [self._state_label]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
-        """Add the keys of ``userdata`` to the container's; KeyError for another label than that of the only state."""
+        """Add the keys of ``userdata`` to the container's; KeyError for another label than that of
+        the only state.
+        """
         for label in initial_states:
             if label != self._state_label:
-                smach.logwarn("An iterator begins in its only state '%s', not in '%s'." % (self._state_label, label))
+                smach.logwarn("An iterator begins in its only state '%s', not in '%s'." %
+                              (self._state_label, label))
                 self[label]
         if userdata is not None:
             self.userdata.update(userdata)
@@ -182,8 +206,11 @@ class Iterator(Container):
         return [self._state_label] if self._is_running else []
 
     def get_internal_edges(self) -> List[Edge]:
-        """Loop outcomes lead back to the state, break outcomes to what the final outcome map says, or None."""
+        """Loop outcomes lead back to the state, break outcomes to what the final outcome map says,
+        or None.
+        """
         label = self._state_label
         edges: List[Edge] = [(outcome, label, label) for outcome in self._loop_outcomes]
-        edges.extend((outcome, label, self._final_outcome_map.get(outcome)) for outcome in self._break_outcomes)
+        edges.extend((outcome, label, self._final_outcome_map.get(outcome))
+                     for outcome in self._break_outcomes)
         return edges

@@ -1,6 +1,7 @@
 """The four loggers of SMACH: plain prints until somebody hands in better ones.
 
-Code that logs says ``smach.loginfo(...)`` at the moment of logging, so that :func:`set_loggers` reaches every module.
+Code that logs says ``smach.loginfo(...)`` at the moment of logging, so that :func:`set_loggers`
+reaches every module.
 """
 import sys
 from typing import Callable

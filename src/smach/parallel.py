@@ -1,4 +1,6 @@
-"""One execution of several states at the same time: the threads, who is running and who ended how."""
+"""One execution of several states at the same time: the threads, who is running and who ended
+how.
+"""
 import threading
 import time
 import traceback
@@ -11,19 +13,21 @@ Outcomes = Dict[str, Optional[str]]
 
 # How often the wait for the children looks for a shutdown.
 _SHUTDOWN_POLL_S = 0.1
-# How long children that were preempted by a shutdown or by Ctrl-C may take to end before they are left behind.
+# How long children that were preempted by a shutdown or by Ctrl-C may take to end before they are
+# left behind.
 _GRACE_S = 1.0
 
 
 class ParallelRun(object):
     """Executes each state in a thread of its own, once.
 
-    ``execute(label)`` runs the state and returns its outcome; ``began(label)`` and ``ended(label)`` are called in the
-    state's thread, never for two states at once. The first error of any of them preempts the other states.
+    ``execute(label)`` runs the state and returns its outcome; ``began(label)`` and ``ended(label)``
+    are called in the state's thread, never for two states at once. The first error of any of them
+    preempts the other states.
     """
 
-    def __init__(self, states: Mapping[str, State], execute: Callable[[str], str], began: Callable[[str], object],
-                 ended: Callable[[str], object]) -> None:
+    def __init__(self, states: Mapping[str, State], execute: Callable[[str], str],
+                 began: Callable[[str], object], ended: Callable[[str], object]) -> None:
         self.outcomes: Outcomes = dict.fromkeys(states)
         self.error: Optional[smach.SmachError] = None
         self.preempted: Set[str] = set()
@@ -36,8 +40,11 @@ class ParallelRun(object):
         self._callback_lock = threading.RLock()
         self._ready = threading.Event()
         self._running = set(states)
-        self._threads = {label: threading.Thread(name='concurrent_split:%s' % label, target=self._run, args=(label,),
-                                                 daemon=True) for label in states}
+        self._threads = {
+            label: threading.Thread(name='concurrent_split:%s' % label, target=self._run,
+                                    args=(label,), daemon=True)
+            for label in states
+        }
         self._unfinished: Set[str] = set()
         self._left_behind = False
 
@@ -46,7 +53,9 @@ class ParallelRun(object):
         return [label for label in self._states if label in self._running]
 
     def run(self) -> None:
-        """Start all and return when all have ended; an interrupt of this thread preempts them and goes on."""
+        """Start all and return when all have ended; an interrupt of this thread preempts them and
+        goes on.
+        """
         try:
             for label, thread in self._threads.items():
                 thread.start()
@@ -73,7 +82,8 @@ class ParallelRun(object):
             smach.logerr("Preempting state '%s' raised:\n%s" % (label, traceback.format_exc()))
         with self._changed:
             ended_meanwhile = label not in self._running
-        # It may have ended because of the request, which is then serviced. Else its next execution must not find it.
+        # It may have ended because of the request, which is then serviced. Else its next execution
+        # must not find it.
         if ended_meanwhile and state.preempt_requested():
             self.preempted.discard(label)
             state.recall_preempt()
@@ -100,7 +110,8 @@ class ParallelRun(object):
         with self._changed:
             self.outcomes[label] = outcome
             self._running.discard(label)
-        smach.loginfo("Concurrent state '%s' returned outcome '%s' on termination." % (label, outcome))
+        smach.loginfo("Concurrent state '%s' returned outcome '%s' on termination." %
+                      (label, outcome))
         with self._callback_lock:
             if not self._left_behind:
                 self._ended(label)
@@ -112,16 +123,20 @@ class ParallelRun(object):
             raise smach.InvalidStateError("Could not execute child state '%s': %s"
                                           % (label, traceback.format_exc())) from err
         if outcome is None:
-            raise smach.InvalidStateError("State '%s' of the concurrence ended without an outcome." % label)
+            raise smach.InvalidStateError(
+                "State '%s' of the concurrence ended without an outcome." % label)
         registered = self._states[label].get_registered_outcomes()
         if outcome not in registered:
-            smach.logerr("Concurrent state '%s' returned outcome '%s', which it has not registered (only %s): no entry "
-                         'of the outcome map can match it.' % (label, outcome, registered))
+            smach.logerr(
+                "Concurrent state '%s' returned outcome '%s', which it has not registered (only "
+                "%s): no entry "
+                'of the outcome map can match it.' % (label, outcome, registered))
         return outcome
 
     def _fail(self, err: BaseException) -> None:
         if not isinstance(err, smach.SmachError):
-            err = smach.InvalidUserCodeError('A callback of a concurrence raised: %s' % traceback.format_exc())
+            err = smach.InvalidUserCodeError('A callback of a concurrence raised: %s' %
+                                             traceback.format_exc())
         with self._changed:
             self.error = self.error or err
         self.preempt()
@@ -138,7 +153,9 @@ class ParallelRun(object):
             self._wait_with_grace()
 
     def _stop(self) -> None:
-        """After an interrupt: preempt the states that run, let none of the others begin, and wait a little."""
+        """After an interrupt: preempt the states that run, let none of the others begin, and wait a
+        little.
+        """
         if not self._ready.is_set():
             self._left_behind = True
             self._ready.set()
@@ -153,5 +170,7 @@ class ParallelRun(object):
             left = sorted(self._unfinished)
             self._left_behind = True
         if left:
-            smach.logerr('Concurrent states %s did not end within %.1f s of being preempted; leaving them behind.'
-                         % (left, _GRACE_S))
+            smach.logerr(
+                'Concurrent states %s did not end within %.1f s of being preempted; leaving them '
+                'behind.'
+                % (left, _GRACE_S))

@@ -1,7 +1,8 @@
 """Read-only views of the objects a state may look at but not change.
 
-A state that declares a key as input only gets a :class:`Const` around an object with attributes. Plain values,
-containers, functions, classes and modules come as they are: they are either immutable or not the object's own state.
+A state that declares a key as input only gets a :class:`Const` around an object with attributes.
+Plain values, containers, functions, classes and modules come as they are: they are either immutable
+or not the object's own state.
 """
 import collections
 import copy
@@ -11,16 +12,21 @@ from typing import Any, Iterator, NoReturn, Tuple
 
 import smach
 
-# Checked by identity before anything else, as nearly every value that passes through userdata is one of these.
-PLAIN_TYPES = frozenset((int, float, str, bool, type(None), bytes, list, tuple, dict, set, frozenset, complex))
+# Checked by identity before anything else, as nearly every value that passes through userdata is
+# one of these.
+PLAIN_TYPES = frozenset(
+    (int, float, str, bool, type(None), bytes, list, tuple, dict, set, frozenset, complex))
 
-_COME_AS_THEY_ARE: Tuple[type, ...] = (
-    int, float, complex, str, bytes, bytearray, list, tuple, dict, set, frozenset, collections.deque, enum.Enum,
-    type, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.ModuleType)
+_COME_AS_THEY_ARE: Tuple[type,
+                         ...] = (int, float, complex, str, bytes, bytearray, list, tuple, dict, set,
+                                 frozenset, collections.deque, enum.Enum, type, types.FunctionType,
+                                 types.BuiltinFunctionType, types.MethodType, types.ModuleType)
 
 
 class Const(object):
-    """A view of an object that refuses to set or delete attributes, and so do the objects reached through it."""
+    """A view of an object that refuses to set or delete attributes, and so do the objects reached
+    through it.
+    """
 
     __slots__ = ('_obj',)
 
@@ -29,7 +35,9 @@ class Const(object):
 
     @property  # type: ignore[misc]
     def __class__(self) -> type:
-        """The class of the object behind the view, so that isinstance() answers as it would for the object."""
+        """The class of the object behind the view, so that isinstance() answers as it would for the
+        object.
+        """
         return type(self._obj)
 
     def __getattr__(self, name: str) -> Any:
@@ -89,7 +97,9 @@ class Const(object):
 
 
 class CallableConst(Const):
-    """A view of an object that can be called; apart, so that callable() is right about the others."""
+    """A view of an object that can be called; apart, so that callable() is right about the
+    others.
+    """
 
     __slots__ = ()
 
@@ -103,7 +113,8 @@ def _behind(obj: Any) -> Any:
 
 def get_const(obj: Any) -> Any:
     """A read-only view of ``obj``, or ``obj`` itself where it has no attributes of its own."""
-    if type(obj) in PLAIN_TYPES or issubclass(type(obj), Const) or isinstance(obj, _COME_AS_THEY_ARE):
+    if type(obj) in PLAIN_TYPES or issubclass(type(obj), Const) or isinstance(
+            obj, _COME_AS_THEY_ARE):
         return obj
     if not hasattr(obj, '__dict__'):
         return obj

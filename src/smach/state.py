@@ -9,12 +9,14 @@ __all__ = ['State', 'CBState']
 class State(object):
     """Base of everything that can be put into a container.
 
-    ``outcomes`` are the names ``execute`` may return; ``input_keys`` may be read and ``output_keys`` written through
-    the userdata it is given; ``io_keys`` are both.
+    ``outcomes`` are the names ``execute`` may return; ``input_keys`` may be read and
+    ``output_keys`` written through the userdata it is given; ``io_keys`` are both.
     """
 
-    def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (), output_keys: Iterable[str] = (),
-                 io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()
+    ) -> None:
         both = _key_set(io_keys, 'io_keys')
         self._outcomes: Set[str] = set(outcomes)
         self._input_keys: Set[str] = _key_set(input_keys, 'input_keys') | both
@@ -73,7 +75,8 @@ class State(object):
 
 
 class CBState(State):
-    """A state whose work is a callback: ``cb(userdata, *cb_args, **cb_kwargs)`` returns the outcome.
+    """A state whose work is a callback: ``cb(userdata, *cb_args, **cb_kwargs)`` returns the
+    outcome.
 
     A callback decorated with :class:`smach.cb_interface` brings its own outcomes and keys along.
     """
@@ -99,5 +102,6 @@ class CBState(State):
 
 def _key_set(keys: Iterable[str], argument: str) -> Set[str]:
     if isinstance(keys, str):
-        raise TypeError('%s must be a list of keys, not the single string %r; write [%r]' % (argument, keys, keys))
+        raise TypeError('%s must be a list of keys, not the single string %r; write [%r]' %
+                        (argument, keys, keys))
     return set(keys)

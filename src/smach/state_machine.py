@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 import smach
 from smach.container import Container, Edge
 from smach.state import State
+from smach.transitions import end_of, inconsistencies, search_target
 from smach.visit import Visit
 
 __all__ = ['StateMachine']
@@ -14,8 +15,8 @@ __all__ = ['StateMachine']
 class StateMachine(Container):
     """A container that executes its states one after the other.
 
-    ``outcomes`` are those of the machine itself. Its states are added inside a ``with`` block, and the first one added
-    is where it begins unless :meth:`set_initial_state` says otherwise.
+    ``outcomes`` are those of the machine itself. Its states are added inside a ``with`` block, and
+    the first one added is where it begins unless :meth:`set_initial_state` says otherwise.
     """
 
     # Made anew rather than copied or pickled.
@@ -23,7 +24,8 @@ class StateMachine(Container):
 
     _is_preempt_passed_on = False  # whether a state was asked since the latest request
 
-    _is_hooked = True  # until execute() has looked: whether a method of _HOOKS was overridden or patched
+    # until execute() has looked: whether a method of _HOOKS was overridden or patched
+    _is_hooked = True
 
     def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = ()) -> None:
@@ -35,7 +37,8 @@ class StateMachine(Container):
         self._initial_state_label: Optional[str] = None
 
         self._is_running = False
-        # Held while the machine moves from one state to the next; re-entrant so that callbacks may request a preempt.
+        # Held while the machine moves from one state to the next; re-entrant so that callbacks may
+        # request a preempt.
         self._state_transitioning_lock = threading.RLock()
         self._current_label: Optional[str] = None
         self._current_state: Optional[State] = None
@@ -53,29 +56,37 @@ class StateMachine(Container):
 
     @staticmethod
     def add(label: str, state: State, transitions: Optional[Mapping[str, Optional[str]]] = None,
-            remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str, Any]] = None) -> State:
+            remapping: Optional[Mapping[str, str]] = None,
+            constants: Optional[Mapping[str, Any]] = None) -> State:
         """Add a state to the innermost open machine and return it.
 
-        ``transitions`` maps outcomes of the state to labels or to outcomes of the machine; outcomes left out, or mapped
-        to None, end the machine with its outcome of the same name. ``remapping`` maps the state's userdata keys to the
-        machine's; ``constants`` gives some of its input keys fixed values. Raises InvalidStateError for a label
-        already used, InvalidTransitionError for a transition from an outcome the state does not have.
+        ``transitions`` maps outcomes of the state to labels or to outcomes of the machine; outcomes
+        left out, or mapped to None, end the machine with its outcome of the same name.
+        ``remapping`` maps the state's userdata keys to the machine's; ``constants`` gives some of
+        its input keys fixed values.
+
+        :raises InvalidStateError: for a label already used.
+        :raises InvalidTransitionError: for a transition from an outcome the state does not have.
         """
         machine = StateMachine._currently_opened_container()
         if transitions is not None and not isinstance(transitions, Mapping):
-            raise smach.InvalidTransitionError("The transitions of state '%s' must map outcomes to labels, not be %r."
-                                               % (label, transitions))
+            raise smach.InvalidTransitionError(
+                "The transitions of state '%s' must map outcomes to labels, not be %r." %
+                (label, transitions))
         transitions = {} if transitions is None else dict(transitions)
         machine.check_state_spec(label, state, transitions)
         missing: Dict[str, Optional[str]] = {
-            outcome: None for outcome in state.get_registered_outcomes() if outcome not in transitions}
+            outcome: None
+            for outcome in state.get_registered_outcomes() if outcome not in transitions
+        }
         transitions.update(missing)
         smach.logdebug("State '%s' (%r) leaves by %s" % (label, state, transitions))
         machine._enter_in_tables(label, state, transitions, remapping, constants)
         return state
 
     def _enter_in_tables(self, label: str, state: State, transitions: Dict[str, Optional[str]],
-                         remapping: Optional[Mapping[str, str]], constants: Optional[Mapping[str, Any]]) -> None:
+                         remapping: Optional[Mapping[str, str]],
+                         constants: Optional[Mapping[str, Any]]) -> None:
         if self._initial_state_label is None:
             self._initial_state_label = label
         self._states[label] = state
@@ -104,46 +115,43 @@ class StateMachine(Container):
         machine._connector_outcomes = connector_outcomes
         return state
 
-    def check_state_spec(self, label: str, state: State, transitions: Mapping[str, Optional[str]]) -> None:
-        """Raise InvalidStateError for a used label, InvalidTransitionError for an outcome the state does not have."""
+    def check_state_spec(self, label: str, state: State,
+                         transitions: Mapping[str, Optional[str]]) -> None:
+        """Raise InvalidStateError for a used label, InvalidTransitionError for an outcome the state
+        does not have.
+        """
         if label in self._states:
             raise smach.InvalidStateError("This state machine has a state '%s' already." % label)
         registered = state.get_registered_outcomes()
         for outcome in transitions:
             if outcome not in registered:
                 raise smach.InvalidTransitionError(
-                    "There is a transition from outcome '%s' of state '%s', which has registered only %s"
+                    "There is a transition from outcome '%s' of state '%s', which has registered "
+                    "only %s"
                     % (outcome, label, registered))
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is no initial state or a transition leads nowhere."""
-        known = set(self._states).union(self.get_registered_outcomes())
-        errors = []
-        if self._initial_state_label is None:
-            errors.append('It has no initial state.')
-        elif self._initial_state_label not in self._states:
-            errors.append("Its initial state '%s' is not among its states." % self._initial_state_label)
-        for label, transitions in self._transitions.items():
-            unknown = [to for to in transitions.values() if to and to not in known]
-            if unknown:
-                errors.append("State '%s' leads to %s, which are neither states nor outcomes of the machine."
-                              % (label, unknown))
-            unregistered = [outcome for outcome, to in transitions.items() if not to and outcome not in known]
-            if unregistered:
-                errors.append("State '%s' has the outcomes %s, which lead to no state and are no outcomes of the "
-                              'machine.'
-                              % (label, unregistered))
+        """Raise InvalidTransitionError if there is no initial state or a transition leads
+        nowhere.
+        """
+        errors = inconsistencies(self._states, self._transitions, self._initial_state_label,
+                                 self.get_registered_outcomes())
         if errors:
-            raise smach.InvalidTransitionError('This state machine is inconsistent:\n\t%s\nIts states and outcomes: %s'
-                                               % ('\n\t'.join(errors), sorted(known, key=str)))
+            known = set(self._states).union(self.get_registered_outcomes())
+            raise smach.InvalidTransitionError(
+                'This state machine is inconsistent:\n\t%s\nIts states and outcomes: %s' %
+                ('\n\t'.join(errors), sorted(known, key=str)))
 
     # -- execution
 
     def execute(self, parent_ud: Any = None) -> Optional[str]:
-        """Run to the end and return the outcome; None if the machine is inconsistent or everything is shut down.
+        """Run to the end and return the outcome.
 
-        Raises InvalidUserCodeError if a state raised, InvalidTransitionError if one ended with an outcome it has not
-        registered or that leads nowhere.
+        It is None if the machine is inconsistent or everything is shut down.
+
+        :raises InvalidUserCodeError: if a state raised.
+        :raises InvalidTransitionError: if a state ended with an outcome that it has not registered
+            or that leads nowhere.
         """
         self._is_running = True
         self._is_hooked = any(getattr(getattr(self, name), '__func__', None) is not method
@@ -164,9 +172,12 @@ class StateMachine(Container):
             self._is_running = False
 
     def _start(self, parent_ud: Any) -> None:
-        """Put the machine to its initial state, take over the input keys and call the start callbacks."""
+        """Put the machine to its initial state, take over the input keys and call the start
+        callbacks.
+        """
         if self._preempted_state is not None and not self._preempt_requested:
-            self._preempted_state.recall_preempt()  # it ignored a request of the last run, since settled elsewhere
+            # it ignored a request of the last run, since settled elsewhere
+            self._preempted_state.recall_preempt()
         self._preempted_label = None
         self._preempted_state = None
         self._set_current_state(self._initial_state_label)
@@ -187,10 +198,11 @@ class StateMachine(Container):
             self._current_transitions = self._transitions[state_label]
 
     def _update_once(self) -> Optional[str]:
-        """Execute the current state and make the transition: None to go on, or the outcome of the machine.
+        """Execute the current state and make the transition: None to go on, or the outcome of the
+        machine.
 
-        Called with the transitioning lock held; lets go of it while the state executes. Every transition takes this
-        path, so it is one flat piece; what is rare is in methods of its own.
+        Called with the transitioning lock held; lets go of it while the state executes. Every
+        transition takes this path, so it is one flat piece; what is rare is in methods of its own.
         """
         if self._preempt_requested or (self._is_hooked and self.preempt_requested()):
             self._pass_preempt_on()
@@ -201,7 +213,8 @@ class StateMachine(Container):
         except KeyError:
             visit = None
         if (visit is None or visit.state is not state or visit.userdata is not self.userdata
-                or visit.input_keys is not state._input_keys or visit.output_keys is not state._output_keys
+                or visit.input_keys is not state._input_keys
+                or visit.output_keys is not state._output_keys
                 or visit.remapping is not self._remappings[label]):
             visit = self._prepare_visit(label, state)
         lock = self._state_transitioning_lock
@@ -217,11 +230,13 @@ class StateMachine(Container):
         finally:
             lock.acquire()
         try:
-            target = self._current_transitions[outcome] if outcome in state._outcomes else _SEARCH  # type: ignore
+            target = _SEARCH
+            if outcome in state._outcomes:
+                target = self._current_transitions[outcome]  # type: ignore
         except (AttributeError, KeyError, TypeError):
             target = _SEARCH
         if target is _SEARCH:
-            target = self._search_target(label, state, outcome)
+            target = search_target(label, state, outcome, self._current_transitions)
         self._current_outcome = outcome
         if target in self._states:
             self._set_current_state(target)
@@ -245,52 +260,40 @@ class StateMachine(Container):
     def _prepare_visit(self, label: str, state: Any) -> Visit:
         """What the state is given to read and write, kept for its next visit where that is safe."""
         if label not in self._states:
-            raise smach.InvalidStateError("The current state '%s' is not in the state machine. Available states: %s"
-                                          % (label, list(self._states)))
+            raise smach.InvalidStateError(
+                "The current state '%s' is none of %s" % (label, list(self._states)))
         visit = Visit(state, self.userdata, self._remappings[label], self._constants.get(label))
         if visit.may_be_kept:
             self._visits[label] = visit
         return visit
 
-    def _search_target(self, label: str, state: Any, outcome: Any) -> Optional[str]:
-        """Where an outcome leads that was not found the quick way; InvalidTransitionError if nowhere."""
-        registered = state.get_registered_outcomes()
-        if outcome not in registered:
-            raise smach.InvalidTransitionError(
-                "State '%s' (%r) returned '%s', but has registered only the outcomes %s"
-                % (label, state, outcome, registered))
-        transitions: Any = self._current_transitions
-        if outcome not in transitions:
-            raise smach.InvalidTransitionError(
-                "State '%s' has no transition for its outcome '%s', only %s" % (label, outcome, transitions))
-        target: Optional[str] = transitions[outcome]
-        return target
-
     def _terminate(self, label: str, outcome: str, target: Optional[str]) -> str:
-        """End the machine with the container outcome of the target's name, else of the outcome's own."""
-        registered = self.get_registered_outcomes()
-        container_outcome = target if target in registered else outcome
-        if container_outcome not in registered:
-            raise smach.InvalidTransitionError(
-                "Outcome '%s' of state '%s' leads to '%s', and neither that nor the outcome itself is a state or an "
-                'outcome of the machine.' % (outcome, label, target))
+        """End the machine with the container outcome of the target's name, else of the outcome's
+        own.
+        """
+        container_outcome = end_of(label, outcome, target, self.get_registered_outcomes())
         preempted = self._preempted_state
         if self._preempt_requested and preempted is not None and not preempted.preempt_requested():
             self._preempt_requested = False
         self._set_current_state(None)
-        smach.loginfo("State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome))
+        smach.loginfo("State machine terminating '%s':'%s':'%s'" %
+                      (label, outcome, container_outcome))
         self.call_termination_cbs([label], container_outcome)
         return container_outcome
 
     # -- preemption
 
     def request_preempt(self) -> None:
-        """Ask the active state to stop; if it ends without servicing this, the next one is asked before it runs."""
+        """Ask the active state to stop; if it ends without servicing this, the next one is asked
+        before it runs.
+        """
         self._is_preempt_passed_on = False
-        State.request_preempt(self)  # before the lock: a machine that moves fast may hold it nearly all the time
+        # before the lock: a machine that moves fast may hold it nearly all the time
+        State.request_preempt(self)
         with self._state_transitioning_lock:
-            # The machine may have seen the request meanwhile and passed it on: asking twice would stop two states. Or
-            # it took it for that of an earlier request just serviced, and has dropped it.
+            # The machine may have seen the request meanwhile and passed it on: asking twice would
+            # stop two states. Or it took it for that of an earlier request just serviced, and has
+            # dropped it.
             if not self._is_preempt_passed_on and self._current_state is not None:
                 self._preempt_requested = True
                 self._preempt_current_state()
@@ -307,10 +310,13 @@ class StateMachine(Container):
         try:
             state.request_preempt()
         except Exception:
-            smach.logerr("Preempting state '%s' raised:\n%s" % (self._current_label, traceback.format_exc()))
+            smach.logerr("Preempting state '%s' raised:\n%s" %
+                         (self._current_label, traceback.format_exc()))
 
     def _pass_preempt_on(self) -> None:
-        """Called with a preempt pending, before a state runs: preempt it, unless the last one serviced the request."""
+        """Called with a preempt pending, before a state runs: preempt it, unless the last one
+        serviced the request.
+        """
         smach.loginfo('The state machine is to be preempted before its next state runs.')
         preempted = self._preempted_state
         if preempted is None:
@@ -333,8 +339,7 @@ class StateMachine(Container):
 
     def __getitem__(self, key: str) -> State:
         if key not in self._states:
-            text = ("This state machine has no state '%s', only %s"
-                    % (key, list(self._states)))
+            text = "This state machine has no state '%s', only %s" % (key, list(self._states))
             smach.logerr(text)
             raise KeyError(text)
         return self._states[key]
@@ -347,12 +352,17 @@ class StateMachine(Container):
         """The label at which execution begins, in a list."""
         return [str(self._initial_state_label)]
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: Optional[smach.UserData] = None) -> None:
-        """Begin at this label (one, in a list) from now on, with the keys of ``userdata`` added to the machine's."""
+    def set_initial_state(self, initial_states: Sequence[str],
+                          userdata: Optional[smach.UserData] = None) -> None:
+        """Begin at this label (one, in a list) from now on, with the keys of ``userdata`` added to
+        the machine's.
+        """
         smach.logdebug('Setting initial states to %s' % (initial_states,))
         labels = [initial_states] if isinstance(initial_states, str) else list(initial_states)
         if len(labels) > 1:
-            smach.logwarn('A state machine begins in one state; of the initial states %s the first is taken.' % labels)
+            smach.logwarn(
+                'A state machine begins in one state; of the initial states %s the first is taken.'
+                % labels)
         if labels:
             self._initial_state_label = labels[0]
         if userdata is not None:
@@ -370,16 +380,20 @@ class StateMachine(Container):
     # -- copies
 
     def __getstate__(self) -> Dict[str, Any]:
-        return {key: value for key, value in self.__dict__.items() if key not in StateMachine._UNPICKLED}
+        return {key: value for key, value in self.__dict__.items()
+                if key not in StateMachine._UNPICKLED}
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
-        state = dict(state, _state_transitioning_lock=threading.RLock(), _visits={}, _is_running=False)
-        for name, value in state.items():  # by setattr, as an instance whose __dict__ was never asked for is faster
+        state = dict(state, _state_transitioning_lock=threading.RLock(), _visits={},
+                     _is_running=False)
+        # by setattr, as an instance whose __dict__ was never asked for is faster
+        for name, value in state.items():
             setattr(self, name, value)
 
 
 # The public methods that are called at every step only if somebody put another in their place.
-_HOOKS = {'preempt_requested': State.preempt_requested, 'call_transition_cbs': Container.call_transition_cbs}
+_HOOKS = {'preempt_requested': State.preempt_requested,
+          'call_transition_cbs': Container.call_transition_cbs}
 
 # Stands for a target that has to be looked for, where None means one that falls through.
 _SEARCH: Any = object()

@@ -1,8 +1,8 @@
 """Userdata: what states hand to each other, and the view of it a single state gets.
 
-Both classes are made for speed: a step of a machine reads and writes through them many times a microsecond apart. A
-read or write of one key is one dictionary operation, which Python itself makes atomic; so they need no locks to be
-safe for several threads.
+Both classes are made for speed: a step of a machine reads and writes through them many times a
+microsecond apart. A read or write of one key is one dictionary operation, which Python itself makes
+atomic; so they need no locks to be safe for several threads.
 """
 import copy
 from typing import Any, Callable, Collection, Dict, Iterable, List, Mapping, Union
@@ -17,7 +17,9 @@ _NO_REMAPPING: Dict[str, str] = {}
 
 
 class UserData(object):
-    """Values by key, as attributes (``ud.x``) or items (``ud['x']``). The dictionary itself is ``_data``."""
+    """Values by key, as attributes (``ud.x``) or items (``ud['x']``). The dictionary itself is
+    ``_data``.
+    """
 
     _data: Dict[str, Any]
 
@@ -63,7 +65,9 @@ class UserData(object):
         self._data.update(_as_dict(other_userdata))
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> 'UserData':
-        """A new userdata with shallow copies of the given keys; ``remapping`` maps new names to keys of this one."""
+        """A new userdata with shallow copies of the given keys; ``remapping`` maps new names to
+        keys of this one.
+        """
         new_names = {old: new for new, old in remapping.items()}
         extracted = UserData()
         for key in keys:
@@ -71,7 +75,9 @@ class UserData(object):
         return extracted
 
     def merge(self, ud: 'UserData', keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Write shallow copies of the given keys of ``ud`` here; ``remapping`` maps keys of ``ud`` to keys of this."""
+        """Write shallow copies of the given keys of ``ud`` here; ``remapping`` maps keys of ``ud``
+        to keys of this.
+        """
         for key in keys:
             self[remapping.get(key, key)] = _shallow_copy(ud[key])
 
@@ -84,18 +90,21 @@ class UserData(object):
 class Remapper(object):
     """The userdata as one state sees it: its own names for the keys, and only those it declared.
 
-    ``remapping`` maps the state's names to the keys of ``ud``. Reading a key that is not in ``input_keys`` raises
-    InvalidUserCodeError; writing one that is not in ``output_keys`` logs an error and changes nothing. The collections
-    of keys are kept, not copied: keys that a state declares later are seen at once.
+    ``remapping`` maps the state's names to the keys of ``ud``. Reading a key that is not in
+    ``input_keys`` raises InvalidUserCodeError; writing one that is not in ``output_keys`` logs an
+    error and changes nothing. The collections of keys are kept, not copied: keys that a state
+    declares later are seen at once.
     """
 
-    # One slot with everything in it and __getattribute__ (not __getattr__) take half the time of anything plainer: a
-    # failing attribute look-up, with its exception made and thrown away, would precede every read.
+    # One slot with everything in it and __getattribute__ (not __getattr__) take half the time of
+    # anything plainer: a failing attribute look-up, with its exception made and thrown away, would
+    # precede every read.
     __slots__ = ('_parts', '__weakref__')
 
     def __init__(self, ud: Any, input_keys: Collection[str] = (), output_keys: Collection[str] = (),
                  remapping: Mapping[str, str] = _NO_REMAPPING) -> None:
-        # A plain UserData is read and written at its dictionary; anything else through its own item access.
+        # A plain UserData is read and written at its dictionary; anything else through its own item
+        # access.
         _set_parts(self, (ud, input_keys, output_keys, remapping, type(ud) is UserData))
 
     def __getattribute__(self, key: str) -> Any:
@@ -152,7 +161,9 @@ class Remapper(object):
         return [name for key in ud.keys() for name in names.get(key, ())]
 
     def update(self, other_userdata: Any) -> None:
-        """Hand all keys of another userdata to the userdata behind this view, under their own names."""
+        """Hand all keys of another userdata to the userdata behind this view, under their own
+        names.
+        """
         _parts_of(self)[0].update(other_userdata)
 
     def __reduce__(self) -> Any:
@@ -160,13 +171,15 @@ class Remapper(object):
 
     def _not_an_input(self, key: str) -> Exception:
         return smach.InvalidUserCodeError(
-            "Userdata key '%s' is no input key of this state, which has %s; declare it in input_keys to read it."
+            "Userdata key '%s' is no input key of this state, which has %s; declare it in "
+            "input_keys to read it."
             % (key, _listed(_parts_of(self)[1])))
 
     _ud = property(lambda self: _parts_of(self)[0], doc='The userdata behind the view.')
     _input = property(lambda self: _parts_of(self)[1], doc='The keys that may be read.')
     _output = property(lambda self: _parts_of(self)[2], doc='The keys that may be written.')
-    _map = property(lambda self: _parts_of(self)[3], doc='The keys of the userdata by the names the state uses.')
+    _map = property(lambda self: _parts_of(self)[3],
+                    doc='The keys of the userdata by the names the state uses.')
 
 
 _parts_of: Callable[[Remapper], Any] = Remapper._parts.__get__  # type: ignore[attr-defined]
@@ -174,7 +187,9 @@ _set_parts: Callable[[Remapper, Any], None] = Remapper._parts.__set__  # type: i
 
 
 class ConstantsRemapper(Remapper):
-    """A view in which some keys have values fixed when the state was added; they can be read, never written."""
+    """A view in which some keys have values fixed when the state was added; they can be read, never
+    written.
+    """
 
     __slots__ = ('_fixed',)
 
@@ -185,7 +200,8 @@ class ConstantsRemapper(Remapper):
 
     def __getattribute__(self, key: str) -> Any:
         constants = _fixed_of(self)
-        return get_const(constants[key]) if key in constants else Remapper.__getattribute__(self, key)
+        return get_const(constants[key]) if key in constants else Remapper.__getattribute__(
+            self, key)
 
     def __getitem__(self, key: str) -> Any:
         constants = _fixed_of(self)
@@ -211,8 +227,10 @@ class ConstantsRemapper(Remapper):
         return type(self), _parts_of(self)[:4] + (_fixed_of(self),)
 
 
-_fixed_of: Callable[[ConstantsRemapper], Any] = ConstantsRemapper._fixed.__get__  # type: ignore[attr-defined]
-_set_fixed: Callable[[ConstantsRemapper, Any], None] = ConstantsRemapper._fixed.__set__  # type: ignore[attr-defined]
+_fixed_of: Callable[[ConstantsRemapper],
+                    Any] = ConstantsRemapper._fixed.__get__  # type: ignore[attr-defined]
+_set_fixed: Callable[[ConstantsRemapper, Any],
+                     None] = ConstantsRemapper._fixed.__set__  # type: ignore[attr-defined]
 
 
 def _no_such_key(ud: UserData, key: object) -> str:
@@ -222,7 +240,8 @@ def _no_such_key(ud: UserData, key: object) -> str:
 def _shallow_copy(value: Any) -> Any:
     try:
         return copy.copy(value)
-    except Exception:  # whatever a lock, a socket or a user's own __copy__ raises: such a thing is shared, not copied
+    except Exception:
+        # whatever a lock, a socket or a user's own __copy__ raises: such a thing is shared
         return value
 
 

@@ -3,7 +3,9 @@ from typing import Any, Callable, Iterable, Tuple
 
 import smach
 
-__all__ = ['is_shutdown', 'set_shutdown_check', 'cb_interface', 'has_smach_interface', 'CBInterface']
+__all__ = [
+    'is_shutdown', 'set_shutdown_check', 'cb_interface', 'has_smach_interface', 'CBInterface'
+]
 
 
 def is_shutdown() -> bool:
@@ -18,15 +20,18 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
 
 def has_smach_interface(obj: Any) -> bool:
     """Whether ``obj`` declares outcomes and userdata keys the way a state does."""
-    return all(hasattr(obj, name) for name in ('get_registered_outcomes', 'get_registered_input_keys',
-                                               'get_registered_output_keys'))
+    return all(
+        hasattr(obj, name) for name in ('get_registered_outcomes', 'get_registered_input_keys',
+                                        'get_registered_output_keys'))
 
 
 class CBInterface(object):
     """A callable together with the outcomes and userdata keys it declares."""
 
-    def __init__(self, cb: Callable[..., Any], outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self, cb: Callable[..., Any], outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()
+    ) -> None:
         self._cb = cb
         self._outcomes = list(outcomes)
         self._input_keys = set(input_keys).union(io_keys)
@@ -49,7 +54,9 @@ class CBInterface(object):
 
 
 class cb_interface(object):
-    """Decorator that gives a callback an interface: ``@cb_interface(outcomes=['done'], input_keys=['x'])``."""
+    """Decorator that gives a callback an interface: ``@cb_interface(outcomes=['done'],
+    input_keys=['x'])``.
+    """
 
     def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
                  output_keys: Iterable[str] = ()) -> None:

@@ -6,19 +6,26 @@ from smach.user_data import ConstantsRemapper, Remapper
 
 
 class Visit(object):
-    """The view on userdata a state is given, with everything it was made of, to be compared by identity later."""
+    """The view on userdata a state is given, with everything it was made of, to be compared by
+    identity later.
+    """
 
-    __slots__ = ('state', 'userdata', 'input_keys', 'output_keys', 'remapping', 'remapper', 'may_be_kept', 'texts')
+    __slots__ = ('state', 'userdata', 'input_keys', 'output_keys', 'remapping', 'remapper',
+                 'may_be_kept', 'texts')
 
     def __init__(self, state: Any, userdata: Any, remapping: Mapping[str, str],
                  constants: Optional[Mapping[str, Any]]) -> None:
         # A state that computes its keys is asked for them at every visit.
         self.may_be_kept = (type(state).get_registered_input_keys is State.get_registered_input_keys
-                            and type(state).get_registered_output_keys is State.get_registered_output_keys)
+                            and type(state).get_registered_output_keys
+                            is State.get_registered_output_keys)
         self.state = state
         self.userdata = userdata
-        self.input_keys = state._input_keys if self.may_be_kept else state.get_registered_input_keys()
-        self.output_keys = state._output_keys if self.may_be_kept else state.get_registered_output_keys()
+        if self.may_be_kept:
+            self.input_keys, self.output_keys = state._input_keys, state._output_keys
+        else:
+            self.input_keys = state.get_registered_input_keys()
+            self.output_keys = state.get_registered_output_keys()
         self.remapping = remapping
         parts = (userdata, self.input_keys, self.output_keys, remapping)
         self.texts: Dict[Any, Any] = {}  # (target, log line of the transition to it) by outcome

@@ -1,6 +1,7 @@
 """States and tools that join SMACH machines to ROS.
 
-Importing this package sends SMACH's log lines to rospy's loggers and lets machines stop when rospy shuts down.
+Importing this package sends SMACH's log lines to rospy's loggers and lets machines stop when rospy
+shuts down.
 """
 import rospy
 import smach
@@ -16,5 +17,7 @@ from smach_ros.condition_state import ConditionState  # noqa: E402
 from smach_ros.action_server_wrapper import ActionServerWrapper  # noqa: E402
 from smach_ros.introspection import IntrospectionClient, IntrospectionServer  # noqa: E402
 
-__all__ = ['set_preempt_handler', 'SimpleActionState', 'ServiceState', 'MonitorState', 'ConditionState',
-           'ActionServerWrapper', 'IntrospectionServer', 'IntrospectionClient']
+__all__ = [
+    'set_preempt_handler', 'SimpleActionState', 'ServiceState', 'MonitorState', 'ConditionState',
+    'ActionServerWrapper', 'IntrospectionServer', 'IntrospectionClient'
+]

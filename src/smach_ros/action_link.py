@@ -1,7 +1,7 @@
 """One connection to an action server, shared by all states of the process that use the action.
 
-A link lives as long as the process: states come and go (and machines are executed hundreds of times) without opening
-topics or threads again.
+A link lives as long as the process: states come and go (and machines are executed hundreds of
+times) without opening topics or threads again.
 """
 import threading
 import time
@@ -11,15 +11,17 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 import actionlib
 import rosgraph
 import rospy
-import smach
 from actionlib_msgs.msg import GoalStatusArray
 
+import smach
 from smach_ros.server_watch import ServerWatch
 from smach_ros.waiting import shutting_down
 
 RETRY_CONNECT_S = 0.5
 SETTLE_S = 0.05
-"""A server greets a new subscriber before it puts it on the list of those that get its results (rospy)."""
+"""A server greets a new subscriber before it puts it on the list of those that get its results
+(rospy).
+"""
 SEND_CANCEL_S = 0.1
 """Time for rospy's sender threads to put a cancel on the wire before the node closes its topics."""
 
@@ -28,7 +30,9 @@ _links_lock = threading.Lock()
 
 
 def link_to(action_name: str, action_spec: Any) -> 'ActionLink':
-    """The process's link to the action, opened in the background if this is the first call for it."""
+    """The process's link to the action, opened in the background if this is the first call for
+    it.
+    """
     key = (rospy.resolve_name(action_name), action_spec)
     with _links_lock:
         if not _links:
@@ -41,20 +45,25 @@ def link_to(action_name: str, action_spec: Any) -> 'ActionLink':
 def _cancel_all() -> None:
     """At a shutdown: cancel the goals under way while the topics are still open.
 
-    From another thread, as Ctrl-C may have interrupted the executing one while it held a lock that is needed here.
+    From another thread, as Ctrl-C may have interrupted the executing one while it held a lock that
+    is needed here.
     """
     runs = [run for link in list(_links.values()) for run in list(link.active_runs)]
     if runs:
-        canceller = threading.Thread(target=lambda: [run.cancel() for run in runs], name='cancel goals', daemon=True)
+        canceller = threading.Thread(target=lambda: [run.cancel() for run in runs],
+                                     name='cancel goals', daemon=True)
         canceller.start()
         canceller.join(SEND_CANCEL_S)
         time.sleep(SEND_CANCEL_S)
 
 
 class ActionLink(object):
-    """Topics of one action: opened in the background, as soon as the node is initialised and its master answers."""
+    """Topics of one action: opened in the background, as soon as the node is initialised and its
+    master answers.
+    """
 
-    _sending = threading.Lock()  # actionlib counts its goals without one: two at once could get the same id
+    # actionlib counts its goals without one: two at once could get the same id
+    _sending = threading.Lock()
 
     def __init__(self, action_name: str, action_spec: Any) -> None:
         self.action_name = action_name
@@ -71,13 +80,15 @@ class ActionLink(object):
         complained = False
         while not shutting_down():
             try:
-                # without a master rospy would hold a lock here that a shutdown of the node waits for
+                # without a master rospy would hold a lock here that a shutdown of the node waits
+                # for
                 if rospy.core.is_initialized() and rosgraph.is_master_online():
                     self._open()
                     return
             except (OSError, rospy.ROSException) as err:
                 if not complained:
-                    smach.logwarn("Cannot open action '%s' yet, trying on: %s" % (self.action_name, err))
+                    smach.logwarn("Cannot open action '%s' yet, trying on: %s" %
+                                  (self.action_name, err))
                 complained = True
             time.sleep(RETRY_CONNECT_S if complained else 0.05)
 
@@ -85,41 +96,53 @@ class ActionLink(object):
         self._disable_nagle()
         client = actionlib.ActionClient(self.action_name, self._spec)
         watch = ServerWatch(client.status_sub)
-        self._fast_ends.append(rospy.Subscriber(client.status_sub.name, GoalStatusArray, watch.note_status))
+        self._fast_ends.append(
+            rospy.Subscriber(client.status_sub.name, GoalStatusArray, watch.note_status))
         self.watch = watch
         self.client = client
 
     def _disable_nagle(self) -> None:
-        # A goal a few milliseconds after the last one would otherwise wait for a delayed TCP acknowledgement (40 ms).
-        # Both directions are asked for by whoever opens the topic here first; these handles stay for that purpose.
+        # A goal a few milliseconds after the last one would otherwise wait for a delayed TCP
+        # acknowledgement (40 ms).
+        # Both directions are asked for by whoever opens the topic here first; these handles stay
+        # for that purpose.
         if self._fast_ends:
             return
         base, spec = rospy.remap_name(self.action_name), self._spec()
         for topic, message in (('goal', spec.action_goal), ('result', spec.action_result),
                                ('feedback', spec.action_feedback)):
             if topic == 'goal':
-                self._fast_ends.append(rospy.Publisher(base + '/' + topic, type(message), tcp_nodelay=True,
-                                                       queue_size=10))
+                self._fast_ends.append(
+                    rospy.Publisher(base + '/' + topic, type(message), tcp_nodelay=True,
+                                    queue_size=10))
             else:
-                self._fast_ends.append(rospy.Subscriber(base + '/' + topic, type(message), tcp_nodelay=True))
-        self._fast_ends.append(rospy.Subscriber(base + '/status', GoalStatusArray, tcp_nodelay=True))
+                self._fast_ends.append(
+                    rospy.Subscriber(base + '/' + topic, type(message), tcp_nodelay=True))
+        self._fast_ends.append(rospy.Subscriber(base + '/status', GoalStatusArray,
+                                                tcp_nodelay=True))
 
     def ready(self) -> bool:
-        """Whether a server is connected on all topics, so that neither a goal nor its result can get lost."""
+        """Whether a server is connected on all topics, so that neither a goal nor its result can
+        get lost.
+        """
         connections = self._connections()
         if [id(each) for each in connections] != [id(each) for each in self._seen]:
             self._seen, self._seen_at = connections, time.monotonic()
         return bool(connections) and time.monotonic() - self._seen_at >= SETTLE_S
 
     def _connections(self) -> Tuple[Any, ...]:
-        """The connections on which result and feedback come; () while any topic is without the server."""
+        """The connections on which result and feedback come; () while any topic is without the
+        server.
+        """
         client, watch = self.client, self.watch
         if client is None or watch is None or not watch.connections():
             return ()
         server_id = watch.server_id
-        heard = tuple(_heard(topic, server_id) for topic in (client.result_sub, client.feedback_sub))
+        heard = tuple(
+            _heard(topic, server_id) for topic in (client.result_sub, client.feedback_sub))
         told = (client.pub_goal, client.pub_cancel)
-        return heard if all(heard) and all(topic.impl.has_connection(server_id) for topic in told) else ()
+        return heard if all(heard) and all(topic.impl.has_connection(server_id)
+                                           for topic in told) else ()
 
     def problem(self, frozen_after_s: float) -> Optional[str]:
         """Why the server must be regarded as lost, or None. See ServerWatch."""
@@ -127,7 +150,9 @@ class ActionLink(object):
 
     def send_goal(self, goal: Any, on_transition: Callable[[Any], None],
                   on_feedback: Callable[[Any, Any], None]) -> Any:
-        """Send ``goal`` (the action's Goal message); returns actionlib's goal handle, which keeps the goal tracked."""
+        """Send ``goal`` (the action's Goal message); returns actionlib's goal handle, which keeps
+        the goal tracked.
+        """
         if self.client is None:
             raise smach.InvalidStateError("Action '%s' is not connected: send_goal() before ready()"
                                           % self.action_name)

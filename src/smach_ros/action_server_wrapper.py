@@ -5,31 +5,34 @@ from typing import Any, Dict, Iterable, List, Optional
 
 import actionlib
 import rospy
-import smach
 
+import smach
 from smach_ros.waiting import shutting_down
 
 __all__ = ['ActionServerWrapper']
 
 
 class ActionServerWrapper(object):
-    """Serves ``server_name`` by executing ``wrapped_container`` once per goal, after ``run_server()``.
+    """Serves ``server_name`` by executing ``wrapped_container`` once per goal, after
+    ``run_server()``.
 
-    Each goal is put into a parent userdata: the goal under ``goal_key``, a fresh feedback under ``feedback_key`` and
-    a fresh result under ``result_key``; ``goal_slots_map`` {goal field: userdata key} adds single fields,
-    ``expand_goal_slots`` all of them by their own names. The container sees the keys it declares. At each of its
-    transitions the feedback is published, with the fields in ``feedback_slots_map`` {feedback field: userdata key}
-    set; at its end the result, with ``result_slots_map`` {result field: userdata key}, or with ``pack_result_slots``
-    every field, taken from userdata. The container's outcome, by the list it stands in, ends the goal as succeeded,
-    aborted or preempted; an unlisted outcome or an exception aborts it. A cancel, a newer goal or a shutdown of the
-    node preempts the container.
+    Each goal is put into a parent userdata: the goal under ``goal_key``, a fresh feedback under
+    ``feedback_key`` and a fresh result under ``result_key``; ``goal_slots_map`` {goal field:
+    userdata key} adds single fields, ``expand_goal_slots`` all of them by their own names. The
+    container sees the keys it declares. At each of its transitions the feedback is published, with
+    the fields in ``feedback_slots_map`` {feedback field: userdata key} set; at its end the result,
+    with ``result_slots_map`` {result field: userdata key}, or with ``pack_result_slots`` every
+    field, taken from userdata. The container's outcome, by the list it stands in, ends the goal as
+    succeeded, aborted or preempted; an unlisted outcome or an exception aborts it. A cancel, a
+    newer goal or a shutdown of the node preempts the container.
     """
 
     def __init__(self, server_name: str, action_spec: Any, wrapped_container: Any,
                  succeeded_outcomes: Iterable[str] = (), aborted_outcomes: Iterable[str] = (),
                  preempted_outcomes: Iterable[str] = (), goal_key: str = 'action_goal',
                  feedback_key: str = 'action_feedback', result_key: str = 'action_result',
-                 goal_slots_map: Optional[Dict[str, str]] = None, feedback_slots_map: Optional[Dict[str, str]] = None,
+                 goal_slots_map: Optional[Dict[str, str]] = None,
+                 feedback_slots_map: Optional[Dict[str, str]] = None,
                  result_slots_map: Optional[Dict[str, str]] = None, expand_goal_slots: bool = False,
                  pack_result_slots: bool = False) -> None:
         self.wrapped_container = wrapped_container
@@ -57,20 +60,23 @@ class ActionServerWrapper(object):
     def _warn_of_mistakes(self) -> None:
         lists = (self._succeeded_outcomes, self._aborted_outcomes, self._preempted_outcomes)
         if len(set().union(*lists)) < sum(len(outcomes) for outcomes in lists):
-            smach.logerr("Action '%s': an outcome is listed as more than one of succeeded, aborted and preempted"
-                         % self._server_name)
+            smach.logerr(
+                "Action '%s': an outcome is listed as more than one of succeeded, aborted and "
+                "preempted"
+                % self._server_name)
         for what, slots, message in (('goal', self._goal_slots_map, self._goal_type),
                                      ('feedback', self._feedback_slots_map, self._feedback_type),
                                      ('result', self._result_slots_map, self._result_type)):
             unknown = sorted(set(slots) - set(message.__slots__))
             if unknown:
-                smach.logerr("Action '%s': %s_slots_map names %s, but %s has only %s"
-                             % (self._server_name, what, unknown, message._type, list(message.__slots__)))
+                smach.logerr(
+                    "Action '%s': %s_slots_map names %s, but %s has only %s" %
+                    (self._server_name, what, unknown, message._type, list(message.__slots__)))
 
     def run_server(self) -> None:
         """Start serving, in the background."""
-        server = actionlib.SimpleActionServer(self._server_name, self._action_spec, execute_cb=self.execute_cb,
-                                              auto_start=False)
+        server = actionlib.SimpleActionServer(self._server_name, self._action_spec,
+                                              execute_cb=self.execute_cb, auto_start=False)
         server.register_preempt_callback(self.preempt_cb)
         self._action_server = server
         rospy.on_shutdown(self.preempt_cb)
@@ -81,7 +87,8 @@ class ActionServerWrapper(object):
         """Publish feedback: the container has made a transition."""
         self.publish_feedback(userdata)
 
-    def termination_cb(self, userdata: Any, terminal_states: List[str], container_outcome: str, *args: Any) -> None:
+    def termination_cb(self, userdata: Any, terminal_states: List[str], container_outcome: str,
+                       *args: Any) -> None:
         """The container has ended with ``container_outcome``. To be overridden."""
 
     def publish_feedback(self, userdata: Any) -> None:
@@ -93,13 +100,16 @@ class ActionServerWrapper(object):
                   if key in userdata and field in self._feedback_type.__slots__}
         if self._feedback_key not in userdata and not fields:
             return
-        feedback = userdata[self._feedback_key] if self._feedback_key in userdata else self._feedback_type()
+        key_is_set = self._feedback_key in userdata
+        feedback = userdata[self._feedback_key] if key_is_set else self._feedback_type()
         for field, key in fields.items():
             setattr(feedback, field, userdata[key])
         server.publish_feedback(feedback)
 
     def execute_cb(self, goal: Any) -> None:
-        """Execute the container for ``goal`` and end it as the container does. Called by the server's thread."""
+        """Execute the container for ``goal`` and end it as the container does. Called by the
+        server's thread.
+        """
         server = self._action_server
         if server is None:
             raise smach.InvalidStateError("Action '%s' is not served yet: call run_server() first"
@@ -110,7 +120,8 @@ class ActionServerWrapper(object):
         try:
             outcome = self.wrapped_container.execute(self.userdata)
         except Exception:
-            smach.logerr("Action '%s': the container raised:\n%s" % (self._server_name, traceback.format_exc()))
+            smach.logerr("Action '%s': the container raised:\n%s" %
+                         (self._server_name, traceback.format_exc()))
             server.set_aborted(self._result_type(), traceback.format_exc().strip().splitlines()[-1])
             return
         self._end_goal(server, outcome)
@@ -141,7 +152,8 @@ class ActionServerWrapper(object):
         try:
             result = self._make_result()
         except (KeyError, AttributeError) as err:
-            smach.logerr("Action '%s': no result could be made from userdata: %r" % (self._server_name, err))
+            smach.logerr("Action '%s': no result could be made from userdata: %r" %
+                         (self._server_name, err))
             server.set_aborted(self._result_type(), 'no result could be made: %r' % (err,))
             return
         text = 'container outcome: %s' % outcome
@@ -151,23 +163,32 @@ class ActionServerWrapper(object):
             server.set_preempted(result, text)
         else:
             if outcome not in self._aborted_outcomes:
-                smach.logerr("Action '%s': the container ended with outcome %r, which is listed neither as succeeded, "
-                             "aborted nor preempted; the goal is aborted" % (self._server_name, outcome))
+                smach.logerr(
+                    "Action '%s': the container ended with outcome %r, which is listed neither as "
+                    "succeeded, "
+                    "aborted nor preempted; the goal is aborted" % (self._server_name, outcome))
             server.set_aborted(result, text)
 
     def preempt_cb(self) -> None:
-        """Preempt the container: the goal was cancelled, a newer one came, or the node shuts down."""
-        # Not in this thread: it holds the server's lock, which the executing one may want while it holds the machine's.
-        threading.Thread(target=self._preempt_container, name='preempt %s' % self._server_name, daemon=True).start()
+        """Preempt the container: the goal was cancelled, a newer one came, or the node shuts
+        down.
+        """
+        # Not in this thread: it holds the server's lock, which the executing one may want while it
+        # holds the machine's.
+        threading.Thread(target=self._preempt_container, name='preempt %s' % self._server_name,
+                         daemon=True).start()
 
     def _preempt_container(self) -> None:
         server = self._action_server
-        if server is not None and server.is_active() and (server.is_preempt_requested() or shutting_down()):
+        if server is not None and server.is_active() and (server.is_preempt_requested()
+                                                          or shutting_down()):
             self.wrapped_container.request_preempt()
 
 
 def _recall_preempts(state: Any) -> None:
-    """Take back, here and in all states inside, what an earlier goal's cancel asked for and nobody serviced."""
+    """Take back, here and in all states inside, what an earlier goal's cancel asked for and nobody
+    serviced.
+    """
     if state.preempt_requested():
         state.recall_preempt()
     if isinstance(state, smach.Container):

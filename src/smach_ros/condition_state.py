@@ -4,24 +4,28 @@ import traceback
 from typing import Any, Callable, Iterable
 
 import rospy
-import smach
 
+import smach
 from smach_ros.waiting import Signal, deadline_after, seconds, shutting_down
 
 __all__ = ['ConditionState']
 
 
 class ConditionState(smach.State):
-    """Ends 'true' as soon as ``cond_cb(userdata)`` is, 'false' when it stays false, 'preempted' on a preempt.
+    """Ends 'true' as soon as ``cond_cb(userdata)`` is, 'false' when it stays false, 'preempted' on
+    a preempt.
 
-    ``poll_rate`` is the pause between checks and ``timeout`` the limit of the whole wait (``rospy.Duration`` or
-    seconds of wall time; no timeout: None or 0). ``max_checks`` more checks follow a first false one; -1: without end.
-    Raises ``smach.InvalidUserCodeError`` from ``execute`` if ``cond_cb`` raises.
+    ``poll_rate`` is the pause between checks and ``timeout`` the limit of the whole wait
+    (``rospy.Duration`` or seconds of wall time; no timeout: None or 0). ``max_checks`` more checks
+    follow a first false one; -1: without end. ``execute`` raises InvalidUserCodeError if
+    ``cond_cb`` raises.
     """
 
     def __init__(self, cond_cb: Callable[[Any], Any], input_keys: Iterable[str] = (),
-                 poll_rate: Any = rospy.Duration(0.05), timeout: Any = None, max_checks: int = 1) -> None:
-        smach.State.__init__(self, outcomes=['true', 'false', 'preempted'], input_keys=list(input_keys))
+                 poll_rate: Any = rospy.Duration(0.05), timeout: Any = None,
+                 max_checks: int = 1) -> None:
+        smach.State.__init__(self, outcomes=['true', 'false', 'preempted'],
+                             input_keys=list(input_keys))
         if smach.has_smach_interface(cond_cb):  # its outcomes are not the state's
             self.register_input_keys(cond_cb.get_registered_input_keys())
             self.register_output_keys(cond_cb.get_registered_output_keys())
@@ -45,7 +49,8 @@ class ConditionState(smach.State):
             if self._holds(ud):
                 return 'true'
             checks += 1
-            if 0 <= self._max_checks < checks or (deadline is not None and time.monotonic() >= deadline):
+            if 0 <= self._max_checks < checks or (deadline is not None
+                                                  and time.monotonic() >= deadline):
                 return 'false'
             self._signal.wait(self.preempt_requested, deadline, pause_s)
         self.service_preempt()

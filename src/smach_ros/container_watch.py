@@ -6,11 +6,15 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 import smach
 
 Report = Callable[['ContainerWatch', str, List[str], Any], None]
-"""``report(watch, info, active_states, userdata)``: a container starts, makes a transition or has ended."""
+"""``report(watch, info, active_states, userdata)``: a container starts, makes a transition or has
+ended.
+"""
 
 
 class _Hook(object):
-    """The callback a container holds. Pickled or copied with its machine it becomes one that does nothing."""
+    """The callback a container holds. Pickled or copied with its machine it becomes one that does
+    nothing.
+    """
 
     def __init__(self, watch: Optional['ContainerWatch'], info: str) -> None:
         self._watch = weakref.ref(watch) if watch is not None else None
@@ -46,7 +50,8 @@ class ContainerWatch(object):
         """Report again after ``detach``."""
         self._report = report
 
-    def happened(self, info: str, userdata: Any, states: Sequence[str], args: Sequence[Any]) -> None:
+    def happened(self, info: str, userdata: Any, states: Sequence[str],
+                 args: Sequence[Any]) -> None:
         """Called in the executing thread."""
         if info == 'TERMINATION':
             self.jump_to = None
@@ -62,7 +67,8 @@ class ContainerWatch(object):
         label, self.jump_to = self.jump_to, None
         if label not in self.container.get_children():
             return states
-        smach.logwarn("Going to '%s' instead of %s, as asked through introspection" % (label, list(states)))
+        smach.logwarn("Going to '%s' instead of %s, as asked through introspection" %
+                      (label, list(states)))
         self.container._set_current_state(label)
         return [str(label)]
 
@@ -80,7 +86,8 @@ def _children(container: Any) -> Dict[str, Any]:
 class ContainerTree(object):
     """All containers below a root, found again at each ``refresh``: machines grow, and get wrapped.
 
-    Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at runs at its speed.
+    Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at
+    runs at its speed.
     """
 
     def __init__(self, report: Report, is_heard: Callable[[], bool] = lambda: True) -> None:
@@ -116,7 +123,8 @@ class ContainerTree(object):
             for key in [key for key, watch in self._known.items() if not watch.paths]:
                 self._known[key].detach()
 
-    def _collect(self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int, ...]) -> None:
+    def _collect(self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int,
+                                                                                  ...]) -> None:
         if not isinstance(state, smach.Container) or id(state) in above:
             return
         found[path] = state
@@ -126,7 +134,8 @@ class ContainerTree(object):
     def _watch(self, path: str, container: Any) -> ContainerWatch:
         watch = self._known.get(id(container))
         if watch is None:
-            watch = self._known[id(container)] = ContainerWatch(container, self._report, self._is_heard)
+            watch = self._known[id(container)] = ContainerWatch(container, self._report,
+                                                                self._is_heard)
         watch.attach(self._report)
         watch.paths = watch.paths + [path]
         return watch

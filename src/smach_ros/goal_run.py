@@ -3,24 +3,27 @@ import time
 import traceback
 from typing import Any, Optional
 
-import smach
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
+import smach
 from smach_ros.action_link import ActionLink
 from smach_ros.waiting import Signal
 
 UNSEEN_AFTER_S = 5.0
 UNSEEN_STATUSES = 5
-"""A goal that the server has left out of that many status messages for that long was never received."""
+"""A goal that the server has left out of that many status messages for that long was never
+received.
+"""
 RESULT_AFTER_S = 5.0
 
 
 class GoalRun(object):
     """Tracks one goal. ``listener`` has SimpleActionState's three overridable callbacks.
 
-    ``done`` turns True once, after ``status`` (a GoalStatus constant) and ``result`` (None if none came) are set and
-    the listener was told. Calls from the server after that, or after ``abandon``, change nothing.
+    ``done`` turns True once, after ``status`` (a GoalStatus constant) and ``result`` (None if none
+    came) are set and the listener was told. Calls from the server after that, or after ``abandon``,
+    change nothing.
     """
 
     def __init__(self, link: ActionLink, listener: Any, signal: Signal) -> None:
@@ -55,7 +58,8 @@ class GoalRun(object):
         try:
             handle.cancel()
         except Exception as err:
-            # rospy raises bare exceptions when a topic is closed under us, as at the end of a shutdown.
+            # rospy raises bare exceptions when a topic is closed under us, as at the end of a
+            # shutdown.
             smach.logwarn('Could not cancel the goal: %r' % err)
 
     def close(self) -> None:
@@ -69,7 +73,9 @@ class GoalRun(object):
         self.status, self.result = GoalStatus.LOST, None
 
     def problem(self, frozen_after_s: float) -> Optional[str]:
-        """Why the goal will never end: the server is lost, or never took notice of it. None as long as it may."""
+        """Why the goal will never end: the server is lost, or never took notice of it. None as long
+        as it may.
+        """
         return self._link.problem(frozen_after_s) or self._never_received() or self._result_lost()
 
     def _never_received(self) -> Optional[str]:
@@ -78,12 +84,14 @@ class GoalRun(object):
             return None
         if watch.status_count - self._statuses_before < UNSEEN_STATUSES:
             return None
-        return 'its server reports status, but has taken no notice of the goal for %g s' % UNSEEN_AFTER_S
+        return ('its server reports status, but has taken no notice of the goal for %g s'
+                % UNSEEN_AFTER_S)
 
     def _result_lost(self) -> Optional[str]:
         if self._ended_at is None or time.monotonic() - self._ended_at < RESULT_AFTER_S:
             return None
-        return 'its server reports the end of the goal, but no result came within %g s' % RESULT_AFTER_S
+        return ('its server reports the end of the goal, but no result came within %g s'
+                % RESULT_AFTER_S)
 
     def _on_transition(self, handle: Any) -> None:
         state = handle.get_comm_state()

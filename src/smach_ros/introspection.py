@@ -1,4 +1,5 @@
-"""Publishing what a machine is and does, and setting where it starts: the ROS side of the smach viewer.
+"""Publishing what a machine is and does, and setting where it starts: the ROS side of the smach
+viewer.
 
 One thread and three publishers serve a whole tree of containers.
 """
@@ -9,22 +10,37 @@ import time
 from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
 
 import rospy
-import smach
-from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus, SmachContainerStructure
 
+import smach
+from smach_msgs.msg import (
+    SmachContainerInitialStatusCmd,
+    SmachContainerStatus,
+    SmachContainerStructure,
+)
 from smach_ros.container_watch import ContainerTree, ContainerWatch
-from smach_ros.introspection_client import INIT_TOPIC, STATUS_TOPIC, STRUCTURE_TOPIC, IntrospectionClient
+from smach_ros.introspection_client import (
+    INIT_TOPIC,
+    STATUS_TOPIC,
+    STRUCTURE_TOPIC,
+    IntrospectionClient,
+)
 from smach_ros.plain_pickle import RefusedDataError, decode_userdata, encode_userdata
 
-__all__ = ['IntrospectionServer', 'IntrospectionClient', 'STATUS_TOPIC', 'INIT_TOPIC', 'STRUCTURE_TOPIC']
+__all__ = [
+    'IntrospectionServer', 'IntrospectionClient', 'STATUS_TOPIC', 'INIT_TOPIC', 'STRUCTURE_TOPIC'
+]
 
 HEARTBEAT_S = 2.0
 LONGEST_BACKLOG = 5000
-"""Status changes that may wait to be published; beyond it the oldest are dropped (and the log says so)."""
+"""Status changes that may wait to be published; beyond it the oldest are dropped (and the log says
+so).
+"""
 SUBSCRIBER_QUEUE = 5000
 LARGE_DATA = 10000
 BACKLOG_BYTES = 32 * 1024 * 1024
-"""With that much waiting for a subscriber that does not read, statuses leave out userdata of LARGE_DATA characters."""
+"""With that much waiting for a subscriber that does not read, statuses leave out userdata of
+LARGE_DATA characters.
+"""
 
 
 class _Change(NamedTuple):
@@ -37,7 +53,9 @@ class _Change(NamedTuple):
 
 
 class _Greeter(rospy.SubscribeListener):
-    """Sends a new subscriber everything at once; keeps the server informed whether anybody listens."""
+    """Sends a new subscriber everything at once; keeps the server informed whether anybody
+    listens.
+    """
 
     def __init__(self, make_messages: Any) -> None:
         super().__init__()
@@ -53,12 +71,14 @@ class _Greeter(rospy.SubscribeListener):
 
 
 class IntrospectionServer(object):
-    """Publishes structure and status of ``state`` and all containers in it, the root being called ``path``.
+    """Publishes structure and status of ``state`` and all containers in it, the root being called
+    ``path``.
 
-    A status goes out at each start, transition and end of a container, in order, and every two seconds (wall time)
-    with the structure. It costs the machine nothing while nobody subscribes. Userdata that cannot be pickled is left
-    out. A command on the init topic sets where a container starts next, and with which userdata; a StateMachine that
-    runs goes there at its next transition.
+    A status goes out at each start, transition and end of a container, in order, and every two
+    seconds (wall time) with the structure. It costs the machine nothing while nobody subscribes.
+    Userdata that cannot be pickled is left out. A command on the init topic sets where a container
+    starts next, and with which userdata; a StateMachine that runs goes there at its next
+    transition.
     """
 
     def __init__(self, server_name: str, state: Any, path: str) -> None:
@@ -88,8 +108,10 @@ class IntrospectionServer(object):
                                            subscriber_listener=_Greeter(self._heartbeat_statuses),
                                            queue_size=SUBSCRIBER_QUEUE)
         self._tree.add_root(self._path, self._state)
-        self._init_sub = rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_init_command)
-        self._thread = threading.Thread(target=self._run, name='introspection %s' % name, daemon=True)
+        self._init_sub = rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd,
+                                          self._on_init_command)
+        self._thread = threading.Thread(target=self._run, name='introspection %s' % name,
+                                        daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -110,21 +132,26 @@ class IntrospectionServer(object):
         self._tree.clear()
 
     def construct(self, server_name: str, state: Any, path: str) -> None:
-        """Show ``state``, and the containers in it, below ``path`` too. All share the topics of this server."""
+        """Show ``state``, and the containers in it, below ``path`` too. All share the topics of
+        this server.
+        """
         self._tree.add_root(path, state)
 
     def _is_heard(self) -> bool:
         status_pub = self._status_pub
         return status_pub is not None and bool(status_pub.impl.connections)
 
-    def _note_change(self, watch: ContainerWatch, info: str, active_states: List[str], userdata: Any) -> None:
+    def _note_change(self, watch: ContainerWatch, info: str, active_states: List[str],
+                     userdata: Any) -> None:
         """In the executing thread: leave the status to the publishing one."""
         if len(self._changes) == LONGEST_BACKLOG:
             if not self._dropped:
-                smach.logwarn("Introspection '%s' cannot keep up: status messages are dropped" % self._server_name)
+                smach.logwarn("Introspection '%s' cannot keep up: status messages are dropped" %
+                              self._server_name)
             self._dropped += 1
-        self._changes.append(_Change(watch, info, active_states, dict(getattr(userdata, '_data', {})),
-                                     rospy.get_rostime()))
+        self._changes.append(
+            _Change(watch, info, active_states, dict(getattr(userdata, '_data', {})),
+                    rospy.get_rostime()))
         self._wake.set()
 
     def _run(self) -> None:
@@ -157,7 +184,8 @@ class IntrospectionServer(object):
             for message in make_messages():
                 topic.publish(message)
         except Exception as err:
-            # A machine half built, a label that is no text, a topic closed by stop(): never the end of the publisher.
+            # A machine half built, a label that is no text, a topic closed by stop(): never the end
+            # of the publisher.
             smach.logdebug('Introspection could not publish: %r' % err)
 
     def _status_messages(self, change: _Change) -> List[SmachContainerStatus]:
@@ -167,10 +195,14 @@ class IntrospectionServer(object):
         message = SmachContainerStatus()
         message.header.stamp = change.stamp
         message.path = path
-        message.initial_states = [str(label) for label in change.watch.container.get_initial_states()]
+        message.initial_states = [
+            str(label) for label in change.watch.container.get_initial_states()
+        ]
         message.active_states = change.active_states
-        message.local_data = encode_userdata(change.data, lambda key, err: self._tell_left_out(path, key, err))
-        if len(message.local_data) > LARGE_DATA and _waiting_bytes(self._status_pub) > BACKLOG_BYTES:
+        message.local_data = encode_userdata(change.data,
+                                             lambda key, err: self._tell_left_out(path, key, err))
+        if len(message.local_data) > LARGE_DATA and _waiting_bytes(
+                self._status_pub) > BACKLOG_BYTES:
             self._tell_heavy()
             message.local_data = encode_userdata({}, lambda key, err: None)
         message.info = change.info
@@ -183,22 +215,29 @@ class IntrospectionServer(object):
         return self._status_message(path, _Change(watch, info, active, data, rospy.get_rostime()))
 
     def _heartbeat_statuses(self) -> List[SmachContainerStatus]:
-        return [self._current_status(path, watch, 'HEARTBEAT') for path, watch in self._tree.by_path.items()]
+        return [
+            self._current_status(path, watch, 'HEARTBEAT')
+            for path, watch in self._tree.by_path.items()
+        ]
 
     def _structures(self) -> List[SmachContainerStructure]:
-        return [structure_message(path, watch.container) for path, watch in self._tree.by_path.items()]
+        return [
+            structure_message(path, watch.container) for path, watch in self._tree.by_path.items()
+        ]
 
     def _tell_heavy(self) -> None:
         if not self._said_heavy:
             self._said_heavy = True
-            smach.logwarn("A viewer of '%s' does not keep up; large userdata is left out of its statuses"
-                          % self._server_name)
+            smach.logwarn(
+                "A viewer of '%s' does not keep up; large userdata is left out of its statuses" %
+                self._server_name)
 
     def _tell_left_out(self, path: str, key: str, err: Exception) -> None:
         if (path, key) not in self._left_out:
             self._left_out.add((path, key))
-            smach.logwarn("Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s"
-                          % (key, path, err))
+            smach.logwarn(
+                "Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s" %
+                (key, path, err))
 
     def _on_init_command(self, command: SmachContainerInitialStatusCmd) -> None:
         watch = self._tree.by_path.get(command.path)
@@ -216,15 +255,20 @@ class IntrospectionServer(object):
 
 
 def _waiting_bytes(topic: Optional[rospy.Publisher]) -> int:
-    """What rospy keeps for subscribers that have not read it yet: a hung one must not eat the robot's memory."""
+    """What rospy keeps for subscribers that have not read it yet: a hung one must not eat the
+    robot's memory.
+    """
     connections = topic.impl.connections if topic is not None and topic.impl is not None else ()
-    return sum(len(data) for connection in connections for data in list(getattr(connection, '_queue', ())))
+    return sum(
+        len(data) for connection in connections for data in list(getattr(connection, '_queue', ())))
 
 
 def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any]) -> bool:
-    """Let the container start in ``labels`` with ``data`` from now on; False if it has no such states (logged).
+    """Let the container start in ``labels`` with ``data`` from now on; False if it has no such
+    states (logged).
 
-    A StateMachine that runs now goes there at its next transition, as soon as its active state has ended.
+    A StateMachine that runs now goes there at its next transition, as soon as its active state has
+    ended.
     """
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]

@@ -5,8 +5,8 @@ from typing import Any, Callable, Iterable, Optional
 
 import rosgraph
 import rospy
-import smach
 
+import smach
 from smach_ros.waiting import Aside, Signal
 
 __all__ = ['MonitorState']
@@ -15,17 +15,20 @@ LOOK_FOR_MASTER_S = 0.2
 
 
 class MonitorState(smach.State):
-    """Ends 'invalid' at the first message on ``topic`` for which ``cond_cb(userdata, message)`` is false.
+    """Ends 'invalid' at the first message on ``topic`` for which ``cond_cb(userdata, message)`` is
+    false.
 
-    Ends 'valid' once ``max_checks`` messages were true (below 1: never), 'preempted' on a preempt or a shutdown.
-    An exception in ``cond_cb`` is logged and counts as false. Messages are judged in the order they arrive in, in the
-    subscriber's thread, so that a slow ``cond_cb`` does not delay a preempt.
+    Ends 'valid' once ``max_checks`` messages were true (below 1: never), 'preempted' on a preempt
+    or a shutdown. An exception in ``cond_cb`` is logged and counts as false. Messages are judged in
+    the order they arrive in, in the subscriber's thread, so that a slow ``cond_cb`` does not delay
+    a preempt.
     """
 
-    def __init__(self, topic: str, msg_type: Any, cond_cb: Callable[[Any, Any], Any], max_checks: int = -1,
-                 input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()) -> None:
-        smach.State.__init__(self, outcomes=['valid', 'invalid', 'preempted'], input_keys=list(input_keys),
-                             output_keys=list(output_keys))
+    def __init__(
+        self, topic: str, msg_type: Any, cond_cb: Callable[[Any, Any], Any], max_checks: int = -1,
+        input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()) -> None:
+        smach.State.__init__(self, outcomes=['valid', 'invalid', 'preempted'],
+                             input_keys=list(input_keys), output_keys=list(output_keys))
         self._topic = topic
         self._msg_type = msg_type
         self._cond_cb = cond_cb
@@ -43,8 +46,10 @@ class MonitorState(smach.State):
             self.service_preempt()
             return 'preempted'
         watch = _Watch(self._cond_cb, self._max_checks, ud, self._signal)
-        listening = Aside('monitor %s' % self._topic, self._signal, lambda stopped: self._listen(watch, stopped))
-        self._signal.wait(lambda: watch.verdict is not None or listening.ended or self.preempt_requested())
+        listening = Aside('monitor %s' % self._topic, self._signal,
+                          lambda stopped: self._listen(watch, stopped))
+        self._signal.wait(
+            lambda: watch.verdict is not None or listening.ended or self.preempt_requested())
         listening.stop()
         verdict = watch.close()
         if listening.error is not None:
@@ -56,7 +61,8 @@ class MonitorState(smach.State):
 
     def _listen(self, watch: '_Watch', stopped: threading.Event) -> None:
         while not rosgraph.is_master_online():
-            # rospy would try to subscribe until it is back, and hold a lock that a shutdown of the node waits for
+            # rospy would try to subscribe until it is back, and hold a lock that a shutdown of the
+            # node waits for
             if stopped.wait(LOOK_FOR_MASTER_S):
                 return
         subscriber = rospy.Subscriber(self._topic, self._msg_type, callback=watch.judge)
@@ -67,7 +73,8 @@ class MonitorState(smach.State):
 class _Watch(object):
     """One execution: counts and judges the messages that arrive while it is open."""
 
-    def __init__(self, cond_cb: Callable[[Any, Any], Any], max_checks: int, ud: Any, signal: Signal) -> None:
+    def __init__(self, cond_cb: Callable[[Any, Any], Any], max_checks: int, ud: Any,
+                 signal: Signal) -> None:
         self.verdict: Optional[str] = None
         self._cond_cb = cond_cb
         self._max_checks = max_checks

@@ -23,8 +23,8 @@ class _TimedTransport(xmlrpc.client.Transport):
 def probe_node(node_uri: str, caller_id: str) -> str:
     """Ask the slave API at ``node_uri`` for its pid.
 
-    Returns ALIVE if something answered, GONE if nobody listens there any more, NO_ANSWER if the host or the process
-    keeps silent (frozen, busy, or cut off from the network).
+    Returns ALIVE if something answered, GONE if nobody listens there any more, NO_ANSWER if the
+    host or the process keeps silent (frozen, busy, or cut off from the network).
     """
     try:
         with xmlrpc.client.ServerProxy(node_uri, transport=_TimedTransport()) as node:
@@ -40,5 +40,5 @@ def probe_node(node_uri: str, caller_id: str) -> str:
 
 def probe_in_background(node_uri: str, caller_id: str, answer: Callable[[str], None]) -> None:
     """Probe from a short-lived thread and hand the verdict to ``answer``."""
-    threading.Thread(target=lambda: answer(probe_node(node_uri, caller_id)), name='probe %s' % node_uri,
-                     daemon=True).start()
+    threading.Thread(target=lambda: answer(probe_node(node_uri, caller_id)),
+                     name='probe %s' % node_uri, daemon=True).start()

@@ -1,7 +1,8 @@
 """Userdata on the wire of smach_msgs: base64 of a pickled dict.
 
-Writing leaves out what cannot be pickled. Reading admits plain data only (numbers, text, bytes, None, lists, tuples,
-dicts, sets): a pickle that names any class or function could run code of its sender's choice, and is refused.
+Writing leaves out what cannot be pickled. Reading admits plain data only (numbers, text, bytes,
+None, lists, tuples, dicts, sets): a pickle that names any class or function could run code of its
+sender's choice, and is refused.
 """
 import base64
 import binascii
@@ -19,7 +20,9 @@ class RefusedDataError(ValueError):
 
 
 class _BytesMaker(object):
-    """Stands in for the two calls by which protocol 2 writes bytes; has no state that a pickle could tamper with."""
+    """Stands in for the two calls by which protocol 2 writes bytes; has no state that a pickle
+    could tamper with.
+    """
 
     __slots__ = ()
 
@@ -49,7 +52,10 @@ class PlainUnpickler(pickle.Unpickler):
 
 
 def decode_userdata(text: str) -> Dict[str, Any]:
-    """The plain dict in ``text``; an empty text is an empty dict. Raises RefusedDataError for anything else."""
+    """Return the plain dict in ``text``; an empty text is an empty dict.
+
+    :raises RefusedDataError: for anything else.
+    """
     if not text:
         return {}
     if len(text) > LONGEST_TEXT:
@@ -68,7 +74,9 @@ def decode_userdata(text: str) -> Dict[str, Any]:
 
 
 def encode_userdata(data: Mapping[str, Any], leave_out: Callable[[str, Exception], None]) -> str:
-    """``data`` for ``local_data``. A key that cannot be pickled is left out and handed to ``leave_out(key, error)``."""
+    """``data`` for ``local_data``. A key that cannot be pickled is left out and handed to
+    ``leave_out(key, error)``.
+    """
     try:
         return _encode(dict(data))
     except Exception:

@@ -1,15 +1,16 @@
 """Noticing that the action server that works on a goal is gone.
 
-A server shows life by its status messages, about five a second. When they stop, or their connection closes, the
-server's node is asked directly: a killed process is known within a fraction of a second, and a server that is merely
-silent (a blocked callback queue, a paused simulation clock) is not given up.
+A server shows life by its status messages, about five a second. When they stop, or their connection
+closes, the server's node is asked directly: a killed process is known within a fraction of a
+second, and a server that is merely silent (a blocked callback queue, a paused simulation clock) is
+not given up.
 """
 import time
 from typing import Any, Callable, List, Optional
 
 import rospy
-import smach
 
+import smach
 from smach_ros import node_probe
 
 SILENT_AFTER_S = 2.0
@@ -18,13 +19,18 @@ PROBE_EVERY_S = 1.0
 FROZEN_AFTER_S = 30.0
 """A node that neither sends status nor answers for this long is given up."""
 WITHDRAWN_AFTER_S = 10.0
-"""A node that answers, but has closed its status connection for this long, serves the action no more."""
+"""A node that answers, but has closed its status connection for this long, serves the action no
+more.
+"""
 
 
 class ServerWatch(object):
-    """Judges the server behind one status subscription. Thread-safe: plain attribute writes, one prober at a time."""
+    """Judges the server behind one status subscription. Thread-safe: plain attribute writes, one
+    prober at a time.
+    """
 
-    def __init__(self, status_subscriber: Any, probe: Callable[..., None] = node_probe.probe_in_background,
+    def __init__(self, status_subscriber: Any,
+                 probe: Callable[..., None] = node_probe.probe_in_background,
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._subscriber = status_subscriber
         self._probe = probe
@@ -60,7 +66,9 @@ class ServerWatch(object):
                 and getattr(connection, 'socket', None) is not None]
 
     def problem(self, frozen_after_s: float = FROZEN_AFTER_S) -> Optional[str]:
-        """Why the server must be regarded as lost; None while it lives or nothing is certain yet. Never blocks."""
+        """Why the server must be regarded as lost; None while it lives or nothing is certain yet.
+        Never blocks.
+        """
         now = self._clock()
         connections = self.connections()
         if connections:
@@ -78,12 +86,15 @@ class ServerWatch(object):
             return 'its node %s is gone: nobody answers at %s' % (self.server_id, self._server_uri)
         if self._unanswered_since is not None and silent_s > frozen_after_s:
             return 'its node %s has given no sign of life for %.0f s' % (self.server_id, silent_s)
-        if self._disconnected_since is not None and now - self._disconnected_since > WITHDRAWN_AFTER_S:
-            return 'node %s no longer serves the action: its status topic was closed' % self.server_id
+        disconnected = self._disconnected_since
+        if disconnected is not None and now - disconnected > WITHDRAWN_AFTER_S:
+            return ('node %s no longer serves the action: its status topic was closed'
+                    % self.server_id)
         if silent_s > 2 * SILENT_AFTER_S and not self._said_silent:
             self._said_silent = True
-            smach.logwarn('Action server on %s has sent no status for %.0f s; its goal is still awaited'
-                          % (self.server_id, silent_s))
+            smach.logwarn(
+                'Action server on %s has sent no status for %.0f s; its goal is still awaited' %
+                (self.server_id, silent_s))
         return None
 
     def _ask_node(self, now: float) -> None:
@@ -91,7 +102,8 @@ class ServerWatch(object):
             return
         self._probing, self._probed_at = True, now
         asked_at = self._last_status_at
-        self._probe(self._server_uri, rospy.get_caller_id(), lambda verdict: self._note_answer(verdict, asked_at))
+        self._probe(self._server_uri, rospy.get_caller_id(),
+                    lambda verdict: self._note_answer(verdict, asked_at))
 
     def _note_answer(self, verdict: str, asked_at: float) -> None:
         self._probing = False

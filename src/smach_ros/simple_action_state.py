@@ -6,9 +6,9 @@ import traceback
 from typing import Any, Callable, Dict, Iterable, Optional
 
 import rospy
-import smach
 from actionlib_msgs.msg import GoalStatus
 
+import smach
 from smach_ros.action_link import SEND_CANCEL_S, link_to
 from smach_ros.goal_run import GoalRun
 from smach_ros.server_watch import FROZEN_AFTER_S
@@ -25,19 +25,22 @@ WATCH_SERVER_S = 0.1
 class SimpleActionState(smach.State):
     """Outcomes succeeded, aborted, preempted, and those in ``outcomes``.
 
-    The goal starts from ``goal``, is replaced by the one in userdata under ``goal_key``, has its fields ``goal_slots``
-    filled from the userdata keys of the same names, and goes through ``goal_cb(userdata, goal, *args, **kwargs)``,
-    which may change it or return another. The result goes to ``result_cb(userdata, status, result, *args, **kwargs)``
-    (an actionlib_msgs/GoalStatus constant; no result: None), which may return one of ``outcomes``, then to userdata as
-    a whole (``result_key``) or by field (``result_slots``).
+    The goal starts from ``goal``, is replaced by the one in userdata under ``goal_key``, has its
+    fields ``goal_slots`` filled from the userdata keys of the same names, and goes through
+    ``goal_cb(userdata, goal, *args, **kwargs)``, which may change it or return another. The result
+    goes to ``result_cb(userdata, status, result, *args, **kwargs)`` (an actionlib_msgs/GoalStatus
+    constant; no result: None), which may return one of ``outcomes``, then to userdata as a whole
+    (``result_key``) or by field (``result_slots``).
 
-    A goal that ends in any other way than SUCCEEDED is 'aborted', or 'preempted' if we asked for its end.
-    Limits (``rospy.Duration`` or seconds, of wall time): a server that has not come ``server_wait_timeout`` after
-    ``execute`` began is 'aborted'; a goal not ended after ``exec_timeout`` (None or 0: no limit) is cancelled and
-    'aborted'; a server that has not ended a cancelled goal after ``preempt_timeout`` is left alone. A server that dies
-    while it works on the goal is noticed; the goal is 'aborted', and the log says why.
+    A goal that ends in any other way than SUCCEEDED is 'aborted', or 'preempted' if we asked for
+    its end. Limits (``rospy.Duration`` or seconds, of wall time): a server that has not come
+    ``server_wait_timeout`` after ``execute`` began is 'aborted'; a goal not ended after
+    ``exec_timeout`` (None or 0: no limit) is cancelled and 'aborted'; a server that has not ended a
+    cancelled goal after ``preempt_timeout`` is left alone. A server that dies while it works on the
+    goal is noticed; the goal is 'aborted', and the log says why.
 
-    ``_goal_active_cb()``, ``_goal_feedback_cb(feedback)`` and ``_goal_done_cb(status, result)`` may be overridden.
+    ``_goal_active_cb()``, ``_goal_feedback_cb(feedback)`` and ``_goal_done_cb(status, result)`` may
+    be overridden.
     """
 
     WAITING_FOR_SERVER = 0
@@ -49,14 +52,16 @@ class SimpleActionState(smach.State):
     server_frozen_timeout_s = FROZEN_AFTER_S
     """A server whose node neither sends status nor answers for this long (s) is given up."""
 
-    def __init__(self, action_name: str, action_spec: Any, goal: Any = None, goal_key: Optional[str] = None,
-                 goal_slots: Iterable[str] = (), goal_cb: Optional[Callable[..., Any]] = None,
-                 goal_cb_args: Iterable[Any] = (), goal_cb_kwargs: Optional[Dict[str, Any]] = None,
-                 result_key: Optional[str] = None, result_slots: Iterable[str] = (),
-                 result_cb: Optional[Callable[..., Any]] = None, result_cb_args: Iterable[Any] = (),
-                 result_cb_kwargs: Optional[Dict[str, Any]] = None, input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = (), outcomes: Iterable[str] = (), exec_timeout: Any = None,
-                 preempt_timeout: Any = rospy.Duration(60.0), server_wait_timeout: Any = rospy.Duration(60.0)) -> None:
+    def __init__(
+        self, action_name: str, action_spec: Any, goal: Any = None, goal_key: Optional[str] = None,
+        goal_slots: Iterable[str] = (), goal_cb: Optional[Callable[..., Any]] = None,
+        goal_cb_args: Iterable[Any] = (), goal_cb_kwargs: Optional[Dict[str, Any]] = None,
+        result_key: Optional[str] = None, result_slots: Iterable[str] = (),
+        result_cb: Optional[Callable[..., Any]] = None, result_cb_args: Iterable[Any] = (),
+        result_cb_kwargs: Optional[Dict[str, Any]] = None, input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (), outcomes: Iterable[str] = (), exec_timeout: Any = None,
+        preempt_timeout: Any = rospy.Duration(60.0), server_wait_timeout: Any = rospy.Duration(60.0)
+    ) -> None:
         smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
         input_keys, output_keys = tuple(input_keys), tuple(output_keys)
         self.register_outcomes(list(outcomes))
@@ -69,9 +74,10 @@ class SimpleActionState(smach.State):
         self._server_wait_timeout = server_wait_timeout
         self._set_goal(goal, goal_key, goal_slots)
         self._set_result(result_key, result_slots)
-        self._goal_cb = self._adopt('goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, input_keys, output_keys)
-        self._result_cb = self._adopt('result_cb', result_cb, result_cb_args, result_cb_kwargs, input_keys,
-                                      output_keys)
+        self._goal_cb = self._adopt('goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, input_keys,
+                                    output_keys)
+        self._result_cb = self._adopt('result_cb', result_cb, result_cb_args, result_cb_kwargs,
+                                      input_keys, output_keys)
         self._goal_status: Optional[int] = GoalStatus.PENDING
         self._goal_result: Any = None
         self._goal_status_text = ''  # why the latest goal ended as it did, for people
@@ -83,19 +89,24 @@ class SimpleActionState(smach.State):
     def _set_goal(self, goal: Any, key: Optional[str], slots: Iterable[str]) -> None:
         template = self._action_spec().action_goal.goal
         if callable(goal):
-            raise smach.InvalidStateError('goal must be a goal message; a function that makes one goes to goal_cb')
+            raise smach.InvalidStateError(
+                'goal must be a goal message; a function that makes one goes to goal_cb')
         self._goal = template if goal is None else goal
         self._goal_type = template._type
         self._goal_key = key
-        self._goal_slots = list(checked_slots('goal_slots', slots, template))  # subclasses add to it
+        # subclasses add to it
+        self._goal_slots = list(checked_slots('goal_slots', slots, template))
         self.register_input_keys(self._goal_slots + ([] if key is None else [key]))
 
     def _set_result(self, key: Optional[str], slots: Iterable[str]) -> None:
         self._result_key = key
-        self._result_slots = list(checked_slots('result_slots', slots, self._action_spec().action_result.result))
+        self._result_slots = list(
+            checked_slots('result_slots', slots,
+                          self._action_spec().action_result.result))
         self.register_output_keys(self._result_slots + ([] if key is None else [key]))
 
-    def _adopt(self, what: str, cb: Optional[Callable[..., Any]], *interface: Any) -> Optional[UserCallback]:
+    def _adopt(self, what: str, cb: Optional[Callable[..., Any]], *interface:
+               Any) -> Optional[UserCallback]:
         if cb is None:
             return None
         callback = UserCallback(what, cb, *interface)
@@ -104,7 +115,9 @@ class SimpleActionState(smach.State):
 
     @property
     def _action_client(self) -> Optional[StateClient]:
-        """A SimpleActionClient for the latest goal, for scripts; None until the node is initialised."""
+        """A SimpleActionClient for the latest goal, for scripts; None until the node is
+        initialised.
+        """
         if self._client is None and self._link.client is not None:
             self._client = StateClient(self._link.client)
         return self._client
@@ -166,7 +179,9 @@ class SimpleActionState(smach.State):
         return False
 
     def _make_goal(self, ud: Any) -> Any:
-        """The goal to send, or None if ``goal_cb`` raised (logged). The script's own goal object is not changed."""
+        """The goal to send, or None if ``goal_cb`` raised (logged). The script's own goal object is
+        not changed.
+        """
         goal = copy.deepcopy(self._goal if self._goal_key is None else ud[self._goal_key])
         for slot in self._goal_slots:
             setattr(goal, slot, ud[slot])
@@ -181,7 +196,8 @@ class SimpleActionState(smach.State):
         return goal if update is None else update
 
     def _check_goal(self, goal: Any) -> None:
-        # rospy would send what it had written of a bad message ahead of the next good one, and break the connection.
+        # rospy would send what it had written of a bad message ahead of the next good one, and
+        # break the connection.
         try:
             goal.serialize(io.BytesIO())
         except Exception as err:
@@ -189,9 +205,12 @@ class SimpleActionState(smach.State):
                                              % (self._action_name, self._goal_type, err)) from err
 
     def _see_through(self, run: GoalRun) -> None:
-        """Wait for the goal's end; after this the run is done, or abandoned with the reason in the log."""
+        """Wait for the goal's end; after this the run is done, or abandoned with the reason in the
+        log.
+        """
         self._goal_status, self._goal_result = None, None
-        problem = self._follow(run, deadline_after(seconds(self._exec_timeout) or None), self.preempt_requested)
+        problem = self._follow(run, deadline_after(seconds(self._exec_timeout) or None),
+                               self.preempt_requested)
         if not run.done:
             if problem is None:
                 problem = self._cancel(run)
@@ -206,8 +225,11 @@ class SimpleActionState(smach.State):
             # A subclass took over _goal_done_cb, or there was no end to tell of.
             self._goal_status, self._goal_result = run.status, run.result
 
-    def _follow(self, run: GoalRun, deadline: Optional[float], stop: Callable[[], bool]) -> Optional[str]:
-        """Wait for the goal's end, ``stop()``, the deadline or a shutdown (None), or a problem (what is wrong)."""
+    def _follow(self, run: GoalRun, deadline: Optional[float],
+                stop: Callable[[], bool]) -> Optional[str]:
+        """Wait for the goal's end, ``stop()``, the deadline or a shutdown (None), or a problem
+        (what is wrong).
+        """
         while not shutting_down():
             if self._signal.wait(lambda: run.done or stop(), deadline, WATCH_SERVER_S):
                 return None
@@ -221,7 +243,8 @@ class SimpleActionState(smach.State):
     def _cancel(self, run: GoalRun) -> Optional[str]:
         """Cancel, and wait for the server to comply. Returns why it did not."""
         if not self._asked_to_stop():
-            smach.logwarn("Action '%s' timed out after %g s" % (self._action_name, seconds(self._exec_timeout) or 0.0))
+            smach.logwarn("Action '%s' timed out after %g s" %
+                          (self._action_name, seconds(self._exec_timeout) or 0.0))
         smach.loginfo("Cancelling the goal of action '%s'" % self._action_name)
         self._status = SimpleActionState.PREEMPTING
         run.cancel()
@@ -260,12 +283,14 @@ class SimpleActionState(smach.State):
         try:
             outcome = self._result_cb(ud, self._goal_status, self._goal_result)
         except Exception:
-            smach.logerr("Result callback of action '%s' raised:\n%s" % (self._action_name, traceback.format_exc()))
+            smach.logerr("Result callback of action '%s' raised:\n%s" %
+                         (self._action_name, traceback.format_exc()))
             return 'aborted'
         if outcome is None or outcome in self.get_registered_outcomes():
             return outcome
-        smach.logerr("Result callback of action '%s' returned %r, but the registered outcomes are %s"
-                     % (self._action_name, outcome, sorted(self.get_registered_outcomes())))
+        smach.logerr(
+            "Result callback of action '%s' returned %r, but the registered outcomes are %s" %
+            (self._action_name, outcome, sorted(self.get_registered_outcomes())))
         return 'aborted'
 
     def _goal_active_cb(self) -> None:
@@ -276,7 +301,8 @@ class SimpleActionState(smach.State):
         """The server has sent feedback (the action's Feedback message). To be overridden."""
 
     def _goal_done_cb(self, result_state: int, result: Any) -> None:
-        """The goal has ended with a GoalStatus constant and a Result message or None. To be overridden.
+        """The goal has ended with a GoalStatus constant and a Result message or None. To be
+        overridden.
 
         What is handed to this base method decides the state's outcome.
         """

@@ -5,26 +5,35 @@ import smach
 
 
 class UserCallback(object):
-    """Calls ``cb(userdata, *values, *args, **kwargs)`` with userdata narrowed to the callback's own interface.
+    """Calls ``cb(userdata, *values, *args, **kwargs)`` with userdata narrowed to the callback's own
+    interface.
 
-    A callback decorated with ``smach.cb_interface`` brings its keys along; any other gets the keys its state declares
-    for callbacks. Raises ``smach.InvalidStateError`` if ``cb`` cannot be called.
+    A callback decorated with ``smach.cb_interface`` brings its keys along; any other gets the keys
+    its state declares for callbacks.
+
+    :raises InvalidStateError: if ``cb`` cannot be called.
     """
 
-    def __init__(self, what: str, cb: Callable[..., Any], args: Iterable[Any], kwargs: Optional[Dict[str, Any]],
-                 input_keys: Iterable[str], output_keys: Iterable[str]) -> None:
+    def __init__(self, what: str, cb: Callable[..., Any], args: Iterable[Any],
+                 kwargs: Optional[Dict[str, Any]], input_keys: Iterable[str],
+                 output_keys: Iterable[str]) -> None:
         if not callable(cb):
             raise smach.InvalidStateError('%s must be callable, not %r' % (what, cb))
         self._cb = cb
         self._args = tuple(args)
         self._kwargs = dict(kwargs or {})
         decorated = smach.has_smach_interface(cb)
-        self.input_keys = tuple(cb.get_registered_input_keys() if decorated else input_keys)  # type: ignore
-        self.output_keys = tuple(cb.get_registered_output_keys() if decorated else output_keys)  # type: ignore
-        self.outcomes: Tuple[str, ...] = tuple(cb.get_registered_outcomes()) if decorated else ()  # type: ignore
+        self.input_keys = tuple(
+            cb.get_registered_input_keys() if decorated else input_keys)  # type: ignore
+        self.output_keys = tuple(
+            cb.get_registered_output_keys() if decorated else output_keys)  # type: ignore
+        self.outcomes: Tuple[str, ...] = tuple(cb.get_registered_outcomes()) if decorated else (
+        )  # type: ignore
 
     def register_with(self, state: smach.State, decides: bool = False) -> None:
-        """Give ``state`` the keys this callback brings along, and, if it decides the end, its outcomes."""
+        """Give ``state`` the keys this callback brings along, and, if it decides the end, its
+        outcomes.
+        """
         state.register_input_keys(self.input_keys)
         state.register_output_keys(self.output_keys)
         if decides:
@@ -36,7 +45,9 @@ class UserCallback(object):
 
 
 def checked_slots(what: str, slots: Iterable[str], message: Any) -> Tuple[str, ...]:
-    """``slots`` as a tuple; raises ``smach.InvalidStateError`` for one that is no field of ``message``."""
+    """``slots`` as a tuple; raises ``smach.InvalidStateError`` for one that is no field of
+    ``message``.
+    """
     slots = tuple(slots)
     unknown = [slot for slot in slots if slot not in message.__slots__]
     if unknown:

@@ -7,6 +7,7 @@ from types import FrameType
 from typing import Any, Optional
 
 import rospy
+
 import smach
 
 STOP_WITHIN_S = 10.0
@@ -14,7 +15,9 @@ STOP_WITHIN_S = 10.0
 
 
 def _executes_beneath_us(container: Any) -> bool:
-    """Whether this very thread is inside ``container.execute``: waiting for its end here would wait for ever."""
+    """Whether this very thread is inside ``container.execute``: waiting for its end here would wait
+    for ever.
+    """
     frame: Optional[FrameType] = inspect.currentframe()
     while frame is not None:
         if frame.f_code.co_name == 'execute' and frame.f_locals.get('self') is container:
@@ -28,8 +31,10 @@ def _is_running(container: Any) -> bool:
 
 
 def _preempt(container: Any) -> None:
-    # The handler may have interrupted the executing thread while that held the machine's lock: ask from another one.
-    asker = threading.Thread(target=container.request_preempt, name='preempt_at_shutdown', daemon=True)
+    # The handler may have interrupted the executing thread while that held the machine's lock: ask
+    # from another one.
+    asker = threading.Thread(target=container.request_preempt, name='preempt_at_shutdown',
+                             daemon=True)
     asker.start()
     if _executes_beneath_us(container):
         return
@@ -38,14 +43,17 @@ def _preempt(container: Any) -> None:
     while _is_running(container) and time.monotonic() < give_up_at:
         time.sleep(0.02)
     if _is_running(container):
-        smach.logwarn('The machine did not end within %g s of its preempt; shutting down without it' % STOP_WITHIN_S)
+        smach.logwarn(
+            'The machine did not end within %g s of its preempt; shutting down without it' %
+            STOP_WITHIN_S)
 
 
 def set_preempt_handler(sc: Any) -> None:
     """Preempt container ``sc`` when Ctrl-C (SIGINT) or any other shutdown of the node is requested.
 
-    A machine that runs in another thread is given ten seconds to end by itself before the shutdown goes on. Where
-    rospy was told to leave signals alone (``disable_signals=True``), a SIGINT preempts the container and nothing else.
+    A machine that runs in another thread is given ten seconds to end by itself before the shutdown
+    goes on. Where rospy was told to leave signals alone (``disable_signals=True``), a SIGINT
+    preempts the container and nothing else.
     """
     rospy.on_shutdown(lambda: _preempt(sc))
     rospy_has_signals = signal.getsignal(signal.SIGINT) is not signal.default_int_handler

@@ -4,6 +4,7 @@ import time
 from typing import Any, Callable, Optional
 
 import rospy
+
 import smach
 
 SHUTDOWN_CHECK_S = 0.1
@@ -13,7 +14,8 @@ SHUTDOWN_CHECK_S = 0.1
 def shutting_down() -> bool:
     """Whether rospy, or whatever shutdown check SMACH was given, says that machines should stop.
 
-    True as soon as a shutdown of the node was requested: while its hooks run, a goal can still be cancelled.
+    True as soon as a shutdown of the node was requested: while its hooks run, a goal can still be
+    cancelled.
     """
     return rospy.core.is_shutdown_requested() or bool(smach.is_shutdown())
 
@@ -21,7 +23,7 @@ def shutting_down() -> bool:
 def seconds(duration: Any) -> Optional[float]:
     """A ``rospy.Duration``, a number of seconds or None (no limit), in seconds.
 
-    Raises ``smach.InvalidStateError`` for anything else.
+    :raises InvalidStateError: for anything else.
     """
     if duration is None:
         return None
@@ -30,8 +32,9 @@ def seconds(duration: Any) -> Optional[float]:
     try:
         return float(duration)
     except (TypeError, ValueError) as err:
-        raise smach.InvalidStateError('%r is no duration: give a rospy.Duration, a number of seconds or None'
-                                      % (duration,)) from err
+        raise smach.InvalidStateError(
+            '%r is no duration: give a rospy.Duration, a number of seconds or None' %
+            (duration,)) from err
 
 
 def deadline_after(timeout_s: Optional[float]) -> Optional[float]:
@@ -42,7 +45,8 @@ def deadline_after(timeout_s: Optional[float]) -> Optional[float]:
 class Signal(object):
     """Wakes the one thread that executes a state.
 
-    The condition uses a re-entrant lock, so that a signal handler that interrupts the waiting thread may notify too.
+    The condition uses a re-entrant lock, so that a signal handler that interrupts the waiting
+    thread may notify too.
     """
 
     def __init__(self) -> None:
@@ -55,7 +59,9 @@ class Signal(object):
 
     def wait(self, happened: Callable[[], bool], deadline: Optional[float] = None,
              longest_s: Optional[float] = None) -> bool:
-        """Wait for ``happened()``, a monotonic ``deadline``, ``longest_s`` or a shutdown; returns ``happened()``."""
+        """Wait for ``happened()``, a monotonic ``deadline``, ``longest_s`` or a shutdown; returns
+        ``happened()``.
+        """
         limits = [limit for limit in (deadline, deadline_after(longest_s)) if limit is not None]
         with self._condition:
             while not happened():
@@ -67,12 +73,12 @@ class Signal(object):
 
 
 class Aside(threading.Thread):
-    """Runs ``work(stopped)`` at once in a daemon thread, so that the executing thread stays free to hear a preempt.
+    """Runs ``work(stopped)`` at once in a daemon thread, so that the executing thread stays free to
+    hear a preempt.
 
-    It also keeps talk with the master out of the main thread: rospy's own handling of Ctrl-C, which runs there, waits
-    for the lock of an interrupted call for ever. The event
-    ``stopped`` is set by ``stop()``; ``ended`` is true once ``value``
-    or ``error`` is set.
+    It also keeps talk with the master out of the main thread: rospy's own handling of Ctrl-C, which
+    runs there, waits for the lock of an interrupted call for ever. The event ``stopped`` is set by
+    ``stop()``; ``ended`` is true once ``value`` or ``error`` is set.
     """
 
     def __init__(self, name: str, signal: Signal, work: Callable[[threading.Event], Any]) -> None:
