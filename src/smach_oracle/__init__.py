@@ -1,7 +1,7 @@
 """Recovery from failures for SMACH state machines, with a human expert as the last resort.
 
-`OracleContainer` is the ROS-attached one where rospy is installed, else the bare one. It is looked up on first use, so
-that `smach_oracle.analysis` needs neither ROS nor SMACH.
+`OracleContainer` is the ROS-attached one where rospy is installed, else the bare one. It is looked
+up on first use, so that `smach_oracle.analysis` needs neither ROS nor SMACH.
 """
 from typing import Any
 

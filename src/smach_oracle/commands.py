@@ -7,14 +7,16 @@ LACKING = 2  # exit code where a package is missing
 
 
 def run(module: str) -> None:
-    """Run `main` of a module, named relative to smach_oracle; ends the process with the code that it returns.
+    """Run `main` of a module, named relative to smach_oracle.
+
+    The process ends with the code that it returns.
 
     Where a package is missing that the module imports, one line says which, and what installs it.
     """
     try:
         main = import_module('smach_oracle.' + module).main
     except ImportError as err:
-        from smach_oracle.oracle.packages import lacking
+        from smach_oracle.packages import lacking
         told = lacking(err)
         if not told:
             raise

@@ -3,22 +3,33 @@ import re
 import sys
 
 # module: package, where it has another name
-_PACKAGES = {'cv2': 'opencv-python-headless', 'yaml': 'PyYAML', 'ruamel': 'ruamel.yaml', 'backports': 'backports.zstd'}
+_PACKAGES = {
+    'cv2': 'opencv-python-headless', 'yaml': 'PyYAML', 'ruamel': 'ruamel.yaml',
+    'backports': 'backports.zstd'
+}
 _OF_ROS = re.compile(r'(ros(?!bags)|smach|actionlib|genpy|tf2_|message_filters)\w*|\w+_(msgs|srvs)')
 _PYTHON = frozenset(getattr(sys, 'stdlib_module_names', ()))  # known from 3.10 on
 _BUILT = ('smach_oracle.msg', 'smach_oracle.srv')  # of our own, by catkin
 
 
 def lacking(err: ImportError) -> str:
-    """The package that an import failed for, and the command that installs it, in one line; '' where none is missing:
-    where an import fails for another reason, or in this package."""
+    """Return which package an import lacks and how it is installed, in one line.
+
+    It is '' where no package is missing: where an import fails for another reason, or in this
+    package.
+    """
     name = err.name or ''
     package = name.split('.')[0]
     ours = package == 'smach_oracle' and name not in _BUILT
-    if not isinstance(err, ModuleNotFoundError) or not package or ours or package.startswith('_') or package in _PYTHON:
+    if not isinstance(err, ModuleNotFoundError) or not package or ours or package.startswith(
+            '_') or package in _PYTHON:
         return ''
     if _OF_ROS.fullmatch(package):
-        return ('the ROS package {} cannot be imported ({}); build the workspace and source its setup.bash (in a '
-                'checkout: scripts/setup && source scripts/ros_env)'.format(package, err))
-    return ('the Python package {} cannot be imported ({}); install it: {} -m pip install {} (in a checkout: '
-            'scripts/setup)'.format(package, err, sys.executable, _PACKAGES.get(package, package)))
+        return (
+            'the ROS package {} cannot be imported ({}); build the workspace and source its '
+            'setup.bash (in a '
+            'checkout: scripts/setup && source scripts/ros_env)'.format(package, err))
+    return (
+        'the Python package {} cannot be imported ({}); install it: {} -m pip install {} (in a '
+        'checkout: '
+        'scripts/setup)'.format(package, err, sys.executable, _PACKAGES.get(package, package)))

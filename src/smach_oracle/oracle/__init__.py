@@ -1,17 +1,28 @@
-"""The executive. Imports smach and the standard library only; its pure parts do not even import smach.
+"""The executive. It imports smach and the standard library; its pure parts not even smach.
 
-Pure: errors, events, question, naming, failure_rate, history, policy, precondition_spec, config, config_values,
-state_record, packages, paths. `OracleContainer` is imported when it is first asked for, so that the pure parts need no
-smach.
+From the top down, each package above all that follow it: `container`, the public face; `execution`,
+`recovery`, `machine`, `asking`, `records`, `settings`, `decision`. Pure are `decision`, `settings`,
+all of `records` but the rates file, the question of `asking`, and `errors`. `OracleContainer` is
+imported when it is first asked for, so that the pure parts need no smach.
 """
-from typing import Any
+from typing import TYPE_CHECKING
 
-_LAZY = {'OracleContainer': 'container', 'Settings': 'config', 'FailureRate': 'failure_rate',
-         'ExponentialFailureRate': 'failure_rate', 'FailureClass': 'failure_rate'}
-__all__ = sorted(_LAZY)
+if TYPE_CHECKING:
+    from .container import OracleContainer
+    from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
+    from .machine.oracle import oracle_of
+    from .settings.settings import Settings
+
+_LAZY = {
+    'OracleContainer': 'container', 'oracle_of': 'machine.oracle', 'Settings': 'settings.settings',
+    'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
+    'FailureClass': 'decision.failure_rate'
+}
+__all__ = ['ExponentialFailureRate', 'FailureClass', 'FailureRate', 'OracleContainer', 'Settings',
+           'oracle_of']
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _LAZY:
         raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
     from importlib import import_module

@@ -1,90 +1,117 @@
-"""OracleContainer: a StateMachine that recovers from failures, and asks an expert only when it must (paper, IV)."""
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+"""OracleContainer: a StateMachine that recovers from failures (paper, section IV).
+
+It asks an expert only when it must.
+"""
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, cast
 
 import smach
 
-from .config import PreconditionLists, SettingsLike, as_settings
-from .errors import ConfigError
-from .events import EventKind
-from .ledger import Ledger
-from .oracle_state import OracleState
-from .question import Expert, names
-from .rates_file import read_rates, write_rates
-from .reporting import StateRateRow, TransitionRow, ledgers_of
-from .step import before_step, ended, execute_watched
-from .tree import Tree, new_id
-from .userdata import View
+from .asking.question import Expert, names
+from .errors import SettingsError
+from .execution.oracle_state import OracleState
+from .execution.step import Step, before_step
+from .execution.trial import run_container
+from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
+from .execution.wrapping import wrap_machine
+from .machine.nesting import nodes_of
+from .machine.node import Node
+from .machine.oracle import StateRateRow, TransitionRow, oracle_of
+from .machine.tree import Tree, new_id
+from .machine.userdata_view import StateView
+from .records.events import EventKind
+from .records.rates_file import read_rates, write_rates
+from .settings.settings import PreconditionLists, SettingsLike, as_settings
 
 EDGE_TO_ORACLE = 'failure'
 
 
 class _Shown:
-    """An attribute of the container's Face, seen on the container while its object has none of that name itself."""
+    """An attribute of the container's oracle, seen on the container too."""
 
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, machine: Any, owner: Any = None) -> Any:
-        return self if machine is None else getattr(machine._oracle.face, self._name)
+    def __get__(self, machine: object, owner: Optional[type] = None) -> Any:
+        return self if machine is None else getattr(oracle_of(machine), self._name)
 
 
 class OracleContainer(smach.StateMachine):
     """A `smach.StateMachine` with an ORACLE state.
 
-    It is built like any state machine, or made of one with `wrap`. All that it keeps beside the machine is behind one
-    attribute, `_oracle`, so that it meets no name of a subclass.
+    It is built like any state machine, or made of one with `wrap`. All that it keeps beside the
+    machine is behind one attribute, `_oracle`, so that it meets no name of a subclass.
     """
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), *,
-                 settings: SettingsLike = None, preconditions: PreconditionLists = None, name: str = '',
-                 expert: Optional[Expert] = None, recover: bool = True, strict: bool = True) -> None:
-        """`settings`: a Settings or a dictionary of them; `preconditions`: lists by LABEL or PATH/LABEL.
+    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
+                 preconditions: PreconditionLists = None, name: str = '',
+                 expert: Optional[Expert] = None, recover: bool = True,
+                 strict: bool = True) -> None:
+        """Make an empty machine under an oracle.
 
-        Raises ConfigError.
+        `settings`: a Settings or a dictionary of them; `preconditions`: lists by LABEL or
+        PATH/LABEL.
+
+        :raises SettingsError: naming key, value and what is allowed.
         """
         checked = as_settings(settings, preconditions)
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
-        self._oracle = Ledger(self, Tree(recover, expert), checked, name)
+        self._oracle = Node(self, Tree(OracleContainer, recover, expert), checked, name)
         self._oracle.strict = strict
 
     @classmethod
-    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None, settings: SettingsLike = None,
-             nested: Optional[bool] = None, name: str = '', expert: Optional[Expert] = None, strict: bool = True,
+    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
+             settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
+             expert: Optional[Expert] = None, strict: bool = True,
              recover: bool = True) -> 'OracleContainer':
-        """Put `machine` under an oracle and return it: the same object, of a class made of this one and its own.
+        """Put `machine` under an oracle and return it.
 
-        With `nested` (default: the setting of this name) every StateMachine inside it, at any depth, is wrapped too.
-        With `recover=False` it is only observed. Wrapping again gives new settings. Raises ConfigError.
+        It stays the same object; its class is made of this one and its own.
+
+        With `nested` (default: the setting of this name) every StateMachine inside it, at any
+        depth, is wrapped too. With `recover=False` it is only observed. Wrapping again gives new
+        settings.
+
+        :raises SettingsError: naming key, value and what is allowed.
         """
-        from .wrapping import wrap_machine  # it builds on this module
         checked = as_settings(settings, preconditions)
-        wrapped: OracleContainer = wrap_machine(cls, machine, checked, checked.nested if nested is None else nested,
-                                                name, expert, strict, recover)
-        return wrapped
+        tree = Tree(OracleContainer, recover, expert)
+        wrapped = wrap_machine(cls, machine, tree, checked,
+                                                checked.nested if nested is None else nested, name,
+                                                strict)
+        return cast(OracleContainer, wrapped)
 
     @staticmethod
-    def add(label: str, state: smach.State, transitions: Optional[Mapping[str, Optional[str]]] = None,
-            remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str, Any]] = None,
+    def add(label: str, state: smach.State, transitions: Optional[Mapping[str,
+                                                                          Optional[str]]] = None,
+            remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str,
+                                                                                       Any]] = None,
             preconditions: Optional[List[Any]] = None, prior: Optional[float] = None,
             time_limit_s: Optional[float] = None) -> smach.State:
-        """Add a state to the innermost open machine, as `smach.StateMachine.add` does, with settings of its own.
+        """Add a state, with settings of its own, to the innermost open machine.
 
-        Settings of the container for the same state win. Raises ConfigError, and what `StateMachine.add` raises.
+        The rest is as with `smach.StateMachine.add`.
+
+        Settings of the container for the same state win.
+
+        :raises SettingsError: for a setting that is not allowed. What `StateMachine.add` raises
+            beside stays.
         """
         own = {'preconditions': preconditions, 'prior': prior, 'time_limit_s': time_limit_s}
         given = {key: value for key, value in own.items() if value is not None}
         machine = smach.StateMachine._currently_opened_container()
         if given and not isinstance(machine, OracleContainer):
-            raise ConfigError('add', sorted(given), 'these settings in an OracleContainer, not {!r}'.format(machine))
+            raise SettingsError('add', sorted(given),
+                              'these settings in an OracleContainer, not {!r}'.format(machine))
         if given:
             machine._oracle.settings.with_states({label: given})
         more = {} if constants is None else {'constants': constants}
         added: smach.State = smach.StateMachine.add(label, state, transitions, remapping, **more)
         if given:
-            machine._oracle.own_states[label] = given
+            machine._oracle.in_force.given_with_add[label] = given
         return state if added is None else added
 
-    # -- what adapters read; see Face
+    # -- what adapters read; see oracle_of
 
     name = _Shown('name')
     path = _Shown('path')
@@ -97,44 +124,55 @@ class OracleContainer(smach.StateMachine):
     @property
     def expert(self) -> Optional[Expert]:
         """Who is asked, by any container of the tree."""
-        return self._oracle.face.expert
+        return oracle_of(self).expert
 
     @expert.setter
     def expert(self, expert: Optional[Expert]) -> None:
-        self._oracle.face.expert = expert
+        oracle_of(self).expert = expert
 
     def new_trial_id(self) -> str:
-        """Return the id of the trial about to begin; to be overridden where ids come from elsewhere."""
+        """Return the id of the trial about to begin; override it where ids come from elsewhere."""
         return new_id()
 
     def rates(self) -> List[StateRateRow]:
         """Return what was learned of every state, of this container and all below it."""
-        return self._oracle.face.rates()
+        return oracle_of(self).rates()
 
     def transition_counts(self) -> List[TransitionRow]:
         """Return how often each edge was taken, of this container and all below it."""
-        return self._oracle.face.transition_counts()
+        return oracle_of(self).transition_counts()
 
     def save_rates(self, path: str) -> None:
-        """Write the learned rates to a file, atomically. Raises OSError."""
-        write_rates(path, ledgers_of(self))
+        """Write the learned rates to a file, atomically.
+
+        :raises OSError: where it cannot be written; an old file is then untouched.
+        """
+        write_rates(path, nodes_of(self))
 
     def load_rates(self, path: str) -> None:
-        """Take over the learned rates of a file that `save_rates` wrote; a missing or damaged one is warned of."""
-        read_rates(path, ledgers_of(self))
+        """Take over the learned rates of a file that `save_rates` wrote.
+
+        A missing or damaged file is logged and changes nothing.
+        """
+        read_rates(path, nodes_of(self))
 
     # -- structure
 
     def get_children(self) -> Dict[str, smach.State]:
-        """The states by label, ORACLE among them. Raises ConfigError where its name is another's."""
+        """Return the states by label, ORACLE among them.
+
+        :raises SettingsError: where ORACLE's name is another's.
+        """
         self._sync_oracle()
         children: Dict[str, smach.State] = super().get_children()
         return children
 
     def get_internal_edges(self) -> List[Tuple[str, str, Optional[str]]]:
-        """All edges (outcome, from, to): the author's, one from every state to ORACLE, and ORACLE's to all.
+        """Return all edges (outcome, from, to).
 
-        :raises ConfigError: where ORACLE's name is another's.
+        They are the author's, one from every state to ORACLE, and ORACLE's to all.
+
+        :raises SettingsError: where ORACLE's name is another's.
         """
         self._sync_oracle()
         edges = list(super().get_internal_edges())
@@ -144,39 +182,51 @@ class OracleContainer(smach.StateMachine):
         return edges
 
     def check_consistency(self) -> None:
-        """Raise what a StateMachine raises for an inconsistent machine; ORACLE is brought up to date before.
+        """Raise what a StateMachine raises for an inconsistent machine.
 
-        :raises ConfigError: where ORACLE's name is another's.
+        ORACLE is brought up to date before.
+
+        :raises SettingsError: where ORACLE's name is another's.
         """
         self._sync_oracle()
         super().check_consistency()
 
     def _sync_oracle(self) -> None:
-        """Have an ORACLE state that leads to the states and outcomes there are now. Raises ConfigError."""
-        ledger = self._oracle
+        """Have an ORACLE state that leads to the states and outcomes there are now.
+
+        :raises SettingsError: where its name is another's.
+        """
+        node = self._oracle
         states = self._states
-        if not ledger.tree.recover or not states:
+        if not node.tree.recover or not states:
             return
-        label = ledger.settings.oracle_label
+        label = node.settings.oracle_label
         meta = states.get(label)
         outcomes = self.get_registered_outcomes()
         if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
-            raise ConfigError('oracle_label', label, 'a name that is no state or outcome of {}, which has {}'.format(
-                ledger.path, names(set(states).union(outcomes))))
+            raise SettingsError(
+                'oracle_label', label,
+                'a name that is no state or outcome of {}, which has {}'.format(
+                    node.path, names(set(states).union(outcomes))))
         if meta is None:
             meta = OracleState()
             self._remappings[label] = {}
             if hasattr(self, '_constants'):
                 self._constants[label] = {}
-        if set(self._transitions.get(label, ())) != set(states).union(outcomes).difference((label,)):
+        if set(self._transitions.get(label, ())) != set(states).union(outcomes).difference(
+            (label,)):
             self._transitions[label] = meta.lead_to(
-                tuple(ledger.labels()) + tuple(name for name in sorted(outcomes, key=str) if name not in states))
+                tuple(node.labels()) +
+                tuple(name for name in sorted(outcomes, key=str) if name not in states))
         states[label] = meta
 
     def _remove_oracle(self) -> None:
         label = self._oracle.settings.oracle_label
         if isinstance(self._states.get(label), OracleState):
-            tables: List[Any] = [self._states, self._transitions, self._remappings, getattr(self, '_constants', {})]
+            tables: List[Any] = [
+                self._states, self._transitions, self._remappings,
+                getattr(self, '_constants', {})
+            ]
             for table in tables:
                 table.pop(label, None)
 
@@ -185,45 +235,49 @@ class OracleContainer(smach.StateMachine):
     def execute(self, *args: Any, **kwargs: Any) -> Optional[str]:
         """Run the machine; the outermost running one of a tree begins and ends a trial.
 
-        Raises what a StateMachine raises.
+        It raises what a StateMachine raises.
         """
-        from .trial import run_container
         return run_container(self, lambda: super(OracleContainer, self).execute(*args, **kwargs))
 
     def call_start_cbs(self) -> None:
-        """Called when the machine has its initial state: whatever of an execution was remembered is forgotten."""
-        if self._oracle.stepped:
+        """Forget the execution before: the machine has its initial state now."""
+        if self._oracle.engine.stepped:
             self._oracle.begin_execution()
         super().call_start_cbs()
 
     def _update_once(self) -> Optional[str]:
-        """Execute the current state and make the transition; None to go on, else the container's outcome.
+        """Execute the current state and make the transition.
 
-        Every transition takes this way, so it is kept flat: a plain success costs what is on this page.
+        It returns None to go on, else the container's outcome.
+
+        Every transition takes this way, so it is kept flat: a plain success costs what is on this
+        page.
         """
-        ledger = self._oracle
+        node = self._oracle
         lock = self._state_transitioning_lock
         label: Any = self._current_label
-        record = ledger.records.get(label) or ledger.record(label)
-        if self._preempt_requested or ledger.attentive:
-            before_step(self, ledger)
+        record = node.records.by_label.get(label) or node.record(label)
+        engine = node.engine
+        if self._preempt_requested or engine.attentive:
+            before_step(node)
         state: Any = self._current_state
         userdata = self.userdata
         view = record.view
         if (view is None or view.state is not state or view.userdata is not userdata
                 or view.remapping is not self._remappings[label]
-                or view.input_keys is not state._input_keys or view.output_keys is not state._output_keys):
-            view = record.view = View(self, label, state)
+                or view.input_keys is not state._input_keys
+                or view.output_keys is not state._output_keys):
+            view = record.view = StateView(self, label, state)
         record.snapshot = userdata._data.copy()
-        observed = ledger.events.observers
+        observed = node.events.observers
         transitions: Any = self._current_transitions
         error = None
-        if ledger.lock_is_held:
+        if engine.lock_is_held:
             lock.release()
         try:
             try:
-                if observed or record.special or ledger.abandoned:
-                    outcome = execute_watched(self, ledger, record, state)
+                if observed or record.special or node.abandoned:
+                    outcome = Step(node, record).execute(state)
                 else:
                     outcome = state.execute(view.remapper)
             except Exception as err:
@@ -234,12 +288,13 @@ class OracleContainer(smach.StateMachine):
                 edge = record.fast[outcome]
                 target = edge.target
                 plain = transitions[outcome] is target and not self._preempt_requested
-            except (KeyError, TypeError):  # seen for the first time, no plain success, or no outcome at all
+            except (KeyError, TypeError):
+                # seen for the first time, no plain success, or no outcome at all
                 plain = False
             if not plain:
-                return ended(self, ledger, record, outcome, error)
+                return Step(node, record).ended(outcome, error)
             edge.count += 1
-            history = ledger.history
+            history = node.records.history
             history.visits.append(edge.visit)
             if not record.has_preconditions:
                 history.unconditioned = label
@@ -247,35 +302,33 @@ class OracleContainer(smach.StateMachine):
                 history.succeeded_other = history.succeeded
                 history.succeeded = label
             if observed:
-                ledger.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=target)
+                node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=target)
             self._current_label = target
             self._current_state = self._states[target]
             self._current_transitions = self._transitions[target]
             smach.loginfo(edge.message)
-            if self._transition_cbs or ledger.tells_transitions:
+            if self._transition_cbs or engine.tells_transitions:
                 self.call_transition_cbs()
             return None
         finally:
-            if not ledger.lock_is_held:
+            if not engine.lock_is_held:
                 lock.release()
 
     # -- pickling and copying
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        """Classes made by wrapping cannot be found by name: they are made again of the two that they are made of."""
-        from .wrapping import rebuild, two_classes
+        """Make the class again on unpickling: a class made by wrapping cannot be found by name."""
         reduced = super().__reduce_ex__(max(2, protocol))
         classes = two_classes(type(self))
         return reduced if classes is None else (rebuild, classes) + tuple(reduced[2:])
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
-        """A shallow copy gets a ledger of its own; a deep or pickled one brings it."""
+        """A shallow copy gets a node of its own; a deep or pickled one brings it."""
         set_base: Optional[Callable[[Any], None]] = getattr(super(), '__setstate__', None)
         if set_base is not None:
             set_base(state)
         else:
             self.__dict__.update(state)
-        from .wrapping import quicken
         if self._oracle.machine is not self:
             self._oracle = self._oracle.twin_for(self)
-        quicken(self)
+        renew_attributes(self)

@@ -1,18 +1,19 @@
 """Errors of the executive.
 
     OracleError
-    +-- ConfigError (also a ValueError): a setting is wrong; names the key, the value and what is allowed
+    +-- SettingsError (also a ValueError): a setting is wrong
     +-- AnswerError (also a ValueError): an expert's answer does not fit its question
-    |     +-- InterfaceError: the interface that an expert chose cannot be used; says why
+    |     +-- InterfaceError: the interface that an expert chose cannot be used
     +-- TrialError: the executive was used out of order
 """
+import warnings
 
 
 class OracleError(Exception):
     """Root of all errors raised by smach_oracle."""
 
 
-class ConfigError(OracleError, ValueError):
+class SettingsError(OracleError, ValueError):
     """A setting is wrong; the text names the key, the value and what is allowed."""
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
@@ -32,3 +33,12 @@ class InterfaceError(AnswerError):
 
 class TrialError(OracleError):
     """The executive was used out of order."""
+
+
+def __getattr__(name: str) -> type:
+    """Give the class that had another name under its old one, with a warning."""
+    if name != 'ConfigError':
+        raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
+    warnings.warn('smach_oracle.oracle.errors.ConfigError is now called SettingsError',
+                  FutureWarning, stacklevel=2)
+    return SettingsError

@@ -1,29 +1,63 @@
-"""Asking the expert, until there is an answer that fits or the deadline is over (paper, section V)."""
+"""Asking the expert until an answer fits or the deadline is over (paper, section V)."""
 import threading
 import time
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
 import smach
 
-from .errors import AnswerError, InterfaceError
-from .events import EventKind
-from .question import Answer, AnswerKind, Expert, Question, names
-from .question_making import make_question
-from .verdict import Verdict, VerdictKind
+from ..errors import AnswerError
+from ..records.events import EventKind
+from .answer_rules import check_answer, choices_of
+from .question import Answer, AnswerKind, Expert, Question
 
 _WATCH_PERIOD_S = 0.05  # how soon a shutdown is noticed while a question is open
-_OVERTIME_S = 2.0  # how long past the deadline an expert is waited for before its question is taken back
+# how long past the deadline an expert is waited for before its question is taken back
+_OVERTIME_S = 2.0
 _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
 
 
+class Asker(Protocol):
+    """The recovery that asks: what an inquiry needs of it."""
+
+    tried: List[str]  # what was tried already, in words; runs of interfaces are added
+    query_cancelled: threading.Event  # the question is to be taken back
+
+    def stopped(self) -> bool:
+        """Whether a preempt or a shutdown ends the recovery."""
+
+    def make_question(self, deadline_s: float) -> Question:
+        """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
+
+    def say_that_it_waits(self, question: Question) -> None:
+        """Log that the machine waits for an answer."""
+
+    def states_now(self) -> Mapping[str, str]:
+        """Return the states by label, and why each cannot be entered now, '' where it can."""
+
+    def emit(self, kind: EventKind, **fields: Any) -> None:
+        """Tell the observers."""
+
+    def warn(self, text: str) -> None:
+        """Log what the operator should know, and tell the observers."""
+
+
+class Reply(NamedTuple):
+    """How an inquiry ended: with an answer that fits, or without one."""
+
+    answer: Optional[Answer]
+    query_id: str = ''  # of the last question, '' where none was put
+    why_none: str = ''
+
+
 class _StopWatch:
-    """Sets `cancelled` at a shutdown, and when an expert has not come back long after the deadline."""
+    """Sets `cancelled` at a shutdown, and when an expert is long overdue."""
 
     def __init__(self, cancelled: threading.Event, end: Optional[float]) -> None:
         self._cancelled = cancelled
         self._latest = None if end is None else end + _OVERTIME_S
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name='smach_oracle shutdown watch', daemon=True)
+        self._thread = threading.Thread(target=self._watch, name='smach_oracle shutdown watch',
+                                        daemon=True)
 
     def __enter__(self) -> '_StopWatch':
         self._thread.start()
@@ -34,7 +68,8 @@ class _StopWatch:
 
     def _watch(self) -> None:
         while not self._over.wait(_WATCH_PERIOD_S):
-            if smach.is_shutdown() or (self._latest is not None and time.monotonic() > self._latest):
+            late = self._latest is not None and time.monotonic() > self._latest
+            if smach.is_shutdown() or late:
                 self._cancelled.set()
                 return
 
@@ -46,50 +81,36 @@ class _NoAnswer(Exception):
 class Inquiry:
     """All questions about one failure; they share one deadline, in monotonic time."""
 
-    def __init__(self, recovery: Any, expert: Expert) -> None:
-        self._recovery = recovery
-        self._ledger = recovery.ledger
-        self._machine = recovery.machine
+    def __init__(self, asker: Asker, expert: Expert, deadline_s: float) -> None:
+        """`deadline_s`: 0 waits without end."""
+        self._asker = asker
         self._expert = expert
-        deadline_s = self._ledger.settings.deadline_s
         self._end = time.monotonic() + deadline_s if deadline_s else None
-        self._cancelled: threading.Event = recovery.query_cancelled
+        self._cancelled = asker.query_cancelled
         self._unfit = 0
         self._query_id = ''
 
-    def run(self) -> Verdict:
-        """Ask, and ask again while the answer does not fit; fall back at the deadline."""
+    def run(self) -> Reply:
+        """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
             with _StopWatch(self._cancelled, self._end):
-                verdict = self._ask_until_it_fits()
+                return Reply(self._ask_until_it_fits(), self._query_id)
         except _NoAnswer as why:
-            if self._recovery.stopped():
-                return self._taken_back()
-            fallback = self._recovery.fallback_in_words()
-            self._emit(EventKind.QUERY_EXPIRED, text='{}; fallback: {}'.format(why, fallback))
-            return self._recovery.fall_back(str(why))
-        return self._taken_back() if self._recovery.stopped() else verdict
+            return Reply(None, self._query_id, str(why))
 
-    def _ask_until_it_fits(self) -> Verdict:
+    def _ask_until_it_fits(self) -> Answer:
         while True:
-            question = make_question(self._recovery, self._ledger.tree.next_query_id(), self._remaining_s())
+            question = self._asker.make_question(self._remaining_s())
             self._query_id = question.query_id
             self._emit(EventKind.QUERY_OPENED, text=question.reason)
-            self._say_that_it_waits(question)
-            verdict = self._settled(question)
-            if verdict is not None:
-                return verdict._replace(query_id=question.query_id)
+            self._asker.say_that_it_waits(question)
+            answer = self._answer_to(question)
+            if answer is not None:
+                return answer
             self._pause()
 
-    def _say_that_it_waits(self, question: Question) -> None:
-        """In the log: a machine that stands still for minutes looks as if it hung."""
-        fallback = ' '.join(self._ledger.settings.on_no_answer).strip()
-        limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback) if question.deadline_s else 'it waits on'
-        smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
-            self._ledger.path, self._recovery.label, question.query_id, limit))
-
     def _remaining_s(self) -> float:
-        if self._recovery.stopped():
+        if self._asker.stopped():
             raise _NoAnswer('taken back')
         if self._end is None:
             return 0.0
@@ -101,31 +122,30 @@ class Inquiry:
     def _pause(self) -> None:
         """Give a front end that answers nonsense at full speed less and less to do."""
         self._unfit += 1
-        pause_s = 0.0 if self._unfit == 1 else min(_MAX_PAUSE_S, 0.05 * 2.0 ** min(self._unfit, 10))
+        pause_s = 0.0
+        if self._unfit > 1:
+            pause_s = min(_MAX_PAUSE_S, 0.05 * 2.0**min(self._unfit, 10))
         self._cancelled.wait(pause_s if self._end is None else min(pause_s, self._remaining_s()))
 
-    def _settled(self, question: Question) -> Optional[Verdict]:
-        """Return the verdict of one question, None where its answer did not fit."""
+    def _answer_to(self, question: Question) -> Optional[Answer]:
+        """Return the answer to one question, None where it did not fit."""
         try:
-            answer = self._guarded(lambda: self._expert.ask(question, self._cancelled, self._progress))
+            answer = self._guarded(
+                lambda: self._expert.ask(question, self._cancelled, self._progress))
             if answer is None:
                 raise _NoAnswer('no answer by the deadline')
             self._check(answer, question)
-            self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(), target=_named(answer),
-                       by=answer.by, text=answer.why)
+            self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(),
+                       target=answer.named(), by=answer.by, text=answer.why)
             if answer.kind is AnswerKind.INTERFACE:
                 return self._try_interface(answer, question)
-            return self._obey(answer)
+            return answer
         except AnswerError as err:
-            self._ledger.warn('an answer does not fit: {}'.format(err), self._recovery.label)
+            self._asker.warn('an answer does not fit: {}'.format(err))
             return None
 
-    def _try_interface(self, answer: Answer, question: Question) -> Optional[Verdict]:
-        try:
-            return self._run_interface(answer, question)
-        except InterfaceError as err:
-            self._ledger.warn('interface {}: {}'.format(answer.interface, err), self._recovery.label)
-            return None
+    def _check(self, answer: Answer, question: Question) -> None:
+        check_answer(answer, choices_of(question)._replace(states=self._asker.states_now()))
 
     def _guarded(self, call: Callable[[], Optional[Answer]]) -> Optional[Answer]:
         """Call the expert's port; what it raises beside AnswerError is its fault and no answer."""
@@ -134,95 +154,43 @@ class Inquiry:
         except AnswerError:
             raise
         except Exception as err:
-            self._ledger.warn('the expert\'s port failed: {!r}'.format(err), self._recovery.label)
+            self._asker.warn('the expert\'s port failed: {!r}'.format(err))
             raise _NoAnswer('the expert\'s port failed') from err
 
-    def _run_interface(self, answer: Answer, question: Question) -> Optional[Verdict]:
+    def _try_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
+        try:
+            return self._run_interface(answer, question)
+        except AnswerError as err:
+            self._asker.tried.append('interface {}: {}'.format(answer.interface, err))
+            self._asker.warn('interface {}: {}'.format(answer.interface, err))
+            return None
+
+    def _run_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         offer = next(offer for offer in question.interfaces if offer.name == answer.interface)
         self._emit(EventKind.INTERFACE_START, target=offer.name, by=answer.by)
-        done: Optional[Answer] = None
+        outcome = ''
         try:
-            done = self._guarded(lambda: self._expert.run_interface(offer, question, self._cancelled, self._progress))
-        except InterfaceError as err:
-            self._recovery.tried.append('interface {}: {}'.format(offer.name, err))
-            raise
+            done = self._guarded(lambda: self._expert.run_interface(
+                offer, question, self._cancelled, self._progress))
+            if done is not None:
+                self._check_done(done, question)
+                outcome = done.outcome
         finally:
-            self._emit(EventKind.INTERFACE_END, target=offer.name, by=answer.by,
-                       outcome=done.outcome if done is not None else '')
-        if done is None:
-            self._recovery.tried.append('interface {}: failed'.format(offer.name))
-            return None
-        self._check(done, question)
+            self._emit(EventKind.INTERFACE_END, target=offer.name, by=answer.by, outcome=outcome)
+        self._asker.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
+        if done is None or done.by:
+            return done
+        return done._replace(by=answer.by)
+
+    def _check_done(self, done: Answer, question: Question) -> None:
         if done.kind is not AnswerKind.SUPERSEDE:
-            raise AnswerError('interface {} gave {}, allowed: SUPERSEDE'.format(offer.name, done.kind.name))
-        self._recovery.tried.append('interface {}: {}'.format(offer.name, done.outcome))
-        return self._obey(done if done.by else done._replace(by=answer.by))
-
-    def _obey(self, answer: Answer) -> Verdict:
-        self._write(answer)
-        if answer.kind is AnswerKind.GOTO:
-            return self._recovery.jump(answer.state, answer.by, answer.why)
-        if answer.kind is AnswerKind.SUPERSEDE:
-            return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by, text=answer.why)
-        verdict: Verdict = self._recovery.give_up(answer.why, answer.outcome, answer.by)
-        return verdict
-
-    def _write(self, answer: Answer) -> None:
-        remapping = self._machine._remappings.get(self._recovery.label) or {}
-        for key, value in (answer.outputs or {}).items():
-            self._recovery.watch.gate[remapping.get(key, key)] = value
-
-    def _check(self, answer: Answer, question: Question) -> None:
-        problem = _CHECKS[answer.kind](self._recovery, answer, question)
-        if problem:
-            raise AnswerError('{} {!r}: {}'.format(answer.kind.name, _named(answer), problem))
-        unknown = sorted(set(answer.outputs or {}) - set(question.output_keys))
-        if unknown:
-            raise AnswerError('outputs {}: the output keys are {}'.format(names(unknown), names(question.output_keys)))
+            raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
+        self._check(done, question)
 
     def _progress(self, what: str, by: str, text: str) -> None:
         kinds = {'claimed': EventKind.QUERY_CLAIMED, 'released': EventKind.QUERY_RELEASED}
         if what in kinds:  # an interface's start and end are told by the oracle itself
             self._emit(kinds[what], by=by, text=text)
 
-    def _taken_back(self) -> Verdict:
-        if self._query_id:
-            self._emit(EventKind.QUERY_CANCELLED, text='preempted' if self._recovery.cancelled.is_set() else 'shutdown')
-        verdict: Verdict = self._recovery.preempted()
-        return verdict
-
     def _emit(self, kind: EventKind, **fields: Any) -> None:
-        self._ledger.emit(kind, state=self._recovery.label, query_id=self._query_id, **fields)
-
-
-def _check_goto(recovery: Any, answer: Answer, question: Question) -> str:
-    problem: str = recovery.why_not_enter(answer.state)
-    return problem
-
-
-def _check_supersede(recovery: Any, answer: Answer, question: Question) -> str:
-    allowed = [choice.outcome for choice in question.supersede_outcomes]
-    return '' if answer.outcome in allowed else 'the outcomes that lead somewhere are ' + names(allowed)
-
-
-def _check_give_up(recovery: Any, answer: Answer, question: Question) -> str:
-    if not answer.outcome or answer.outcome in question.give_up_outcomes:
-        return ''
-    return 'the outcomes of the container are ' + names(question.give_up_outcomes)
-
-
-def _check_interface(recovery: Any, answer: Answer, question: Question) -> str:
-    offered = [offer.name for offer in question.interfaces]
-    return '' if answer.interface in offered else 'the interfaces on offer are ' + names(offered)
-
-
-_CHECKS: Dict[AnswerKind, Callable[[Any, Answer, Question], str]] = {
-    AnswerKind.GOTO: _check_goto,
-    AnswerKind.SUPERSEDE: _check_supersede,
-    AnswerKind.GIVE_UP: _check_give_up,
-    AnswerKind.INTERFACE: _check_interface,
-}
-
-
-def _named(answer: Answer) -> str:
-    return {AnswerKind.GOTO: answer.state, AnswerKind.INTERFACE: answer.interface}.get(answer.kind, answer.outcome)
+        self._asker.emit(kind, query_id=self._query_id, **fields)

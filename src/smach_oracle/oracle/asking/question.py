@@ -3,7 +3,9 @@ import threading
 from enum import IntEnum
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
 
-from .events import FailureKind
+from ..records.events import FailureKind
+from ..records.visits import Visit
+from ..settings.interfaces import InterfaceOffer
 
 
 class AnswerKind(IntEnum):
@@ -13,23 +15,6 @@ class AnswerKind(IntEnum):
     SUPERSEDE = 2
     GIVE_UP = 3
     INTERFACE = 4
-
-
-class VisitResult(IntEnum):
-    """How a visit counts; the numbers are those of VisitedState.msg."""
-
-    SUCCESS = 1
-    FAILURE = 2
-    SUPERSEDED = 3
-    PREEMPTED = 4
-
-
-class Visit(NamedTuple):
-    """One visit of a state that has ended."""
-
-    state: str
-    outcome: str  # '' where it raised or ran over its time limit
-    result: VisitResult
 
 
 class StateChoice(NamedTuple):
@@ -51,43 +36,24 @@ class OutcomeChoice(NamedTuple):
     target: str
 
 
-class Standing(NamedTuple):
+class PreconditionStatus(NamedTuple):
     """How a precondition stands."""
 
     holds: Optional[bool]  # None: it cannot be told
     text: str  # why, for people
 
 
-class Look:
-    """Tells how the preconditions of a question's choices stand now; the oracle implements it."""
+class PreconditionProbe:
+    """Finds out how the preconditions of a question's choices stand; the oracle implements it."""
 
     names: Tuple[Tuple[str, str], ...] = ()  # state and precondition of each
 
-    def look(self, number: int) -> Standing:
-        """How the one of that number stands. It may call a user's function, and so take for ever."""
+    def status(self, number: int) -> PreconditionStatus:
+        """Return how the precondition of that number stands.
+
+        It may call a user's function, and so take for ever.
+        """
         raise NotImplementedError
-
-
-START_LIMIT_S = 60.0
-
-
-class InterfaceStart(NamedTuple):
-    """How an interface that is not there is started; who can do that is not this room's business."""
-
-    kind: str  # 'launch' or 'node'
-    package: str
-    target: str  # file name or node type
-    args: Tuple[str, ...] = ()
-    limit_s: float = START_LIMIT_S  # how long its action server may take to come
-
-
-class InterfaceOffer(NamedTuple):
-    """A shared-autonomy interface on offer for the failed state (paper, section V-A)."""
-
-    name: str
-    action: str
-    description: str = ''
-    start: Optional[InterfaceStart] = None  # None: somebody else starts it
 
 
 class Question(NamedTuple):
@@ -113,10 +79,12 @@ class Question(NamedTuple):
     give_up_outcomes: Tuple[str, ...]
     interfaces: Tuple[InterfaceOffer, ...]
     userdata: Mapping[str, Any]  # the container's, values as they are
-    input_userdata: Mapping[str, Any]  # the failed state's inputs, by its own key names, where present
+    # the failed state's inputs, by its own key names, where present
+    input_userdata: Mapping[str, Any]
     deadline_s: float  # 0: waits without end
     fallback: str  # what happens at the deadline, in words
-    preconditions: Optional[Look] = None  # how those of the choices stand, as long as it is open; None: nobody can tell
+    # how those of the choices stand, as long as it is open; None: nobody can tell
+    preconditions: Optional[PreconditionProbe] = None
 
 
 class Answer(NamedTuple):
@@ -124,33 +92,45 @@ class Answer(NamedTuple):
 
     kind: AnswerKind
     state: str = ''  # GOTO
-    outcome: str = ''  # SUPERSEDE, GIVE_UP ('' there: as the failure would have ended the container)
+    # SUPERSEDE, GIVE_UP ('' there: as the failure would have ended the container)
+    outcome: str = ''
     interface: str = ''  # INTERFACE
     outputs: Optional[Mapping[str, Any]] = None  # by the failed state's own key names
     by: str = ''
     why: str = ''
 
+    def named(self) -> str:
+        """Return what it names: a state, an interface or an outcome."""
+        return {AnswerKind.GOTO: self.state,
+                AnswerKind.INTERFACE: self.interface}.get(self.kind, self.outcome)
 
-# Told while a question is open: ('claimed', by, text), ('released', by, text), ('interface_start', interface, text),
-# ('interface_end', interface, outcome).
+
+# Told while a question is open: ('claimed', by, text), ('released', by, text), ('interface_start',
+# interface, text), ('interface_end', interface, outcome).
 Progress = Callable[[str, str, str], None]
 
 
 class Expert:
-    """Where questions go. ros/ implements it with the ExpertQuery action; tests implement it in a few lines."""
+    """Where questions go.
 
-    def ask(self, question: Question, cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
+    ros/ implements it with the ExpertQuery action; tests implement it in a few lines.
+    """
+
+    def ask(self, question: Question, cancelled: threading.Event,
+            progress: Progress) -> Optional[Answer]:
         """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
 
-        Must return soon (tens of milliseconds) after `cancelled` is set. An INTERFACE answer is handed back as it is;
-        `run_interface` is then called. Deadlines are monotonic wall time. May raise AnswerError for an answer that
-        cannot be used; the question is then put again.
+        Must return soon (tens of milliseconds) after `cancelled` is set. An INTERFACE answer is
+        handed back as it is; `run_interface` is then called. Deadlines are monotonic wall time. May
+        raise AnswerError for an answer that cannot be used; the question is then put again.
         """
         raise NotImplementedError
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Run a shared-autonomy interface; return a SUPERSEDE answer, or None where it failed or was cancelled.
+        """Run a shared-autonomy interface.
+
+        It returns a SUPERSEDE answer, or None where the interface failed or was cancelled.
 
         May raise InterfaceError, which says to the expert why the interface cannot be used.
         """

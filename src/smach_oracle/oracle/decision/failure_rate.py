@@ -1,13 +1,14 @@
-"""How often a state fails, learned with a limited memory (paper, section IV-A and IV-C). Pure; no smach.
+"""How often a state fails, learned with a limited memory (paper, IV-A, IV-C). Pure.
 
-The estimate starts as the designer's prior; every result pushes one share of the prior out, and once the memory is full
-only the latest results count. Two estimators share one face: a window and an exponentially weighted mean.
+The estimate starts as the designer's prior; every result pushes one share of the prior out, and
+once the memory is full only the latest results count. Two estimators share one face: a window and
+an exponentially weighted mean.
 """
 from collections import deque
 from enum import IntEnum
 from typing import Any, Callable, Deque, Dict, Mapping, Tuple, Union
 
-from .errors import ConfigError
+from ..errors import SettingsError
 
 _ROUNDING = 1e-9  # a rate that equals a threshold but for binary rounding has reached it
 
@@ -22,7 +23,10 @@ class FailureClass(IntEnum):
 
 
 def classify(rate: float, moderate_from: float, high_from: float) -> FailureClass:
-    """Return the class of a failure rate (0 to 1): LOW below `moderate_from`, HIGH from `high_from` on."""
+    """Return the class of a failure rate, 0 to 1.
+
+    LOW below `moderate_from`, HIGH from `high_from` on, MODERATE between.
+    """
     if rate + _ROUNDING >= high_from:
         return FailureClass.HIGH
     if rate + _ROUNDING >= moderate_from:
@@ -32,22 +36,25 @@ def classify(rate: float, moderate_from: float, high_from: float) -> FailureClas
 
 def _checked(memory: int, prior: float) -> None:
     if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
-        raise ConfigError('memory', memory, 'a whole number of results from 1')
+        raise SettingsError('memory', memory, 'a whole number of results from 1')
     if isinstance(prior, bool) or not isinstance(prior, (int, float)) or not 0 <= prior <= 1:
-        raise ConfigError('prior', prior, 'a failure rate from 0 to 1')
+        raise SettingsError('prior', prior, 'a failure rate from 0 to 1')
 
 
 class FailureRate:
     """Window of the last `memory` results, filled with `prior` to start with.
 
-    rate = (failures in the window + prior * (memory - n)) / memory, with n results seen and n < memory.
-    `successes` and `failures` count all results ever added.
+    rate = (failures in the window + prior * (memory - n)) / memory, with n results seen and n <
+    memory. `successes` and `failures` count all results ever added.
     """
 
     kind = 'window'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results; `prior`: failure rate, 0 to 1. Raises ConfigError."""
+        """`memory`: results; `prior`: failure rate, 0 to 1.
+
+        :raises SettingsError: for a memory or prior that is not allowed.
+        """
         _checked(memory, prior)
         self.memory = memory
         self.prior = float(prior)
@@ -79,7 +86,10 @@ class FailureRate:
         self.failures -= 1
 
     def _forget(self, before: int) -> None:
-        """Drop what is too old to count, but for one more result than `memory`, so that one can be taken back."""
+        """Drop what is too old to count.
+
+        One result more than `memory` stays, so that one can be taken back.
+        """
         while self._failed and self._failed[0] < before:
             self._failed.popleft()
 
@@ -93,18 +103,26 @@ class FailureRate:
         return (failures + self.prior * missing) / self.memory
 
     def snapshot(self) -> Dict[str, Any]:
-        """Return what was learned as plain data, for `restore` and the rates file; newest result last."""
+        """Return what was learned as plain data, for `restore` and the rates file.
+
+        The newest result is the last one.
+        """
         oldest = max(0, self._results - self.memory)
         window = [0] * (self._results - oldest)
         for position in self._failed:
             if position >= oldest:
                 window[position - oldest] = 1
-        return {'estimator': self.kind, 'successes': self.successes, 'failures': self.failures, 'window': window}
+        return {
+            'estimator': self.kind, 'successes': self.successes, 'failures': self.failures,
+            'window': window
+        }
 
     def restore(self, learned: Mapping[str, Any]) -> None:
         """Take over a `snapshot`, also one made with another memory: its newest results count.
 
-        Raises ValueError where it is no snapshot. One of the other estimator gives the totals alone.
+        A snapshot of the other estimator gives the totals alone.
+
+        :raises ValueError: where it is no snapshot.
         """
         successes, failures = _totals(learned)
         window = learned.get('window', []) if learned.get('estimator') == self.kind else []
@@ -117,7 +135,9 @@ class FailureRate:
 
 
 class ExponentialFailureRate:
-    """Exponentially weighted mean: each result replaces a share 1/memory of what was believed, first of the prior.
+    """Exponentially weighted mean of the results, beginning with the prior.
+
+    Each result replaces a share 1/memory of what was believed.
 
     It agrees with `FailureRate` on the first result and forgets gradually instead of all at once.
     """
@@ -125,7 +145,10 @@ class ExponentialFailureRate:
     kind = 'exponential'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results; `prior`: failure rate, 0 to 1. Raises ConfigError."""
+        """`memory`: results; `prior`: failure rate, 0 to 1.
+
+        :raises SettingsError: for a memory or prior that is not allowed.
+        """
         _checked(memory, prior)
         self.memory = memory
         self.prior = float(prior)
@@ -159,12 +182,19 @@ class ExponentialFailureRate:
 
     def snapshot(self) -> Dict[str, Any]:
         """Return what was learned as plain data, for `restore` and the rates file."""
-        return {'estimator': self.kind, 'successes': self.successes, 'failures': self.failures, 'rate': self._rate}
+        return {
+            'estimator': self.kind, 'successes': self.successes, 'failures': self.failures,
+            'rate': self._rate
+        }
 
     def restore(self, learned: Mapping[str, Any]) -> None:
-        """Take over a `snapshot`. Raises ValueError where it is none; the other estimator's gives the totals alone."""
+        """Take over a `snapshot`; one of the other estimator gives the totals alone.
+
+        :raises ValueError: where it is no snapshot.
+        """
         successes, failures = _totals(learned)
-        rate = learned.get('rate', self.prior) if learned.get('estimator') == self.kind else self.prior
+        rate = learned.get('rate',
+                           self.prior) if learned.get('estimator') == self.kind else self.prior
         if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not 0 <= rate <= 1:
             raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
         self.successes, self.failures, self._rate = successes, failures, float(rate)
@@ -183,7 +213,10 @@ ESTIMATORS: Dict[str, Callable[[int, float], Estimator]] = {
 
 
 def make_estimator(kind: str, memory: int, prior: float) -> Estimator:
-    """Return a new estimator named 'window' or 'exponential'. Raises ConfigError."""
+    """Return a new estimator named 'window' or 'exponential'.
+
+    :raises SettingsError: for a memory or prior that is not allowed.
+    """
     if kind not in ESTIMATORS:
-        raise ConfigError('estimator', kind, ', '.join(sorted(ESTIMATORS)))
+        raise SettingsError('estimator', kind, ', '.join(sorted(ESTIMATORS)))
     return ESTIMATORS[kind](memory, prior)

@@ -1,14 +1,14 @@
-"""From a situation to a decision: Algorithm 1 and its alternatives (paper, section IV-C). Pure; no smach.
+"""From a situation to a decision: Algorithm 1 and its alternatives (paper, IV-C). Pure.
 
 doc/policies.md holds each policy as a table, cell by cell; the tests read those tables.
 
-A policy is asked three things, in this order: is this a continuous failure; shall the preconditions be run; and, once
-they have run, what now. Where a step back leads is the policy's business too.
+A policy is asked three things, in this order: is this a continuous failure; shall the preconditions
+be run; and, once they have run, what now. Where a step back leads is the policy's business too.
 """
 from enum import Enum
 from typing import Dict, NamedTuple, Optional
 
-from .errors import ConfigError
+from ..errors import SettingsError
 from .failure_rate import FailureClass
 
 
@@ -28,8 +28,8 @@ class Preconditions(str, Enum):
     NOT_MET = 'not met'
 
 
-class Chain(NamedTuple):
-    """What the chain of visits says about a failure of `state`, the present visit not among the visits."""
+class FailureContext(NamedTuple):
+    """What the visits before say about a failure of `state`."""
 
     state: str
     initial: str  # the container's initial state
@@ -52,7 +52,7 @@ class Policy:
 
     name = ''
 
-    def is_continuous(self, chain: Chain) -> bool:
+    def is_continuous(self, context: FailureContext) -> bool:
         """Whether this is a continuous failure in the policy's sense."""
         raise NotImplementedError
 
@@ -64,7 +64,7 @@ class Policy:
         """Return what to do."""
         raise NotImplementedError
 
-    def step_back_target(self, chain: Chain) -> str:
+    def step_back_target(self, context: FailureContext) -> str:
         """Return the state that a step back leads to."""
         raise NotImplementedError
 
@@ -74,9 +74,9 @@ class Algorithm1(Policy):
 
     name = 'algorithm1'
 
-    def is_continuous(self, chain: Chain) -> bool:
+    def is_continuous(self, context: FailureContext) -> bool:
         """The listing's Attempt: the failure before this one was of the same state."""
-        return chain.failed_last
+        return context.failed_last
 
     def decide(self, situation: Situation) -> Action:
         """Look the cell up."""
@@ -87,19 +87,25 @@ class Algorithm1(Policy):
             return Action.REVISIT if preconditions is Preconditions.MET else Action.STEP_BACK
         return Action.ASK
 
-    def step_back_target(self, chain: Chain) -> str:
-        """The listing's Rs: the state of the latest earlier visit, of whichever state, without preconditions."""
-        return chain.initial if chain.unconditioned is None else chain.unconditioned
+    def step_back_target(self, context: FailureContext) -> str:
+        """Return the listing's Rs.
+
+        It is the state of the latest earlier visit, of whichever state, without preconditions.
+        """
+        return context.initial if context.unconditioned is None else context.unconditioned
 
 
 class Prose(Policy):
-    """Section IV-C. Preconditions that cannot be met count as continuous: our reading, the prose is silent."""
+    """Section IV-C of the paper.
+
+    Preconditions that cannot be met count as continuous: our reading, the prose is silent.
+    """
 
     name = 'prose'
 
-    def is_continuous(self, chain: Chain) -> bool:
+    def is_continuous(self, context: FailureContext) -> bool:
         """The failure before this one was of the same state, which has not succeeded since."""
-        return chain.failing_since
+        return context.failing_since
 
     def decide(self, situation: Situation) -> Action:
         """Look the cell up."""
@@ -110,16 +116,19 @@ class Prose(Policy):
             return Action.REVISIT
         return Action.STEP_BACK if failure_class is FailureClass.LOW else Action.ASK
 
-    def step_back_target(self, chain: Chain) -> str:
+    def step_back_target(self, context: FailureContext) -> str:
         """The last successful state before the failed one."""
-        return chain.initial if chain.succeeded_before is None else chain.succeeded_before
+        return context.initial if context.succeeded_before is None else context.succeeded_before
 
 
 POLICIES: Dict[str, Policy] = {policy.name: policy for policy in (Algorithm1(), Prose())}
 
 
 def policy_named(name: str) -> Policy:
-    """Return the policy of this name. Raises ConfigError."""
+    """Return the policy of this name.
+
+    :raises SettingsError: where there is none of this name.
+    """
     if name not in POLICIES:
-        raise ConfigError('policy', name, ', '.join(sorted(POLICIES)))
+        raise SettingsError('policy', name, ', '.join(sorted(POLICIES)))
     return POLICIES[name]

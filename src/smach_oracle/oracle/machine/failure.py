@@ -1,15 +1,18 @@
-"""What the end of a state means: where it leads, whether it is a failure, and how it would have ended the container.
+"""The end of a state: where it leads, whether it is a failure, how the container would end.
 
-Without an oracle an unsuccessful outcome leads to a state of the author's or ends the machine (paper, section VI-A).
+Without an oracle an unsuccessful outcome leads to a state of the author's or ends the machine
+(paper, section VI-A).
 """
 import traceback
 from typing import Any, Callable, NamedTuple, Optional, Tuple
 
 import smach
 
-from .events import FailureKind
-from .naming import FailingNames, is_preempted
-from .question import VisitResult, names
+from ..asking.question import names
+from ..records.events import FailureKind
+from ..records.visits import VisitResult
+from ..settings.failing_outcomes import FailingNames, is_preempted
+from .protocols import Machine
 
 
 class Route(NamedTuple):
@@ -27,11 +30,12 @@ class Failure(NamedTuple):
     outcome: str  # '' where there is none
     text: str  # exception text, reasons
     route: Optional[Route]  # where the outcome would have led; None where it raises
-    error: Optional[Callable[[], Exception]] = None  # makes what the machine raises if the oracle gives up
+    # makes what the machine raises if the oracle gives up
+    error: Optional[Callable[[], Exception]] = None
     details: str = ''  # the traceback
 
 
-class Ending(NamedTuple):
+class ContainerEnding(NamedTuple):
     """How a container would end, or go on, without an oracle: exactly one is set."""
 
     state: Optional[str] = None
@@ -39,8 +43,11 @@ class Ending(NamedTuple):
     error: Optional[Exception] = None
 
 
-def route_of(machine: Any, label: str, outcome: str) -> Route:
-    """Follow an outcome of a state: to a state, to a container outcome by its target's or its own name, or nowhere."""
+def route_of(machine: Machine, label: str, outcome: str) -> Route:
+    """Follow an outcome of a state.
+
+    It leads to a state, to a container outcome by its target's or its own name, or nowhere.
+    """
     transitions = machine._transitions.get(label) or {}
     if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
         return Route('', False)
@@ -54,7 +61,8 @@ def route_of(machine: Any, label: str, outcome: str) -> Route:
     return Route('', False)
 
 
-def failure_kind(outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames) -> FailureKind:
+def failure_kind(outcome: str, route: Route, listed: Tuple[str, ...],
+                 failing: FailingNames) -> FailureKind:
     """Classify a registered outcome, without regard to who recovers from it."""
     if outcome in listed:
         return FailureKind.FAILING_OUTCOME
@@ -71,8 +79,8 @@ def author_recovers(outcome: str, route: Route, kind: FailureKind, listed: Tuple
                     author_recoveries: str) -> bool:
     """Whether the author's own transition from this failing outcome stays.
 
-    It does where it leads to another state, or, for an outcome that only sounds like a failure, to a container outcome
-    that does not.
+    It does where it leads to another state, or, for an outcome that only sounds like a failure, to
+    a container outcome that does not.
     """
     if author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
         return False
@@ -80,37 +88,47 @@ def author_recovers(outcome: str, route: Route, kind: FailureKind, listed: Tuple
 
 
 def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult:
-    """How a visit counts that ended with `outcome`; `stopping`: a preempt or a shutdown is under way."""
+    """Return how a visit counts that ended with `outcome`.
+
+    `stopping`: a preempt or a shutdown is under way.
+    """
     if stopping or (is_preempted(outcome) and kind is FailureKind.NOT_A_FAILURE):
         return VisitResult.PREEMPTED
     return VisitResult.SUCCESS if kind is FailureKind.NOT_A_FAILURE else VisitResult.FAILURE
 
 
-def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...], failing: FailingNames) -> Ending:
+def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
+                   failing: FailingNames) -> ContainerEnding:
     """Return how the failure would have ended the container without an oracle.
 
-    An overrun has no such ending, since the state would still run: the container's own failing outcome, else an error.
+    An overrun has no such ending, since the state would still run: the container's own failing
+    outcome, else an error.
     """
     if failure.route is not None and failure.route.target:
         route = failure.route
-        return Ending(state=route.target) if route.is_state else Ending(outcome=route.target)
+        return ContainerEnding(state=route.target) if route.is_state else ContainerEnding(
+            outcome=route.target)
     if failure.error is not None:
-        return Ending(error=failure.error())
+        return ContainerEnding(error=failure.error())
     for word in failing.words:
         if word in container_outcomes:
-            return Ending(outcome=word)
+            return ContainerEnding(outcome=word)
     for outcome in sorted(container_outcomes, key=str):
         if outcome in failing:
-            return Ending(outcome=outcome)
-    return Ending(error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
+            return ContainerEnding(outcome=outcome)
+    return ContainerEnding(
+        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
 
 
-def raised_error(label: str, state: Any, err: Exception) -> Exception:
-    """Return the error with which a machine passes on what a state raised, its traceback in the text."""
+def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
+    """Return the error with which a machine passes on what a state raised.
+
+    Its text holds the traceback.
+    """
     if isinstance(err, smach.InvalidUserCodeError):
         return err
-    wrapped: Exception = smach.InvalidUserCodeError('Could not execute state {!r} of type {!r}: {}'.format(
-        label, state, traceback_of(err)))
+    wrapped: Exception = smach.InvalidUserCodeError(
+        'Could not execute state {!r} of type {!r}: {}'.format(label, state, traceback_of(err)))
     wrapped.__cause__ = err
     return wrapped
 
@@ -120,7 +138,7 @@ def traceback_of(err: Exception) -> str:
     return ''.join(traceback.format_exception(type(err), err, err.__traceback__))
 
 
-def unregistered_text(label: str, state: Any, outcome: Any) -> str:
+def unregistered_text(label: str, state: smach.State, outcome: Any) -> str:
     """Say that the state has not registered the outcome."""
     return 'State {!r} of type {!r} returned {!r}; its registered outcomes are {}'.format(
         label, state, outcome, names(state.get_registered_outcomes()))

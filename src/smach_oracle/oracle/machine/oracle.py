@@ -1,9 +1,14 @@
-"""What a container says of itself to whoever publishes, records or prints it."""
-from typing import Any, Iterator, List, NamedTuple, Optional
+"""The oracle of one container as adapters see it: who publishes, records or prints what it does."""
+from typing import Callable, List, NamedTuple, Optional
 
-from .config import Settings
-from .events import EventSource
-from .question import Expert
+import smach
+
+from ..asking.question import Expert
+from ..errors import TrialError
+from ..records.events import EventSource
+from ..settings.settings import Settings
+from .nesting import nodes_of
+from .node import Node, WrappedMachine
 
 
 class StateRateRow(NamedTuple):
@@ -29,102 +34,112 @@ class TransitionRow(NamedTuple):
     count: int  # type: ignore[assignment]  # as the message says, not what a tuple does
 
 
-def ledgers_of(machine: Any) -> Iterator[Any]:
-    """Yield the ledger of a container and those of all wrapped containers below it, each once."""
-    from .wrapping import containers_in
-    for container in containers_in(machine):
-        yield container._oracle
-
-
-def rate_rows(machine: Any) -> List[StateRateRow]:
+def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:
     """Return one row for each state."""
     rows = []
-    for ledger in ledgers_of(machine):
-        path = ledger.path
-        for label in ledger.labels():
-            record = ledger.record(label)
+    for node in nodes_of(machine):
+        path = node.path
+        for label in node.labels():
+            record = node.record(label)
             successes, failures = record.totals
-            rows.append(StateRateRow(path, label, record.rate, int(record.failure_class), successes, failures,
-                                     record.recoveries, record.has_preconditions))
+            rows.append(
+                StateRateRow(path, label, record.rate, int(record.failure_class), successes,
+                             failures, record.recoveries, record.has_preconditions))
     return rows
 
 
-def transition_rows(machine: Any) -> List[TransitionRow]:
+def transition_rows(machine: WrappedMachine) -> List[TransitionRow]:
     """Return one row for each edge that was taken, ORACLE's among them."""
     rows = []
-    for ledger in ledgers_of(machine):
-        path = ledger.path
-        for label, record in list(ledger.records.items()):
+    for node in nodes_of(machine):
+        path = node.path
+        for label, record in list(node.records.by_label.items()):
             rows += [TransitionRow(path, label, outcome, target, count)
                      for (outcome, target), count in record.transitions().items()]
-        rows += [TransitionRow(path, ledger.settings.oracle_label, target, target, count)
-                 for target, count in list(ledger.oracle_edges.items())]
+        rows += [TransitionRow(path, node.settings.oracle_label, target, target, count)
+                 for target, count in list(node.records.oracle_edges.items())]
     return rows
 
 
-class Face:
-    """What adapters read of a container.
+class Oracle:
+    """The oracle of one container.
 
-    The container has the same attributes itself, but a user's class may have taken their names for its own ends.
+    A container has the same attributes itself, but a user's class may have taken their names for
+    its own ends.
     """
 
-    def __init__(self, ledger: Any) -> None:
-        self._ledger = ledger
+    def __init__(self, node: Node) -> None:
+        self._node = node
 
     @property
     def name(self) -> str:
         """Name of the machine where it is the top one, else its label."""
-        name: str = self._ledger.below[-1] if self._ledger.below else self._ledger.name
-        return name
+        return self._node.below[-1] if self._node.below else self._node.name
 
     @property
     def path(self) -> str:
         """Container path, such as TOP/PICK."""
-        path: str = self._ledger.path
-        return path
+        return self._node.path
 
     @property
     def settings(self) -> Settings:
         """Settings in force."""
-        settings: Settings = self._ledger.settings
-        return settings
+        return self._node.settings
 
     @property
     def events(self) -> EventSource:
         """The events of the whole tree; append to `events.observers` to be told."""
-        events: EventSource = self._ledger.events
-        return events
+        return self._node.events
 
     @property
     def expert(self) -> Optional[Expert]:
-        """Who is asked, by any container of the tree."""
-        expert: Optional[Expert] = self._ledger.tree.expert
-        return expert
+        """The expert whom any container of the tree asks."""
+        return self._node.tree.expert
 
     @expert.setter
     def expert(self, expert: Optional[Expert]) -> None:
-        self._ledger.tree.expert = expert
+        self._node.tree.expert = expert
+
+    @property
+    def describe_failure(self) -> Callable[[smach.State], str]:
+        """How a state that failed by outcome is asked what it knows of its failure."""
+        return self._node.tree.describe_failure
+
+    @describe_failure.setter
+    def describe_failure(self, describe: Callable[[smach.State], str]) -> None:
+        self._node.tree.describe_failure = describe
 
     @property
     def trial_id(self) -> str:
         """Id of the present or latest trial, '' before the first."""
-        trial_id: str = self._ledger.tree.trial_id
-        return trial_id
+        return self._node.tree.trial_id
 
     @property
     def is_top(self) -> bool:
         """Whether no wrapped container is above this one."""
-        return self._ledger.parent is None
+        return self._node.parent is None
 
     @property
     def recovers(self) -> bool:
         """Whether failures are recovered from, not only observed."""
-        return bool(self._ledger.tree.recover)
+        return self._node.tree.recover
 
     def rates(self) -> List[StateRateRow]:
         """Return what was learned of every state, of this container and all below it."""
-        return rate_rows(self._ledger.machine)
+        return rate_rows(self._node.machine)
 
     def transition_counts(self) -> List[TransitionRow]:
         """Return how often each edge was taken, of this container and all below it."""
-        return transition_rows(self._ledger.machine)
+        return transition_rows(self._node.machine)
+
+
+def oracle_of(machine: object) -> Oracle:
+    """Return the oracle of a wrapped machine.
+
+    :raises TrialError: for what is not under an oracle.
+    """
+    node = getattr(machine, '_oracle', None)
+    if not isinstance(node, Node):
+        raise TrialError('{!r} is not under an oracle; OracleContainer.wrap puts it there'.format(
+            machine))
+    return Oracle(node)

@@ -1,13 +1,16 @@
-"""What all containers of one wrapped machine share: the trial, its events, the expert, the threads left behind."""
+"""What all containers of one wrapped machine share.
+
+The trial, its events, the expert, the threads that were left behind.
+"""
 import threading
 import uuid
 from typing import Any, Callable, Dict, Optional
 
 import smach
 
-from .events import EventSource
-from .question import Expert
-from .worker import Workers
+from ..asking.question import Expert
+from ..records.events import EventSource
+from .workers import Workers
 
 
 def log_error(text: str) -> None:
@@ -15,7 +18,7 @@ def log_error(text: str) -> None:
     smach.logerr(text)
 
 
-def no_description(state: Any) -> str:
+def no_description(state: smach.State) -> str:
     """States say nothing of a failure by outcome, unless somebody knows how to ask them."""
     return ''
 
@@ -28,7 +31,10 @@ def new_id() -> str:
 class Tree:
     """Shared by the top machine and all wrapped containers below it."""
 
-    def __init__(self, recover: bool = True, expert: Optional[Expert] = None) -> None:
+    def __init__(self, container_class: type, recover: bool = True,
+                 expert: Optional[Expert] = None) -> None:
+        # that of wrapped machines, and what nested ones become
+        self.container_class = container_class
         self.recover = recover
         self.expert = expert
         self.events = EventSource(log_error)
@@ -36,7 +42,8 @@ class Tree:
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
-        self.describe_failure: Callable[[Any], str] = no_description  # what a state that failed by outcome says of it
+        # what a state that failed by outcome says of it
+        self.describe_failure: Callable[[smach.State], str] = no_description
         self._questions = 0
         self._lock = threading.Lock()
 
@@ -47,13 +54,19 @@ class Tree:
         self.events.begin_trial(trial_id)
 
     def next_query_id(self) -> str:
-        """Return the id of the next question: each one is new, also when it is asked about the same failure."""
+        """Return the id of the next question.
+
+        Each is new, also when it is asked about the same failure.
+        """
         with self._lock:
             self._questions += 1
             return '{}-{}'.format(self.trial_id or new_id(), self._questions)
 
     def __getstate__(self) -> Dict[str, Any]:
-        """Without what cannot travel with a pickled or copied machine: the expert, its connection, and locks."""
+        """Leave out what cannot travel with a pickled or copied machine.
+
+        That is the expert, its connection, and locks.
+        """
         state = dict(self.__dict__)
         del state['_lock'], state['rates_lock']
         state['expert'] = None

@@ -1,7 +1,7 @@
 """Runs a state that has a time limit in a thread of its own, so that it can be left behind.
 
-On overrun the gate on its userdata is shut and the state is preempted; after a grace period it is abandoned. While an
-abandoned thread lives its state is blocked: nobody enters it again.
+On overrun the gate on its userdata is shut and the state is preempted; after a grace period it is
+abandoned. While an abandoned thread lives its state is blocked: nobody enters it again.
 """
 import contextvars
 import threading
@@ -10,35 +10,37 @@ from typing import Any, Callable, Dict, NamedTuple, Optional
 
 import smach
 
-from .userdata import Gate
+from .userdata_gate import UserdataGate
 
 
 class LimitedResult(NamedTuple):
     """How an execution with a time limit went; exactly one of the three is told."""
 
-    outcome: Any = None
+    outcome: object = None
     error: Optional[BaseException] = None
     overrun: str = ''  # what happened, in words
 
 
-class _Run:
+class _Execution:
     """One execution in a thread of its own."""
 
-    def __init__(self, state: Any, userdata: Any, name: str) -> None:
+    def __init__(self, state: smach.State, userdata: smach.Remapper, name: str) -> None:
         self.state = state
-        self.outcome: Any = None
+        self.outcome: object = None
         self.error: Optional[BaseException] = None
         self.abandoned = False
         self._lock = threading.Lock()
         self._userdata = userdata
         self.done = threading.Event()
         context = contextvars.copy_context()
-        self.thread = threading.Thread(target=context.run, args=(self._work,), name=name, daemon=True)
+        self.thread = threading.Thread(target=context.run, args=(self._work,), name=name,
+                                       daemon=True)
 
     def _work(self) -> None:
         try:
             self.outcome = self.state.execute(self._userdata)
-        except BaseException as err:  # handed to the machine's thread, SystemExit and KeyboardInterrupt among them
+        except BaseException as err:
+            # handed to the machine's thread, SystemExit and KeyboardInterrupt among them
             self.error = err
         with self._lock:
             self.done.set()
@@ -58,9 +60,9 @@ class Workers:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self.abandoned: Dict[int, _Run] = {}
+        self.abandoned: Dict[int, _Execution] = {}
 
-    def blocked(self, state: Any) -> str:
+    def blocked(self, state: smach.State) -> str:
         """Return why `state` cannot be entered now, '' where it can."""
         with self._lock:
             run = self.abandoned.get(id(state))
@@ -71,27 +73,29 @@ class Workers:
             del self.abandoned[id(state)]
             return ''
 
-    def run(self, state: Any, make_userdata: Callable[[Gate], Any], gate: Gate, label: str, limit_s: float,
-            grace_s: float) -> LimitedResult:
+    def run(self, state: smach.State, make_userdata: Callable[[UserdataGate], smach.Remapper],
+            gate: UserdataGate, label: str, limit_s: float, grace_s: float) -> LimitedResult:
         """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
 
         What the state raises is told in the result, not raised.
         """
-        run = _Run(state, make_userdata(gate), 'smach_oracle worker of {}'.format(label))
+        run = _Execution(state, make_userdata(gate), 'smach_oracle worker of {}'.format(label))
         run.thread.start()
         try:
             if wait(run.done, limit_s):
                 return LimitedResult(run.outcome, run.error)
-        except BaseException:  # Ctrl-C in the machine's thread: nothing the state does from now on counts
+        except BaseException:
+            # Ctrl-C in the machine's thread: nothing the state does from now on counts
             self._leave(run, gate, 0.0)
             raise
         ended = self._leave(run, gate, grace_s)
         what = 'overran its time limit of {:g} s and '.format(limit_s)
         if ended:
             return LimitedResult(overrun=what + 'ended when it was preempted')
-        return LimitedResult(overrun=what + 'was abandoned {:g} s after it was preempted'.format(grace_s))
+        return LimitedResult(overrun=what +
+                             'was abandoned {:g} s after it was preempted'.format(grace_s))
 
-    def _leave(self, run: _Run, gate: Gate, grace_s: float) -> bool:
+    def _leave(self, run: _Execution, gate: UserdataGate, grace_s: float) -> bool:
         gate.shut()
         try:
             run.state.request_preempt()
@@ -124,8 +128,8 @@ def wait(event: threading.Event, seconds: float) -> bool:
     return True
 
 
-def recall_preempts(state: Any) -> None:
-    """Take a preempt request back from a state and all that it contains: its execution has ended."""
+def recall_preempts(state: smach.State) -> None:
+    """Take a preempt request back from a state that has ended, and from all that it contains."""
     try:
         state.recall_preempt()
         get_children = getattr(state, 'get_children', None)

@@ -1,8 +1,9 @@
 """What observers (recorder, publisher, checkpoint, viewer) are told, and how.
 
-An observer is a callable that takes one `Event`. It is called in the thread in which the step happened, in the order
-of the sequence numbers, before the machine goes on: an observer that blocks holds the machine back, which is how a
-recorder loses nothing. An observer that raises is logged and does not stop the machine.
+An observer is a callable that takes one `Event`. It is called in the thread in which the step
+happened, in the order of the sequence numbers, before the machine goes on: an observer that blocks
+holds the machine back, which is how a recorder loses nothing. An observer that raises is logged and
+does not stop the machine.
 """
 import threading
 import time
@@ -12,7 +13,6 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 NAN = float('nan')
 # Text of the TRIAL_END and CONTAINER_END of an execute() that returned None.
 NO_OUTCOME = 'ended without an outcome: inconsistent, or shut down'
-SPENT = ' spent on it'  # how a decision's text ends where max_recoveries decided, outside every policy
 
 
 class EventKind(IntEnum):
@@ -81,8 +81,9 @@ Observer = Callable[[Event], None]
 class EventSource:
     """Numbers the events of one trial after another and hands them to the observers.
 
-    One source serves all containers of a wrapped tree. Emitting is serialised by a lock, so that the order in which
-    observers see events is that of their numbers, also from the children of a Concurrence.
+    One source serves all containers of a wrapped tree. Emitting is serialised by a lock, so that
+    the order in which observers see events is that of their numbers, also from the children of a
+    Concurrence.
     """
 
     def __init__(self, log_error: Callable[[str], None]) -> None:

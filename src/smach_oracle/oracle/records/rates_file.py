@@ -1,12 +1,15 @@
-"""Learned rates kept across runs in a JSON file, written so that a crash at any moment leaves the old file or the new.
+"""Learned rates, kept from program to program in a JSON file.
 
-Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STATE: estimator snapshot}}}, with PATH
-relative to the top machine ('' itself), so that renaming the machine loses nothing.
+A crash at any moment leaves the old file or the new one.
+
+Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STATE: estimator
+snapshot}}}, with PATH relative to the top machine ('' itself), so that renaming the machine loses
+nothing.
 """
 import json
 import os
 import tempfile
-from typing import Any, Dict, Iterable, Mapping
+from typing import Any, Dict, Iterable, Mapping, Protocol
 
 import smach
 
@@ -15,21 +18,51 @@ VERSION = 1
 DAMAGED = '.damaged'
 
 
-def learned_by(ledgers: Iterable[Any]) -> Dict[str, Dict[str, Any]]:
+class Learner(Protocol):
+    """A container that learns rates."""
+
+    @property
+    def path(self) -> str:
+        """Its path, for messages."""
+
+    @property
+    def relative_path(self) -> str:
+        """Its path below the top machine, '' for that itself."""
+
+    def learned_rates(self) -> Dict[str, Any]:
+        """Return what was learned of each state, as plain data."""
+
+    def learn(self, label: str, learned: Mapping[str, Any]) -> None:
+        """Take over what was learned of a state.
+
+        :raises ValueError: where it cannot be read.
+        """
+
+
+def learned_by(containers: Iterable[Learner]) -> Dict[str, Dict[str, Any]]:
     """Return what was learned, as the "containers" of a rates file."""
-    return {ledger.relative_path: ledger.learned_rates() for ledger in ledgers}
+    return {container.relative_path: container.learned_rates() for container in containers}
 
 
-def write_rates(path: str, ledgers: Iterable[Any]) -> None:
-    """Write what was learned to `path`, atomically and durably. Raises OSError; the old file is then untouched."""
-    write_learned(path, learned_by(ledgers))
+def write_rates(path: str, learners: Iterable[Learner]) -> None:
+    """Write what was learned to `path`, atomically and durably.
+
+    :raises OSError: where it cannot be written; the old file is
+    then untouched.
+    """
+    write_learned(path, learned_by(learners))
 
 
 def write_learned(path: str, containers: Mapping[str, Any]) -> None:
-    """Write what `learned_by` returned, as `write_rates` does. Raises OSError."""
-    text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1, sort_keys=True)
+    """Write what `learned_by` returned, as `write_rates` does.
+
+    :raises OSError: where it cannot be written; the old file is then untouched.
+    """
+    text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1,
+                      sort_keys=True)
     folder = os.path.dirname(os.path.abspath(path))
-    descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp', dir=folder)
+    descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp',
+                                             dir=folder)
     try:
         with os.fdopen(descriptor, 'w', encoding='utf-8') as stream:
             stream.write(text + '\n')
@@ -64,11 +97,11 @@ def _sync_folder(folder: str) -> None:
         os.close(descriptor)
 
 
-def read_rates(path: str, ledgers: Iterable[Any]) -> None:
+def read_rates(path: str, learners: Iterable[Learner]) -> None:
     """Take over the rates in `path`.
 
-    A file that is not there is no matter; one that cannot be read is warned of; a damaged one is set aside as
-    PATH.damaged and warned of, and the states start from their priors.
+    A file that is not there is no matter; one that cannot be read is warned of; a damaged one is
+    set aside as PATH.damaged and warned of, and the states start from their priors.
     """
     try:
         with open(path, encoding='utf-8') as stream:
@@ -76,14 +109,15 @@ def read_rates(path: str, ledgers: Iterable[Any]) -> None:
     except FileNotFoundError:
         return
     except OSError as err:
-        smach.logwarn('Rates file {} cannot be read, starting from the priors: {}'.format(path, err))
+        smach.logwarn('Rates file {} cannot be read, starting from the priors: {}'.format(
+            path, err))
         return
     except (ValueError, RecursionError) as err:
         smach.logwarn('Rates file {} is damaged ({}), {}; starting from the priors'.format(
             path, err, _set_aside(path)))
         return
-    for ledger in ledgers:
-        _hand_over(path, ledger, containers.get(ledger.relative_path, {}))
+    for learner in learners:
+        _hand_over(path, learner, containers.get(learner.relative_path, {}))
 
 
 def _checked(content: Any) -> Dict[str, Dict[str, Any]]:
@@ -92,7 +126,8 @@ def _checked(content: Any) -> Dict[str, Dict[str, Any]]:
     if content.get('version') != VERSION:
         raise ValueError('it has version {!r}, known is {}'.format(content.get('version'), VERSION))
     containers = content.get('containers')
-    if not isinstance(containers, dict) or not all(isinstance(states, dict) for states in containers.values()):
+    if not isinstance(containers, dict) or not all(
+            isinstance(states, dict) for states in containers.values()):
         raise ValueError('it has no states')
     return containers
 
@@ -105,9 +140,10 @@ def _set_aside(path: str) -> str:
     return 'it is kept as {}'.format(path + DAMAGED)
 
 
-def _hand_over(path: str, ledger: Any, states: Dict[str, Any]) -> None:
+def _hand_over(path: str, learner: Learner, states: Dict[str, Any]) -> None:
     for label, learned in states.items():
         try:
-            ledger.learn(label, learned)
+            learner.learn(label, learned)
         except (ValueError, TypeError, AttributeError) as err:
-            smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(path, label, ledger.path, err))
+            smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(
+                path, label, learner.path, err))

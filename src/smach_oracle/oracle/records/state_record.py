@@ -2,13 +2,13 @@
 import threading
 from typing import Any, Dict, Mapping, Optional, Tuple
 
-from .config import StateSettings
-from .failure_rate import Estimator, FailureClass, classify, make_estimator
-from .question import Visit
+from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
+from ..records.visits import Visit
+from ..settings.settings import StateSettings
 
 
-class Edge:
-    """A transition that leads to another state without any failure: all that its next use needs, made once."""
+class FastEdge:
+    """A transition to another state without any failure, with all that its next use needs."""
 
     __slots__ = ('target', 'count', 'message', 'visit')
 
@@ -22,31 +22,37 @@ class Edge:
 class StateRecord:
     """Learned rate, counts and latest snapshot of one state.
 
-    Successes by way of an `Edge` are counted there and reach the estimator when somebody asks for it: their order among
-    each other does not matter, and a failure is always learned after them.
+    Successes by way of an `FastEdge` are counted there and reach the estimator when somebody asks
+    for it: their order among each other does not matter, and a failure is always learned after
+    them.
     """
 
-    __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks', 'has_preconditions', 'special',
-                 'view', '_estimator', '_lock', '_learned', '_retired', '_edges', '_visits', '_visits_before')
+    __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
+                 'has_preconditions', 'special', 'view', '_estimator', '_lock', '_learned',
+                 '_retired', '_edges', '_visits', '_visits_before')
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
-        self.fast: Dict[Any, Edge] = {}
+        self.fast: Dict[Any, FastEdge] = {}
         self.snapshot: Optional[Dict[str, Any]] = None
         self.view: Any = None  # what the state reads and writes, kept from its last visit
         self.recoveries = 0  # of this trial
-        self.fallbacks = 0  # of this trial: times that nobody answered and `on_no_answer` led to a state
+        # of this trial: times that nobody answered and `on_no_answer` led to a state
+        self.fallbacks = 0
         self._learned = 0  # successes by way of edges that the estimator knows
         self._retired = 0  # successes by way of edges that are no more
-        self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an Edge
-        self._visits = 0  # not counted by an Edge
+        self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
+        self._visits = 0  # not counted by an FastEdge
         self._visits_before = 0  # visits of earlier trials
         self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
         self._lock = threading.RLock()  # rates are read from other threads
         self.configure(settings, special)
 
     def configure(self, settings: StateSettings, special: bool) -> None:
-        """Go on under other settings with what was learned; `special`: more is to be done than to execute the state."""
+        """Go on under other settings with what was learned.
+
+        `special`: more is to be done than to execute the state.
+        """
         self.settings = settings
         self.has_preconditions = bool(settings.preconditions)
         self.special = special or settings.time_limit_s is not None
@@ -65,7 +71,7 @@ class StateRecord:
         return self._estimator
 
     def learn(self, failed: bool) -> None:
-        """Learn the result of a visit that took no Edge."""
+        """Learn the result of a visit that took no FastEdge."""
         with self._lock:
             self._up_to_date().add(failed)
 
@@ -108,11 +114,11 @@ class StateRecord:
         self._visits_before = self._visits + self._by_edges()
 
     def left_by(self, outcome: str, target: str) -> None:
-        """Count a transition that took no Edge."""
+        """Count a transition that took no FastEdge."""
         self._edges[outcome, target] = self._edges.get((outcome, target), 0) + 1
 
     def visit_ended(self) -> None:
-        """Count a visit that ended without an Edge."""
+        """Count a visit that ended without an FastEdge."""
         self._visits += 1
 
     def transitions(self) -> Dict[Tuple[str, str], int]:
@@ -123,7 +129,10 @@ class StateRecord:
         return counts
 
     def restore(self, learned: Mapping[str, Any]) -> None:
-        """Take over a snapshot of an estimator. Raises ValueError."""
+        """Take over a snapshot of an estimator.
+
+        :raises ValueError: where it cannot be read.
+        """
         with self._lock:
             self._up_to_date().restore(learned)
 
@@ -152,4 +161,5 @@ class StateRecord:
             edge = self.fast.pop(outcome)
             self._retired += edge.count
         if edge.count:
-            self._edges[outcome, edge.target] = self._edges.get((outcome, edge.target), 0) + edge.count
+            self._edges[outcome, edge.target] = self._edges.get(
+                (outcome, edge.target), 0) + edge.count

@@ -4,47 +4,58 @@ from typing import Any, NamedTuple, Optional, Union
 
 import smach
 
-from .events import FailureKind
-from .failure import (Failure, Route, failure_kind, raised_error, route_of, traceback_of, unbound_text,
-                      unregistered_text)
-from .ledger import Ledger
-from .state_record import StateRecord
+from ..machine.failure import (
+    Failure,
+    Route,
+    failure_kind,
+    raised_error,
+    route_of,
+    traceback_of,
+    unbound_text,
+    unregistered_text,
+)
+from ..machine.node import Node
+from ..records.events import FailureKind
+from ..records.state_record import StateRecord
 
 
 class Overrun(NamedTuple):
-    """Stands for the outcome of a state that overran its time limit, or still runs from an earlier overrun."""
+    """In place of the outcome of a state that overran its time limit, or still runs."""
 
     text: str
 
 
-def judge(machine: Any, ledger: Ledger, record: StateRecord, outcome: Any,
+def judge(node: Node, record: StateRecord, outcome: Any,
           error: Optional[Exception]) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
+    machine = node.machine
     label, state = record.label, machine._states[record.label]
     if error is not None:
-        return Failure(label, FailureKind.EXCEPTION, '', '{}: {}'.format(type(error).__name__, error), None,
+        return Failure(label, FailureKind.EXCEPTION, '',
+                       '{}: {}'.format(type(error).__name__, error), None,
                        partial(raised_error, label, state, error), traceback_of(error))
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
     if outcome not in state.get_registered_outcomes():
         text = unregistered_text(label, state, outcome)
-        return Failure(label, FailureKind.UNREGISTERED_OUTCOME, outcome if isinstance(outcome, str) else '', text,
-                       None, partial(smach.InvalidTransitionError, text))
+        return Failure(label, FailureKind.UNREGISTERED_OUTCOME,
+                       outcome if isinstance(outcome, str) else '', text, None,
+                       partial(smach.InvalidTransitionError, text))
     route = route_of(machine, label, outcome)
-    kind = failure_kind(outcome, route, record.settings.failure_outcomes, ledger.failing)
+    kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:
         return route
     if route.target:
-        return Failure(label, kind, outcome, _description(ledger, label, state), route)
+        return Failure(label, kind, outcome, _description(node, label, state), route)
     text = unbound_text(label, outcome, machine.get_registered_outcomes())
     return Failure(label, kind, outcome, text, route, partial(smach.InvalidTransitionError, text))
 
 
-def _description(ledger: Ledger, label: str, state: Any) -> str:
+def _description(node: Node, label: str, state: smach.State) -> str:
     try:
-        return ledger.tree.describe_failure(state)
+        return node.tree.describe_failure(state)
     except Exception as err:  # it looks into states of any make
-        smach.logwarn('{}/{}: cannot say more of its failure: {!r}'.format(ledger.path, label, err))
+        smach.logwarn('{}/{}: cannot say more of its failure: {!r}'.format(node.path, label, err))
         return ''
 
 

@@ -1,12 +1,20 @@
-"""Makes what must hold before a state hold (paper, section IV-B). Runs of preconditions are no visits."""
+"""Makes what must hold before a state hold (paper, IV-B).
+
+Runs of preconditions do not count as visits.
+"""
 import threading
 from typing import Any, Optional
 
-from .events import FailureKind
-from .failure import failure_kind, route_of
-from .naming import is_preempted
-from .precondition_spec import PreconditionKind, PreconditionSpec
-from .userdata import Gate, WriteWatch, behind, view_of
+import smach
+
+from ..machine.failure import failure_kind, route_of
+from ..machine.node import Node
+from ..machine.userdata_gate import UserdataGate, behind
+from ..machine.userdata_view import view_of
+from ..machine.write_watch import WriteWatch
+from ..records.events import FailureKind
+from ..settings.failing_outcomes import is_preempted
+from ..settings.preconditions import PreconditionKind, PreconditionSpec
 
 
 class NotMet(Exception):
@@ -14,14 +22,17 @@ class NotMet(Exception):
 
 
 class PreconditionRunner:
-    """Runs the preconditions of one failure, one after the other, on the container's userdata behind a gate.
+    """Runs the preconditions of one failure, one after the other.
 
-    `cancel` may be called from any thread, at any time: the state that runs is preempted, nothing more begins.
+    They read and write the container's userdata through a gate.
+
+    `cancel` may be called from any thread, at any time: the state that runs is preempted, nothing
+    more begins.
     """
 
-    def __init__(self, machine: Any, ledger: Any, watch: WriteWatch) -> None:
-        self._machine = machine
-        self._ledger = ledger
+    def __init__(self, node: Node, watch: WriteWatch) -> None:
+        self._machine = node.machine
+        self._node = node
         self._watch = watch
         self._gate = watch.gate
         self._lock = threading.Lock()
@@ -37,7 +48,10 @@ class PreconditionRunner:
             running.request_preempt()
 
     def run(self, spec: PreconditionSpec) -> str:
-        """Return '' where the precondition is met, else why not; what it wrote until then is taken back."""
+        """Return '' where the precondition is met, else why not.
+
+        What an unmet one wrote is taken back.
+        """
         begun = self._watch.begin()
         try:
             self._achieve(spec)
@@ -74,12 +88,12 @@ class PreconditionRunner:
 
     def _run_label(self, label: str) -> None:
         state = self._machine._states.get(label)
-        if state is None or self._ledger.is_oracle(label):
+        if state is None or self._node.is_oracle(label):
             raise NotMet('there is no state {!r}'.format(label))
         self._judge(state, label, self._execute(state, label))
 
-    def _execute(self, state: Any, label: str) -> Any:
-        workers = self._ledger.tree.workers
+    def _execute(self, state: smach.State, label: str) -> object:
+        workers = self._node.tree.workers
         blocked = workers.blocked(state)
         if blocked:
             raise NotMet(blocked)
@@ -96,40 +110,41 @@ class PreconditionRunner:
         finally:
             self._ended(state)
 
-    def _with_limit(self, state: Any, label: str) -> Any:
-        def make_view(gate: Gate) -> Any:
+    def _with_limit(self, state: smach.State, label: str) -> object:
+        def make_view(gate: UserdataGate) -> smach.Remapper:
             return view_of(self._machine, label, state, behind(gate))
 
-        settings = self._ledger.settings_of(label) if label else None
+        settings = self._node.settings_of(label) if label else None
         if settings is None or settings.time_limit_s is None:
             return state.execute(make_view(self._gate))
-        result = self._ledger.tree.workers.run(state, make_view, self._gate.branch(), label, settings.time_limit_s,
-                                               settings.grace_period_s)
+        result = self._node.tree.workers.run(state, make_view, self._gate.branch(), label,
+                                               settings.time_limit_s, settings.grace_period_s)
         if result.error is not None:
             raise result.error
         if result.overrun:
             raise NotMet(result.overrun)
         return result.outcome
 
-    def _ended(self, state: Any) -> None:
+    def _ended(self, state: smach.State) -> None:
         with self._lock:
             self._running = None
             cancelled = self._cancelled
-        if cancelled and not self._ledger.tree.workers.blocked(state):
+        if cancelled and not self._node.tree.workers.blocked(state):
             state.recall_preempt()  # the meta state services the request in its place
 
-    def _judge(self, state: Any, label: str, outcome: Any) -> None:
+    def _judge(self, state: smach.State, label: str, outcome: Any) -> None:
         if self._cancelled:
             raise NotMet('preempted')
         if outcome not in state.get_registered_outcomes():
             raise NotMet('returned {!r}, which is no outcome of it'.format(outcome))
-        failing = self._ledger.failing
+        failing = self._node.in_force.failing
         if label:
-            listed = self._ledger.settings_of(label).failure_outcomes
+            listed = self._node.settings_of(label).failure_outcomes
             route = route_of(self._machine, label, outcome)
             failed = failure_kind(outcome, route, listed, failing) not in (
                 FailureKind.NOT_A_FAILURE, FailureKind.UNREGISTERED_OUTCOME)
         else:
-            failed = outcome in failing or outcome in self._ledger.settings.defaults.failure_outcomes
+            listed = self._node.settings.defaults.failure_outcomes
+            failed = outcome in failing or outcome in listed
         if failed or is_preempted(outcome):
             raise NotMet('ended with {!r}'.format(outcome))

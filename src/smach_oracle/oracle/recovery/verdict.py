@@ -2,7 +2,7 @@
 from enum import Enum
 from typing import FrozenSet, NamedTuple, Optional
 
-from .failure import Ending
+from ..machine.failure import ContainerEnding
 
 
 class VerdictKind(Enum):
@@ -20,12 +20,12 @@ class Verdict(NamedTuple):
     kind: VerdictKind
     state: str = ''  # JUMP
     outcome: str = ''  # SUPERSEDE
-    ending: Ending = Ending()
+    ending: ContainerEnding = ContainerEnding()
     by: str = ''  # the expert's name
     text: str = ''
     written: FrozenSet[str] = frozenset()  # userdata keys that survive a restore
     query_id: Optional[str] = None
 
     def leads_to(self) -> str:
-        """Return the outcome of the meta state: the state or container outcome it leads to, '' where it raises."""
+        """Return the state or outcome that the meta state leads to, '' where it raises."""
         return self.state or self.outcome or self.ending.state or self.ending.outcome or ''

@@ -1,114 +1,135 @@
-"""Checks of single settings: each takes the dotted key and the value, returns the value or raises ConfigError. Pure."""
+"""Checks of single settings. Pure.
+
+Each takes the dotted key and the value, and returns the value or raises SettingsError.
+"""
 import math
 from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 
-from .errors import ConfigError
+from ..errors import SettingsError
 from .paths import path_of
 
-Check = Callable[[str, Any], Any]
+Check = Callable[[str, object], Any]
 
 
 def is_state(value: object) -> bool:
     """Whether `value` is a state in smach's sense, told without importing smach."""
-    return callable(getattr(value, 'execute', None)) and callable(getattr(value, 'get_registered_outcomes', None))
+    return callable(getattr(value, 'execute', None)) and callable(
+        getattr(value, 'get_registered_outcomes', None))
 
 
 def number(low: float, high: float, allowed: str) -> Check:
-    """Check for a number from `low` to `high`; its ConfigError says `allowed`."""
-    def check(key: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-            raise ConfigError(key, value, allowed)
+    """Check for a number from `low` to `high`; its SettingsError says `allowed`."""
+    def check(key: str, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value,
+                                                     (int, float)) or not low <= value <= high:
+            raise SettingsError(key, value, allowed)
         try:
             taken = float(value)
         except OverflowError:  # a whole number of hundreds of digits
             taken = math.inf
         if not math.isfinite(taken):
-            raise ConfigError(key, value, allowed)
+            raise SettingsError(key, value, allowed)
         return taken
     return check
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check:
-    """Check for a whole number from `low` to `high`; its ConfigError says `allowed`."""
-    def check(key: str, value: Any) -> int:
+    """Check for a whole number from `low` to `high`; its SettingsError says `allowed`."""
+    def check(key: str, value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ConfigError(key, value, allowed)
+            raise SettingsError(key, value, allowed)
         return value
     return check
 
 
-def flag(key: str, value: Any) -> bool:
-    """Check for true or false. Raises ConfigError."""
+def flag(key: str, value: object) -> bool:
+    """Check for true or false.
+
+    :raises SettingsError: for anything else.
+    """
     if not isinstance(value, bool):
-        raise ConfigError(key, value, 'true or false')
+        raise SettingsError(key, value, 'true or false')
     return value
 
 
 def choice(options: Sequence[str]) -> Check:
-    """Check for one of some words; its ConfigError names them all."""
-    def check(key: str, value: Any) -> str:
+    """Check for one of some words; its SettingsError names them all."""
+    def check(key: str, value: object) -> str:
         if not isinstance(value, str) or value not in options:
-            raise ConfigError(key, value, ', '.join(options))
+            raise SettingsError(key, value, ', '.join(options))
         return value
     return check
 
 
-def text(key: str, value: Any) -> str:
-    """Check for a string, empty or not. Raises ConfigError."""
+def text(key: str, value: object) -> str:
+    """Check for a string, empty or not.
+
+    :raises SettingsError: for anything else.
+    """
     if not isinstance(value, str):
-        raise ConfigError(key, value, 'a string')
+        raise SettingsError(key, value, 'a string')
     return value
 
 
-def file(key: str, value: Any) -> str:
+def file(key: str, value: object) -> str:
     """Check for a path, empty or not; returns it with `~` filled in."""
     return path_of(text(key, value))
 
 
-def label(key: str, value: Any) -> str:
-    """Check for a string that is not empty. Raises ConfigError."""
+def label(key: str, value: object) -> str:
+    """Check for a string that is not empty.
+
+    :raises SettingsError: for anything else.
+    """
     if not isinstance(value, str) or not value:
-        raise ConfigError(key, value, 'a string that is not empty')
+        raise SettingsError(key, value, 'a string that is not empty')
     return value
 
 
-def words(key: str, value: Any) -> Tuple[str, ...]:
-    """Check for a list of strings, none of them empty. Raises ConfigError."""
+def words(key: str, value: object) -> Tuple[str, ...]:
+    """Check for a list of strings, none of them empty.
+
+    :raises SettingsError: for anything else.
+    """
     if isinstance(value, str) or not isinstance(value, (list, tuple, set, frozenset)):
-        raise ConfigError(key, value, 'a list of strings')
+        raise SettingsError(key, value, 'a list of strings')
     for entry in value:
         if not isinstance(entry, str) or not entry:
-            raise ConfigError(key, entry, 'a list of strings, none of them empty')
+            raise SettingsError(key, entry, 'a list of strings, none of them empty')
     return tuple(sorted(value)) if isinstance(value, (set, frozenset)) else tuple(value)
 
 
 def optional(check: Check) -> Check:
     """Check that admits None (nothing set) beside what `check` admits."""
-    def checked(key: str, value: Any) -> Any:
+    def checked(key: str, value: object) -> object:
         return None if value is None else check(key, value)
     return checked
 
 
-def mapping(key: str, value: Any) -> Mapping[str, Any]:
-    """Check for a mapping whose keys are strings; None (an empty section of a YAML file) counts as empty.
+def mapping(key: str, value: object) -> Mapping[str, Any]:
+    """Check for a mapping whose keys are strings.
 
-    :raises ConfigError: naming the value, or the key that is no string.
+    None, an empty section of a YAML file, counts as an empty one.
+
+    :raises SettingsError: naming the value, or the key that is no string.
     """
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise ConfigError(key, value, 'a mapping')
+        raise SettingsError(key, value, 'a mapping')
     for name in value:
         if not isinstance(name, str):
-            raise ConfigError(key, name, 'names that are strings')
+            raise SettingsError(key, name, 'names that are strings')
     return value
 
 
-def on_no_answer(key: str, value: Any) -> Tuple[str, str]:
-    """Check for a fallback: 'stop', 'goto:LABEL', 'give_up:OUTCOME' or a mapping of one of these words.
+def on_no_answer(key: str, value: object) -> Tuple[str, str]:
+    """Check for a fallback.
+
+    Allowed: 'stop', 'goto:LABEL', 'give_up:OUTCOME', or a mapping of one of these words.
 
     :returns: the word, and what it names or ''.
-    :raises ConfigError: for anything else.
+    :raises SettingsError: for anything else.
     """
     if isinstance(value, Mapping) and len(value) == 1:
         (verb, target), = value.items()
@@ -121,15 +142,21 @@ def on_no_answer(key: str, value: Any) -> Tuple[str, str]:
     named = isinstance(target, str) and bool(target)
     if (verb == 'stop' and not target) or (verb in ('goto', 'give_up') and named):
         return str(verb), str(target or '')
-    raise ConfigError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}")
+    raise SettingsError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}")
 
 
-def deadline(key: str, value: Any) -> float:
-    """Check for a deadline in seconds; 0 waits without end. Raises ConfigError."""
+def deadline(key: str, value: object) -> float:
+    """Check for a deadline in seconds; 0 waits without end.
+
+    :raises SettingsError: for anything else.
+    """
     return float(number(0, math.inf, 'seconds from 0; 0 waits without end')(key, value))
 
 
-def time_limit(key: str, value: Any) -> Optional[float]:
-    """Check for a time limit in seconds; 0 and None are no limit. Raises ConfigError."""
+def time_limit(key: str, value: object) -> Optional[float]:
+    """Check for a time limit in seconds; 0 and None are no limit.
+
+    :raises SettingsError: for anything else.
+    """
     limit_s = optional(number(0, math.inf, 'seconds from 0; 0 is no limit'))(key, value)
     return limit_s or None

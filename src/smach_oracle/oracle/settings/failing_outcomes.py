@@ -14,14 +14,15 @@ def is_preempted(outcome: object) -> bool:
 class FailingNames:
     """Tells whether an outcome names a failure: one of the given words, whole or as a suffix.
 
-    A suffix begins after `_`, `-` or a change to a capital: grasp_failed, Grasp-Error, graspFailed, IOError. Case is
-    ignored otherwise. `preempted` is never a failure.
+    A suffix begins after `_`, `-` or a change to a capital: grasp_failed, Grasp-Error, graspFailed,
+    IOError. Case is ignored otherwise. `preempted` is never a failure.
     """
 
     def __init__(self, words: Iterable[str] = DEFAULT_FAILING_OUTCOMES) -> None:
         self.words = tuple(words)
         self._whole = _pattern(r'(?:^|.*[_\-])(?:{})$', self.words, re.IGNORECASE | re.DOTALL)
-        capitalised = tuple(word[:1].upper() + word[1:] for word in self.words if word[:1].isalpha())
+        capitalised = tuple(word[:1].upper() + word[1:] for word in self.words
+                            if word[:1].isalpha())
         self._camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
 
     def __contains__(self, outcome: object) -> bool:

@@ -1,32 +1,59 @@
-"""The settings of shared-autonomy interfaces (paper, section V-A): what is offered, where, how it is started. Pure."""
-import re
-from typing import Any, List, Mapping, Optional, Tuple
+"""The settings of shared-autonomy interfaces (paper, section V-A). Pure.
 
-from . import config_values as values
-from .errors import ConfigError
-from .question import START_LIMIT_S, InterfaceOffer, InterfaceStart
+They say what is offered, for which states, and how it is started.
+"""
+import re
+from typing import Any, List, Mapping, NamedTuple, Optional, Tuple
+
+from ..errors import SettingsError
+from . import checks as values
 
 _KEYS = ('action', 'args', 'description', 'launch', 'node', 'start_limit_s', 'states')
 _NAME = r'[A-Za-z0-9_.+-]+'
 _LAUNCH = re.compile(r'({0})/({0}\.launch)'.format(_NAME))
 _NODE = re.compile(r'({0}) +({0})'.format(_NAME))
 _ARGUMENT = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+START_LIMIT_S = 60.0
 _LIMIT = values.number(0.1, 3600.0, 'seconds from 0.1 to 3600')
+
+
+
+class InterfaceStart(NamedTuple):
+    """How an interface that is not there is started."""
+
+    kind: str  # 'launch' or 'node'
+    package: str
+    target: str  # file name or node type
+    args: Tuple[str, ...] = ()
+    limit_s: float = START_LIMIT_S  # how long its action server may take to come
+
+
+class InterfaceOffer(NamedTuple):
+    """A shared-autonomy interface on offer for the failed state (paper, section V-A)."""
+
+    name: str
+    action: str
+    description: str = ''
+    start: Optional[InterfaceStart] = None  # None: somebody else starts it
+
 
 Offers = Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]
 
 
-def checked_interfaces(given: Any) -> Offers:
-    """Each offer with the states it serves, () for all of them. Raises ConfigError."""
+def checked_interfaces(given: object) -> Offers:
+    """Each offer with the states it serves, () for all of them.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
     offers = []
     for name, entry in values.mapping('interfaces', given).items():
         prefix = 'interfaces.{}.'.format(name)
         entry = values.mapping(prefix[:-1], entry)
         for key in entry:
             if key not in _KEYS:
-                raise ConfigError(prefix + key, entry[key], 'one of the keys ' + ', '.join(_KEYS))
+                raise SettingsError(prefix + key, entry[key], 'one of the keys ' + ', '.join(_KEYS))
         if 'action' not in entry:
-            raise ConfigError(prefix + 'action', None, 'the name of a SharedAutonomy action')
+            raise SettingsError(prefix + 'action', None, 'the name of a SharedAutonomy action')
         offer = InterfaceOffer(name, values.label(prefix + 'action', entry['action']),
                                values.text(prefix + 'description', entry.get('description', '')),
                                _start(prefix, entry))
@@ -40,29 +67,32 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
     if not kinds:
         for key in ('args', 'start_limit_s'):
             if key in entry:
-                raise ConfigError(prefix + key, entry[key], 'given together with launch or node')
+                raise SettingsError(prefix + key, entry[key], 'given together with launch or node')
         return None
     if len(kinds) > 1:
-        raise ConfigError(prefix + 'node', entry['node'], 'one of launch and node, not both')
+        raise SettingsError(prefix + 'node', entry['node'], 'one of launch and node, not both')
     kind = kinds[0]
-    pattern, allowed = {'launch': (_LAUNCH, 'PACKAGE/FILE.launch'), 'node': (_NODE, 'PACKAGE TYPE')}[kind]
+    pattern, allowed = {
+        'launch': (_LAUNCH, 'PACKAGE/FILE.launch'), 'node': (_NODE, 'PACKAGE TYPE')
+    }[kind]
     found = pattern.fullmatch(entry[kind]) if isinstance(entry[kind], str) else None
     if found is None or '..' in entry[kind]:
-        raise ConfigError(prefix + kind, entry[kind], allowed)
+        raise SettingsError(prefix + kind, entry[kind], allowed)
     args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
-    return InterfaceStart(kind, found.group(1), found.group(2), tuple(args),
-                          _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', START_LIMIT_S)))
+    return InterfaceStart(
+        kind, found.group(1), found.group(2), tuple(args),
+        _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', START_LIMIT_S)))
 
 
-def _launch_args(key: str, given: Any) -> List[str]:
+def _launch_args(key: str, given: object) -> List[str]:
     args = []
     for name, value in values.mapping(key, given).items():
         if not _ARGUMENT.fullmatch(name) or not isinstance(value, (str, int, float)):
-            raise ConfigError('{}.{}'.format(key, name), value,
+            raise SettingsError('{}.{}'.format(key, name), value,
                               'the name of a launch argument, and text, a number or true or false')
         args.append('{}:={}'.format(name, str(value).lower() if isinstance(value, bool) else value))
     return args
 
 
-def _node_args(key: str, given: Any) -> Tuple[str, ...]:
+def _node_args(key: str, given: object) -> Tuple[str, ...]:
     return values.words(key, given if given is not None else ())

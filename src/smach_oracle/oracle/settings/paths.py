@@ -1,23 +1,27 @@
 """Files and folders as people name them in settings, parameters and command lines. Pure."""
 import os
 
-from .errors import ConfigError
+from ..errors import SettingsError
 
 
 def path_of(text: str) -> str:
-    """The path, `~` and `~user` at its beginning filled in; a relative one is relative to where the process runs."""
+    """Return the path with `~` or `~user` at its beginning filled in.
+
+    A relative path is relative to the folder in which the process runs.
+    """
     return os.path.expanduser(text)
 
 
 def check_writable(key: str, path: str, replaced: bool = False) -> None:
     """Find out before it is needed whether a file can be written.
 
-    :param replaced: whether a file beside it is to take its place: then its folder is written in any case.
-    :raises ConfigError: naming the key, the path and what is wrong with it.
+    :param replaced: whether a file beside it is to take its place: then its folder is written in
+        any case.
+    :raises SettingsError: naming the key, the path and what is wrong with it.
     """
     why = why_not_writable(path, replaced)
     if why:
-        raise ConfigError(key, path, 'a file that can be written ({})'.format(why))
+        raise SettingsError(key, path, 'a file that can be written ({})'.format(why))
 
 
 def why_not_writable(path: str, replaced: bool = False) -> str:

@@ -1,14 +1,14 @@
-"""What must hold before a state, as the designer wrote it down (paper, section IV-B). Pure; no smach.
+"""What must hold before a state, as its designer wrote it (paper, section IV-B). Pure.
 
-Four kinds: the label of another state of the same container; a `smach.State`; a callable `f(userdata) -> bool`; a pair
-(check, achieve) whose second half runs only if the first does not hold. In YAML: a label, 'python:module:attribute',
-or {check: ..., achieve: ...}.
+Four kinds: the label of another state of the same container; a `smach.State`; a callable
+`f(userdata) -> bool`; a pair (check, achieve) whose second half runs only if the first does not
+hold. In YAML: a label, 'python:module:attribute', or {check: ..., achieve: ...}.
 """
 from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
-from .config_values import is_state
-from .errors import ConfigError
+from ..errors import SettingsError
+from .checks import is_state
 
 PYTHON = 'python:'
 Resolver = Callable[[str], Any]
@@ -39,21 +39,34 @@ class PreconditionSpec(NamedTuple):
         return ()
 
 
-_ALLOWED = ('the label of a state, a smach.State, a callable f(userdata) -> bool, a pair (check, achieve) of these, '
-            "'python:module:attribute' or {check: ..., achieve: ...}")
+_ALLOWED = (
+    'the label of a state, a smach.State, a callable f(userdata) -> bool, a pair (check, achieve) '
+    'of these, '
+    "'python:module:attribute' or {check: ..., achieve: ...}")
 
 
-def parse_preconditions(key: str, given: Any, resolver: Optional[Resolver] = None) -> Tuple[PreconditionSpec, ...]:
-    """Check a list of preconditions of one state. Raises ConfigError naming `key` and the position."""
+def parse_preconditions(key: str, given: object,
+                        resolver: Optional[Resolver] = None) -> Tuple[PreconditionSpec, ...]:
+    """Check a list of preconditions of one state.
+
+    :raises SettingsError: naming `key` and the
+    position.
+    """
     if not isinstance(given, list):
         if isinstance(given, tuple) and all(isinstance(spec, PreconditionSpec) for spec in given):
             return given
-        raise ConfigError(key, given, 'a list of preconditions')
-    return tuple(parse_precondition('{}[{}]'.format(key, index), spec, resolver) for index, spec in enumerate(given))
+        raise SettingsError(key, given, 'a list of preconditions')
+    return tuple(
+        parse_precondition('{}[{}]'.format(key, index), spec, resolver)
+        for index, spec in enumerate(given))
 
 
-def parse_precondition(key: str, given: Any, resolver: Optional[Resolver] = None) -> PreconditionSpec:
-    """Check one precondition. Raises ConfigError naming `key`."""
+def parse_precondition(key: str, given: object,
+                       resolver: Optional[Resolver] = None) -> PreconditionSpec:
+    """Check one precondition.
+
+    :raises SettingsError: naming `key`.
+    """
     if isinstance(given, PreconditionSpec):
         return given
     if isinstance(given, str):
@@ -65,31 +78,34 @@ def parse_precondition(key: str, given: Any, resolver: Optional[Resolver] = None
     if isinstance(given, (tuple, list)) and len(given) == 2:
         return _parse_pair(key, list(given), resolver)
     if callable(given) and not (isinstance(given, type) and is_state(given)):
-        return PreconditionSpec(PreconditionKind.CALLABLE, getattr(given, '__name__', type(given).__name__), given)
-    raise ConfigError(key, given, _ALLOWED)
+        return PreconditionSpec(PreconditionKind.CALLABLE,
+                                getattr(given, '__name__',
+                                        type(given).__name__), given)
+    raise SettingsError(key, given, _ALLOWED)
 
 
 def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> PreconditionSpec:
     if not given:
-        raise ConfigError(key, given, _ALLOWED)
+        raise SettingsError(key, given, _ALLOWED)
     if not given.startswith(PYTHON):
         return PreconditionSpec(PreconditionKind.LABEL, given, given)
     if resolver is None:
-        raise ConfigError(key, given, 'an object here: nobody told how to import names')
+        raise SettingsError(key, given, 'an object here: nobody told how to import names')
     try:
         found = resolver(given)
-    except ConfigError:
+    except SettingsError:
         raise
     except Exception as err:
-        raise ConfigError(key, given, 'python:module:attribute that can be imported ({!r})'.format(err)) from err
+        raise SettingsError(
+            key, given, 'python:module:attribute that can be imported ({!r})'.format(err)) from err
     if isinstance(found, (str, list, tuple, Mapping)):
-        raise ConfigError(key, given, 'the name of a callable or a smach.State')
+        raise SettingsError(key, given, 'the name of a callable or a smach.State')
     return parse_precondition(key, found)._replace(name=given[len(PYTHON):].rpartition(':')[2])
 
 
 def _halves(key: str, given: Mapping[str, Any]) -> List[Any]:
     if set(given) != {'check', 'achieve'}:
-        raise ConfigError(key, dict(given), 'exactly the keys check and achieve')
+        raise SettingsError(key, dict(given), 'exactly the keys check and achieve')
     return [given['check'], given['achieve']]
 
 
@@ -97,5 +113,6 @@ def _parse_pair(key: str, halves: List[Any], resolver: Optional[Resolver]) -> Pr
     check = parse_precondition(key + '.check', halves[0], resolver)
     achieve = parse_precondition(key + '.achieve', halves[1], resolver)
     if PreconditionKind.PAIR in (check.kind, achieve.kind):
-        raise ConfigError(key, halves, 'a pair of a check and an achieve, neither of them a pair')
-    return PreconditionSpec(PreconditionKind.PAIR, '{} or {}'.format(check.name, achieve.name), (check, achieve))
+        raise SettingsError(key, halves, 'a pair of a check and an achieve, neither of them a pair')
+    return PreconditionSpec(PreconditionKind.PAIR, '{} or {}'.format(check.name, achieve.name),
+                            (check, achieve))

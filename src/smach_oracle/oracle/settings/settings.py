@@ -1,20 +1,20 @@
 """The settings of the executive, validated. Pure; no smach.
 
-`Settings.from_dict` reads nested plain dictionaries, as YAML and rosparam give them. Every error is a ConfigError that
-names the dotted key, the value and what is allowed.
+`Settings.from_dict` reads nested plain dictionaries, as YAML and rosparam give them. Every error is
+a SettingsError that names the dotted key, the value and what is allowed.
 """
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
-from . import config_values as values
-from .errors import ConfigError
-from .failure_rate import ESTIMATORS
-from .interface_config import checked_interfaces
-from .naming import DEFAULT_FAILING_OUTCOMES
-from .policy import POLICIES
-from .precondition_spec import PreconditionSpec, Resolver, parse_preconditions
-from .question import InterfaceOffer
+from ..decision.failure_rate import ESTIMATORS
+from ..decision.policy import POLICIES
+from ..errors import SettingsError
+from ..settings.interfaces import InterfaceOffer
+from . import checks as values
+from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
+from .interfaces import checked_interfaces
+from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
 _MAX_HISTORY = 1000000  # visits; each question carries them all
 _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
@@ -58,7 +58,8 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'on_no_answer': values.on_no_answer,
     'escalate': values.flag,
     'watch_preconditions': values.flag,
-    'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY),
+    'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY),
+                                   _MAX_HISTORY),
     'rates_file': values.file,
     'oracle_label': values.label,
     'nested': values.flag,
@@ -67,7 +68,10 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a wrapped machine; `states` holds what is set for single states, by LABEL or PATH/LABEL."""
+    """Settings of a wrapped machine.
+
+    `states` holds what is set for single states, by LABEL or PATH/LABEL.
+    """
 
     defaults: StateSettings = StateSettings()
     policy: str = 'prose'
@@ -77,31 +81,43 @@ class Settings:
     deadline_s: float = 300.0  # 0: waits without end
     on_no_answer: Tuple[str, str] = ('stop', '')
     escalate: bool = True
-    watch_preconditions: bool = True  # whether callables among them may be called while a question is open
+    # whether callables among them may be called while a question is open
+    watch_preconditions: bool = True
     history_length: int = 50  # visits
     rates_file: str = ''
     oracle_label: str = 'ORACLE'
     nested: bool = True
-    interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()  # offer, states it serves ((): all)
+    # offer, states it serves ((): all)
+    interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()
     states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
-    def from_dict(cls, given: Optional[Mapping[str, Any]], resolver: Optional[Resolver] = None) -> 'Settings':
+    def from_dict(cls, given: Optional[Mapping[str, Any]],
+                  resolver: Optional[Resolver] = None) -> 'Settings':
         """Check a dictionary of settings.
 
-        `resolver` turns 'python:module:attribute' of a precondition into that object. Raises ConfigError.
+        `resolver` turns 'python:module:attribute' of a precondition into that object.
+
+        :raises SettingsError: naming key, value and what is allowed.
         """
         given = values.mapping('settings', given)
         allowed = sorted(list(_STATE_CHECKS) + list(_MACHINE_CHECKS) + ['states', 'interfaces'])
         _refuse_unknown('', given, allowed)
         defaults = _checked_defaults(given)
-        machine = {key: check(key, given[key]) for key, check in _MACHINE_CHECKS.items() if key in given}
+        machine = {
+            key: check(key, given[key])
+            for key, check in _MACHINE_CHECKS.items() if key in given
+        }
         states = {name: _checked_state(name, overrides, defaults, resolver)
                   for name, overrides in values.mapping('states', given.get('states')).items()}
-        return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')), states=states, **machine)
+        return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')),
+                   states=states, **machine)
 
     def for_state(self, path: str, label: str) -> StateSettings:
-        """Return the settings of state `label` in the container at `path` (relative to the top machine, '' itself)."""
+        """Return the settings of a state.
+
+        `path`: of its container, relative to the top machine, '' for that itself.
+        """
         merged: Dict[str, Any] = dict(self.states.get(label, {}))
         if path:
             merged.update(self.states.get('{}/{}'.format(path, label), {}))
@@ -109,10 +125,14 @@ class Settings:
 
     def with_states(self, states: Mapping[str, Mapping[str, Any]],
                     resolver: Optional[Resolver] = None) -> 'Settings':
-        """Return these settings with further settings of single states, which win. Raises ConfigError."""
+        """Return these settings with further settings of single states, which win.
+
+        :raises SettingsError: naming key, value and what is allowed.
+        """
         merged = {name: dict(overrides) for name, overrides in self.states.items()}
         for name, overrides in states.items():
-            merged.setdefault(name, {}).update(_checked_state(name, overrides, self.defaults, resolver))
+            merged.setdefault(name,
+                              {}).update(_checked_state(name, overrides, self.defaults, resolver))
         return replace(self, states=merged)
 
     def offers_for(self, path: str, label: str) -> Tuple[InterfaceOffer, ...]:
@@ -125,23 +145,29 @@ class Settings:
 def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
     for key in given:
         if key not in allowed:
-            raise ConfigError(prefix + key, given[key], 'one of the keys ' + ', '.join(allowed))
+            raise SettingsError(prefix + key, given[key], 'one of the keys ' + ', '.join(allowed))
 
 
 def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:
-    defaults = StateSettings(**{key: check(key, given[key]) for key, check in _STATE_CHECKS.items() if key in given})
+    defaults = StateSettings(
+        **{key: check(key, given[key])
+           for key, check in _STATE_CHECKS.items() if key in given})
     _check_thresholds('', defaults, given)
     return defaults
 
 
-def _checked_state(name: str, overrides: Any, defaults: StateSettings,
+def _checked_state(name: str, overrides: object, defaults: StateSettings,
                    resolver: Optional[Resolver]) -> Dict[str, Any]:
     prefix = 'states.{}.'.format(name)
     overrides = values.mapping(prefix[:-1], overrides)
     _refuse_unknown(prefix, overrides, sorted(list(_STATE_CHECKS) + ['preconditions']))
-    checked = {key: check(prefix + key, overrides[key]) for key, check in _STATE_CHECKS.items() if key in overrides}
+    checked = {
+        key: check(prefix + key, overrides[key])
+        for key, check in _STATE_CHECKS.items() if key in overrides
+    }
     if 'preconditions' in overrides:
-        checked['preconditions'] = parse_preconditions(prefix + 'preconditions', overrides['preconditions'], resolver)
+        checked['preconditions'] = parse_preconditions(prefix + 'preconditions',
+                                                       overrides['preconditions'], resolver)
     _check_thresholds(prefix, replace(defaults, **checked), checked)
     return checked
 
@@ -150,9 +176,9 @@ def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, 
     """Blame the threshold that was given, not the default of the other."""
     if settings.moderate_from > settings.high_from:
         if 'moderate_from' not in given:
-            raise ConfigError(prefix + 'high_from', settings.high_from,
+            raise SettingsError(prefix + 'high_from', settings.high_from,
                               'at least moderate_from, which is {}'.format(settings.moderate_from))
-        raise ConfigError(prefix + 'moderate_from', settings.moderate_from,
+        raise SettingsError(prefix + 'moderate_from', settings.moderate_from,
                           'at most high_from, which is {}'.format(settings.high_from))
 
 
@@ -161,10 +187,15 @@ PreconditionLists = Optional[Mapping[str, List[Any]]]
 
 
 def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Settings:
-    """Return checked settings, with preconditions added. Raises ConfigError."""
+    """Return checked settings, with preconditions added.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
     checked = settings if isinstance(settings, Settings) else Settings.from_dict(settings)
     if preconditions is None:
         return checked
     if not isinstance(preconditions, Mapping):
-        raise ConfigError('preconditions', preconditions, 'a mapping of state labels to lists')
-    return checked.with_states({label: {'preconditions': given} for label, given in preconditions.items()})
+        raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
+    return checked.with_states(
+        {label: {'preconditions': given}
+         for label, given in preconditions.items()})

@@ -1,0 +1,1 @@
+"""The question to an expert, and the answer (paper, section V)."""

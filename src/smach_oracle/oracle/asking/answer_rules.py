@@ -1,0 +1,83 @@
+"""Which answers fit a question: one rule for executive, servers and interfaces. Pure."""
+from typing import Callable, Dict, Iterable, Mapping, NamedTuple, Sequence
+
+from ..errors import AnswerError
+from .question import Answer, AnswerKind, Question, names
+
+
+class AnswerChoices(NamedTuple):
+    """What an answer may choose from."""
+
+    container: str  # path
+    failed_state: str
+    states: Mapping[str, str]  # label: why it cannot be entered now, '' where it can
+    supersede_outcomes: Sequence[str]
+    give_up_outcomes: Sequence[str]
+    interfaces: Sequence[str]
+    output_keys: Sequence[str]  # of the failed state
+
+
+def choices_of(question: Question) -> AnswerChoices:
+    """Return what an answer to a question may choose from."""
+    return AnswerChoices(question.container_path, question.failed_state,
+                   {choice.state: choice.blocked for choice in question.choices},
+                   [choice.outcome for choice in question.supersede_outcomes],
+                   question.give_up_outcomes, [offer.name for offer in question.interfaces],
+                   question.output_keys)
+
+
+def check_answer(answer: Answer, choices: AnswerChoices) -> None:
+    """Check an answer and the keys of its outputs.
+
+    :raises AnswerError: where it does not fit; the text says what would.
+    """
+    _CHECKS[answer.kind](answer, choices)
+    check_output_keys(answer.outputs or (), choices)
+
+
+def check_output_keys(keys: Iterable[str], choices: AnswerChoices) -> None:
+    """Check that outputs go to output keys of the failed state.
+
+    :raises AnswerError: where one does not.
+    """
+    unknown = [key for key in keys if key not in choices.output_keys]
+    if unknown:
+        raise AnswerError('{} has no output keys {}; allowed: {}'.format(
+            choices.failed_state, names(unknown), names(choices.output_keys)))
+
+
+def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
+    free = [state for state, blocked in choices.states.items() if not blocked]
+    if answer.state not in choices.states:
+        raise AnswerError('{} has no state {!r} to go to; allowed: {}'.format(
+            choices.container, answer.state, names(free)))
+    if choices.states[answer.state]:
+        raise AnswerError('{} cannot be entered now: {}; allowed: {}'.format(
+            answer.state, choices.states[answer.state], names(free)))
+
+
+def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
+    if answer.outcome not in choices.supersede_outcomes:
+        raise AnswerError('{} has no outcome {!r} to supersede it with; allowed: {}'.format(
+            choices.failed_state, answer.outcome, names(choices.supersede_outcomes)))
+
+
+def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:
+    if answer.outcome and answer.outcome not in choices.give_up_outcomes:
+        raise AnswerError(
+            '{} has no outcome {!r} to give up with; allowed: {}, or none at all'.format(
+                choices.container, answer.outcome, names(choices.give_up_outcomes)))
+
+
+def _check_interface(answer: Answer, choices: AnswerChoices) -> None:
+    if answer.interface not in choices.interfaces:
+        raise AnswerError('no interface {!r} is on offer for {}; allowed: {}'.format(
+            answer.interface, choices.failed_state, names(choices.interfaces)))
+
+
+_CHECKS: Dict[AnswerKind, Callable[[Answer, AnswerChoices], None]] = {
+    AnswerKind.GOTO: _check_goto,
+    AnswerKind.SUPERSEDE: _check_supersede,
+    AnswerKind.GIVE_UP: _check_give_up,
+    AnswerKind.INTERFACE: _check_interface,
+}

@@ -1,0 +1,1 @@
+"""From a situation to a decision: failure rates and policies (paper, IV). Pure; no smach."""

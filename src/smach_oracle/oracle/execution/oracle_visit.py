@@ -1,0 +1,142 @@
+"""One visit of the meta state: entered by a failure, left by a verdict (paper, section IV-A)."""
+from typing import Optional, Sequence, cast
+
+import smach
+
+from ..decision.policy import FailureContext
+from ..machine.failure import Failure, route_of
+from ..machine.learned_rates import save_rates
+from ..machine.node import Node
+from ..machine.snapshots import restore
+from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..records.events import EventKind
+from ..records.state_record import StateRecord
+from ..recovery.judging import in_words
+from ..recovery.recovery import Recovery
+from ..recovery.verdict import Verdict, VerdictKind
+from .oracle_state import OracleState
+from .transitions import go_to, message_of, terminate
+
+
+class OracleVisit:
+    """The way of one failure into the meta state and out of it."""
+
+    def __init__(self, node: Node, record: StateRecord, failure: Failure) -> None:
+        self._node = node
+        self._machine = node.machine
+        self._record = record
+        self._failure = failure
+
+    def run(self, context: FailureContext, continuous: bool) -> Optional[str]:
+        """Recover; return the container's outcome, or None where the machine goes on.
+
+        Where the oracle gives up, it raises what the machine would raise without one.
+        """
+        meta = self._enter()
+        verdict = self._recover(meta, Recovery(self._node, self._record, self._failure, context,
+                                               continuous))
+        if verdict.kind is VerdictKind.SUPERSEDE:
+            self._record.take_back_failure()
+            self._node.records.history.supersede(verdict.outcome)
+        return self._leave(meta, verdict)
+
+    def _enter(self) -> OracleState:
+        node, machine, failure = self._node, self._machine, self._failure
+        label, meta_label = self._record.label, node.settings.oracle_label
+        what = failure.outcome or failure.kind.name.lower()
+        smach.logwarn('{}/{} failed: {}'.format(node.path, label,
+                                                failure.details or in_words(failure)))
+        self._record.left_by(what, meta_label)
+        save_rates(node)
+        machine._sync_oracle()
+        node.emit(EventKind.TRANSITION, state=label, outcome=failure.outcome, target=meta_label)
+        # _sync_oracle refuses any other state of this name
+        meta = cast(OracleState, machine._states[meta_label])
+        go_to(node, message_of(label, what, meta_label), meta_label)
+        return meta
+
+    def _recover(self, meta: OracleState, recovery: Recovery) -> Verdict:
+        meta.begin(recovery)
+        if self._machine._preempt_requested:
+            meta.request_preempt()  # it came from a callback on the way here
+        lock = self._machine._state_transitioning_lock
+        lock.release()
+        try:
+            return meta.recover()
+        finally:
+            lock.acquire()
+
+    def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
+        if verdict.kind is VerdictKind.JUMP:
+            self._jump(verdict)
+            return None
+        if verdict.kind is VerdictKind.SUPERSEDE:
+            return self._supersede(verdict)
+        if verdict.kind is VerdictKind.PREEMPTED:
+            return self._preempted(meta, verdict)
+        return self._give_up(verdict)
+
+    def _jump(self, verdict: Verdict) -> None:
+        node, target = self._node, verdict.state
+        snapshot = node.record(target).snapshot
+        missing = missing_keys(self._machine, target,
+                               keys_after_jump(node, target, verdict.written))
+        restores = snapshot if node.settings.userdata == 'restore' else None
+        if restores is not None:
+            restore(self._machine.userdata._data, restores, verdict.written,
+                    node.in_force.deep_copy_keys)
+        if missing:
+            node.warn('jumping there without its input keys {}'.format(', '.join(missing)), target)
+        self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,
+                    verdict.text)
+
+    def _supersede(self, verdict: Verdict) -> Optional[str]:
+        route = route_of(self._machine, self._record.label, verdict.outcome)
+        self._node.emit(EventKind.SUPERSEDE, state=self._record.label, outcome=verdict.outcome,
+                        target=route.target, by=verdict.by, text=verdict.text)
+        if not route.is_state:
+            return self._terminate(route.target)
+        self._go_on(route.target, by=verdict.by)
+        return None
+
+    def _give_up(self, verdict: Verdict) -> Optional[str]:
+        ending, text = verdict.ending, verdict.text
+        told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
+        self._node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
+                        target=ending.state or '', by=verdict.by, text=told)
+        if ending.error is not None:
+            smach.logerr(str(ending.error))
+            raise ending.error
+        if ending.state is not None:
+            self._go_on(ending.state, by=verdict.by, text=text)
+            return None
+        return self._terminate(str(ending.outcome))
+
+    def _preempted(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
+        ending = verdict.ending
+        if self._machine.preempt_requested():
+            self._node.tell_preempt()
+        if ending.state is not None:  # the author's own transition: the request goes on with it
+            self._go_on(ending.state)
+            return None
+        meta.service_preempt()
+        self._machine.service_preempt()
+        if ending.error is not None:
+            raise ending.error
+        return self._terminate(str(ending.outcome))
+
+    def _go_on(self, target: str, userdata: str = 'keep', missing: Optional[Sequence[str]] = None,
+               by: str = '', text: str = '') -> None:
+        """Leave the meta state for a state."""
+        node = self._node
+        if missing is None:
+            missing = missing_keys(self._machine, target, self._machine.userdata._data)
+        node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
+                  data={'missing_keys': list(missing), 'userdata': userdata})
+        node.records.count_oracle_edge(target)
+        go_to(node, message_of(node.settings.oracle_label, target, target), target)
+
+    def _terminate(self, outcome: str) -> str:
+        """Leave the meta state for a container outcome."""
+        self._node.records.count_oracle_edge(outcome)
+        return terminate(self._node, self._node.settings.oracle_label, outcome, outcome)

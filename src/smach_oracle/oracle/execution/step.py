@@ -1,0 +1,182 @@
+"""What happens around a state, off the short way of a plain success in container.py."""
+from typing import Any, Optional
+
+import smach
+
+from ..machine.failure import (
+    ContainerEnding,
+    Failure,
+    Route,
+    author_recovers,
+    natural_ending,
+    visit_result,
+)
+from ..machine.node import Node
+from ..machine.userdata_gate import UserdataGate, behind
+from ..machine.userdata_view import view_of
+from ..records.events import EventKind, FailureKind
+from ..records.state_record import StateRecord
+from ..records.visits import VisitResult
+from ..recovery.judging import Overrun, judge
+from ..settings.failing_outcomes import PREEMPTED
+from .oracle_visit import OracleVisit
+from .transitions import go_to, message_of, terminate
+
+
+def before_step(node: Node) -> None:
+    """Before the first state of an execution, and before any state under a preempt request.
+
+    Under a request the state is preempted too, unless the last one has serviced the request.
+    """
+    if not node.engine.stepped:
+        node.begin_stepping()
+    if not node.machine.preempt_requested():
+        return
+    if node.engine.lock_is_held:
+        _pass_preempt_on(node)
+    else:
+        with node.machine._state_transitioning_lock:
+            _pass_preempt_on(node)
+
+
+def _pass_preempt_on(node: Node) -> None:
+    machine = node.machine
+    node.tell_preempt()
+    last = machine._preempted_state
+    if last is not None and not last.preempt_requested():
+        machine._preempt_requested = False
+        machine._preempted_state = machine._preempted_label = None
+        node.preempt_told = False
+        return
+    if last is not None:
+        last.recall_preempt()
+    current = machine._current_state
+    machine._preempted_state = current
+    machine._preempted_label = machine._current_label
+    # to our engine: who asked, and now waits for the lock, need not ask again
+    machine._is_preempt_passed_on = True
+    if current is not None:
+        current.request_preempt()
+
+
+class Step:
+    """One visit of a state: its execution where more is to be done than that, and its end."""
+
+    __slots__ = ('_node', '_machine', '_record')
+
+    def __init__(self, node: Node, record: StateRecord) -> None:
+        self._node = node
+        self._machine = node.machine
+        self._record = record
+
+    def execute(self, state: smach.State) -> object:
+        """Execute the state, watched; return its outcome, or an Overrun.
+
+        It raises what the state raises.
+        """
+        node, record = self._node, self._record
+        if node.in_force.deep_copy_keys:
+            record.snapshot = node.snapshot()
+        node.emit(EventKind.STATE_START, state=record.label)
+        blocked = node.tree.workers.blocked(state)
+        if blocked:
+            return Overrun(blocked)
+        if record.settings.time_limit_s is not None and node.tree.recover:
+            return self._execute_limited(state, record.settings.time_limit_s)
+        return state.execute(record.view.remapper)
+
+    def _execute_limited(self, state: smach.State, limit_s: float) -> object:
+        """Execute a state in a worker, as `execute` does."""
+        node, label = self._node, self._record.label
+
+        def on_late_write(key: str) -> None:
+            smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and is '
+                          'dropped'.format(node.path, label, key))
+
+        def make_view(gate: UserdataGate) -> smach.Remapper:
+            return view_of(self._machine, label, state, behind(gate))
+
+        result = node.tree.workers.run(state, make_view, UserdataGate(self._machine, on_late_write),
+                                       label, limit_s, self._record.settings.grace_period_s)
+        if result.error is not None:
+            raise result.error
+        return Overrun(result.overrun) if result.overrun else result.outcome
+
+    def ended(self, outcome: Any, error: Optional[Exception] = None) -> Optional[str]:
+        """Go on after the state has ended, through the oracle where it failed.
+
+        It returns the container's outcome, or None where the machine goes on.
+
+        :raises InvalidUserCodeError: as the machine would without an oracle.
+        :raises InvalidTransitionError: likewise.
+        """
+        node, record = self._node, self._record
+        judged = judge(node, record, outcome, error)
+        stopping = self._machine.preempt_requested() or smach.is_shutdown()
+        if self._machine.preempt_requested():
+            node.tell_preempt()
+        if isinstance(judged, Route):
+            result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
+            node.records.visit_ended(record, outcome, result)
+            return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)
+        if stopping:
+            node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
+            return self._end_unrecovered(self._preempted_ending(judged), judged)
+        return self._failed(judged)
+
+    def _failed(self, failure: Failure) -> Optional[str]:
+        node, record = self._node, self._record
+        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        node.records.note_failure(record)
+        continuous = node.in_force.policy.is_continuous(context)
+        # rate and class are those before this failure is counted
+        node.emit(EventKind.FAILURE, state=failure.state, outcome=failure.outcome,
+                  failure_kind=int(failure.kind), failure_class=int(record.failure_class),
+                  rate=record.rate, continuous=continuous, text=failure.text)
+        record.learn(True)
+        node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
+        if not node.tree.recover or self._author_recovers(failure):
+            return self._end_unrecovered(self._natural_ending(failure), failure)
+        return OracleVisit(node, record, failure).run(context, continuous)
+
+    def _author_recovers(self, failure: Failure) -> bool:
+        settings = self._record.settings
+        return failure.route is not None and author_recovers(
+            failure.outcome, failure.route, failure.kind, settings.failure_outcomes,
+            settings.author_recoveries)
+
+    def _natural_ending(self, failure: Failure) -> ContainerEnding:
+        return natural_ending(failure, self._machine.get_registered_outcomes(),
+                              self._node.in_force.failing)
+
+    def _preempted_ending(self, failure: Failure) -> ContainerEnding:
+        """Return how a failure ends the container while a preempt or a shutdown is under way.
+
+        An overrun ends it as preempted, all else as it would.
+        """
+        if (failure.kind is FailureKind.TIME_LIMIT
+                and PREEMPTED in self._machine.get_registered_outcomes()):
+            return ContainerEnding(outcome=PREEMPTED)
+        return self._natural_ending(failure)
+
+    def _end_unrecovered(self, ending: ContainerEnding, failure: Failure) -> Optional[str]:
+        if ending.error is not None:
+            if isinstance(ending.error, smach.InvalidUserCodeError):
+                smach.logerr("State '{}' ended in an error.".format(self._record.label))
+            raise ending.error
+        route = (Route(ending.state, True) if ending.state is not None
+                 else Route(str(ending.outcome), False))
+        return self._advance(failure.outcome, route)
+
+    def _advance(self, outcome: str, route: Route, learn: bool = False) -> Optional[str]:
+        """Make the transition that the author drew; `learn`: take the short way next time."""
+        node, label = self._node, self._record.label
+        self._record.left_by(outcome, route.target)
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target)
+        if not route.is_state:
+            return terminate(node, label, outcome, route.target)
+        message = message_of(label, outcome, route.target)
+        if learn:
+            node.records.add_edge(self._record, outcome, route.target, message)
+        go_to(node, message, route.target)
+        return None

@@ -1,0 +1,32 @@
+"""How a machine moves on: to a state, or to its end."""
+import smach
+
+from ..machine.node import Node
+from ..settings.failing_outcomes import PREEMPTED
+
+
+def go_to(node: Node, message: str, target: str) -> None:
+    """Make `target` the current state, log the transition, tell the callbacks."""
+    machine = node.machine
+    machine._set_current_state(target)
+    smach.loginfo(message)
+    machine.call_transition_cbs()
+
+
+def message_of(source: str, outcome: str, target: str) -> str:
+    """Return what SMACH logs of a transition."""
+    return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
+
+
+def terminate(node: Node, label: str, outcome: str, container_outcome: str) -> str:
+    """End the container; a preempt that its last state has serviced is serviced."""
+    machine = node.machine
+    last = machine._current_state
+    if machine._preempt_requested and last is not None and not last.preempt_requested() and (
+            machine._preempted_state is not None or container_outcome == PREEMPTED):
+        machine.service_preempt()
+    machine._set_current_state(None)
+    smach.loginfo("State machine terminating '{}':'{}':'{}'".format(
+        label, outcome, container_outcome))
+    machine.call_termination_cbs([label], container_outcome)
+    return container_outcome

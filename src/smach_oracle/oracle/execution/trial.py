@@ -1,0 +1,100 @@
+"""Trials: one execution of the top machine is one trial.
+
+Also what one execution of any container begins and ends.
+"""
+from typing import Any, Callable, Dict, Optional
+
+from ..machine.learned_rates import save_rates
+from ..machine.nesting import nodes_of
+from ..machine.node import Node, WrappedMachine
+from ..records.events import NO_OUTCOME, EventKind
+from ..records.facts import ENDED_BY, TrialEnd
+from ..records.rates_file import learned_by
+from .wrapping import adopt, bring_up_to_date
+
+
+def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
+    """Execute a container; where no container above it runs, this is a trial."""
+    node = machine._oracle
+    if node.has_running_ancestor():
+        return _run(node, execute)
+    adopt(machine)
+    for each in nodes_of(machine):
+        bring_up_to_date(each)
+    node.tree.begin_trial(machine.new_trial_id())
+    for each in nodes_of(machine):
+        # one that still runs was abandoned in an earlier trial, and is left there
+        if not each.machine.is_running():
+            each.begin_trial(node.tree.trial_id)
+    return _run_trial(node, execute)
+
+
+def _run_trial(node: Node, execute: Callable[[], Optional[str]]) -> Optional[str]:
+    node.emit(EventKind.TRIAL_START, data={
+        'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
+        'settings': _settings(node)})
+    outcome: Optional[str] = None
+    error: Optional[BaseException] = None
+    try:
+        outcome = _run(node, execute)
+        return outcome
+    except BaseException as err:
+        error = err
+        raise
+    finally:
+        node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
+                  data={ENDED_BY: _trial_end(node, outcome, error).value, **_learned(node)})
+        save_rates(node)
+
+
+def _settings(node: Node) -> Dict[str, Any]:
+    """What the oracle of the top machine decides by, but for what is set for single states."""
+    settings, defaults = node.settings, node.settings.defaults
+    return {'policy': settings.policy, 'memory': defaults.memory, 'estimator': defaults.estimator,
+            'prior': defaults.prior, 'moderate_from': defaults.moderate_from,
+            'high_from': defaults.high_from, 'max_recoveries': defaults.max_recoveries}
+
+
+def _learned(node: Node) -> Dict[str, Any]:
+    """What was learned so far, where it is kept in a file.
+
+    A record of the trial then has all that is needed to go on after it.
+    """
+    if not node.settings.rates_file:
+        return {}
+    return {'learned': learned_by(nodes_of(node.machine))}
+
+
+def _trial_end(node: Node, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
+    if isinstance(error, (KeyboardInterrupt, SystemExit)):
+        return TrialEnd.STOPPED
+    if error is not None:
+        return TrialEnd.ERROR
+    if outcome is not None:
+        return TrialEnd.OUTCOME
+    return TrialEnd.SHUTDOWN if node.engine.stepped else TrialEnd.INCONSISTENT
+
+
+def _run(node: Node, execute: Callable[[], Optional[str]]) -> Optional[str]:
+    machine = node.machine
+    node.begin_execution()
+    node.emit(EventKind.CONTAINER_START, state=machine._initial_state_label or '')
+    outcome: Optional[str] = None
+    error: Optional[BaseException] = None
+    try:
+        outcome = execute()
+        return outcome
+    except BaseException as err:
+        machine._is_running = False  # also after what no engine cleans up after, such as Ctrl-C
+        error = err
+        raise
+    finally:
+        node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=_why(outcome, error))
+        node.records.drop_snapshots()
+
+
+def _why(outcome: Optional[str], error: Optional[BaseException]) -> str:
+    """Why an execution has no outcome, '' where it has one."""
+    if error is not None:
+        return '{}: {}'.format(type(error).__name__, error)
+    return NO_OUTCOME if outcome is None else ''

@@ -1,0 +1,144 @@
+"""Whole trees: puts a machine, and the machines nested in it, under one oracle each."""
+from typing import Any, cast
+
+import smach
+
+from ..errors import SettingsError
+from ..machine.learned_rates import load_rates
+from ..machine.nesting import containers_in, machines_below, nodes_of
+from ..machine.node import Node, WrappedMachine
+from ..machine.protocols import Labels
+from ..machine.tree import Tree
+from ..settings.settings import Settings
+from .settings_check import check_preconditions, check_state_names
+from .wrapped_classes import change_class, two_classes
+
+
+def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: bool,
+                 name: str, strict: bool) -> WrappedMachine:
+    """Wrap a machine and what is nested in it; see OracleContainer.wrap.
+
+    A machine that is wrapped already keeps its tree, and takes over from `tree` what is new.
+
+    :raises SettingsError: for what is no machine or cannot be wrapped, and for settings that do not
+        fit it; a bare machine then stays bare.
+    """
+    if not isinstance(given, smach.StateMachine):
+        raise SettingsError('machine', given, 'a smach.StateMachine')
+    if isinstance(given, tree.container_class):
+        return _wrap_again(cast(WrappedMachine, given), tree, settings, nested, name, strict)
+    try:
+        machine = _put_under(given, oracle_class, tree, settings, name)
+        _put_in_order(machine, settings, nested, strict)
+    except SettingsError:  # as if nobody had tried
+        _unwrap(given, tree)
+        raise
+    return machine
+
+
+def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, settings: Settings,
+               name: str) -> WrappedMachine:
+    change_class(machine, oracle_class)
+    wrapped = cast(WrappedMachine, machine)
+    wrapped._oracle = Node(wrapped, tree, settings, name)
+    return wrapped
+
+
+def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, strict: bool) -> None:
+    top = machine._oracle
+    top.strict = strict
+    top.nested = nested
+    adopt(machine)
+    _configure(machine, settings)
+    for node in nodes_of(machine):
+        node.strict = strict
+    check_state_names(top)
+    for node in nodes_of(machine):
+        bring_up_to_date(node)
+
+
+def bring_up_to_date(node: Node) -> None:
+    """Take notice of states added since.
+
+    :raises SettingsError: where the settings do not fit them.
+    """
+    node.machine._sync_oracle()
+    if len(node.machine._states) != node.checked_states:
+        check_preconditions(node)
+        node.checked_states = len(node.machine._states)
+    load_rates(node)
+
+
+def _configure(machine: WrappedMachine, settings: Settings) -> None:
+    """Hand the settings to a machine and to those below it that have none of their own."""
+    for node in nodes_of(machine):
+        if node.machine is machine or node.inherits:
+            node.configure(settings)
+
+
+def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: bool, name: str,
+                strict: bool) -> WrappedMachine:
+    top = machine._oracle
+    before = top.settings
+    try:
+        for container in containers_in(machine):
+            container._remove_oracle()
+        top.tree.recover = tree.recover
+        top.name = name or top.name
+        if tree.expert is not None:
+            top.tree.expert = tree.expert
+        _configure(machine, settings)
+        _put_in_order(machine, settings, nested, strict)
+    except SettingsError:
+        _configure(machine, before)
+        raise
+    return machine
+
+
+def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
+    """Give a machine that could not be wrapped, and what was wrapped with it, back as it was."""
+    if not isinstance(machine, tree.container_class):
+        return
+    for container in containers_in(cast(WrappedMachine, machine)):
+        made_of = two_classes(type(container))
+        if made_of is not None and (container is machine or container._oracle.inherits):
+            container._remove_oracle()
+            unwrapped: Any = container
+            unwrapped.__class__ = made_of[1]
+            del unwrapped.__dict__['_oracle']
+
+
+def adopt(machine: WrappedMachine) -> None:
+    """Wrap what is nested in a wrapped machine and is not wrapped yet, into one tree with it.
+
+    :raises SettingsError: for a machine whose class cannot be extended.
+    """
+    parent = machine._oracle
+    for below, child in machines_below(machine):
+        if isinstance(child, parent.tree.container_class):
+            container = cast(WrappedMachine, child)
+        elif parent.nested:
+            container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings,
+                                   '')
+            container._oracle.inherits = True
+            container._oracle.strict = parent.strict
+        else:
+            continue
+        node = container._oracle
+        if container is not machine and (node.parent is None or node.tree is not parent.tree):
+            _move_below(node, parent, below)
+        node.nested = parent.nested
+        adopt(container)
+
+
+def _move_below(node: Node, parent: Node, below: Labels) -> None:
+    """Make a wrapped machine one below `parent`.
+
+    It may have been on its own, or below another machine, before.
+    """
+    node.machine._remove_oracle()  # it may go by another name here, or not be wanted
+    node.parent, node.below = parent, below
+    node.join(parent.tree)
+    if node.inherits:
+        node.strict = parent.strict
+    node.configure(parent.settings if node.inherits else node.settings)

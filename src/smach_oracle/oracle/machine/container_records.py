@@ -1,0 +1,94 @@
+"""What one container remembers: its states' records, its history, the ways out of its oracle."""
+import copy
+from typing import Any, Dict, Mapping
+
+from ..decision.policy import FailureContext
+from ..records.history import History
+from ..records.state_record import FastEdge, StateRecord
+from ..records.visits import Visit, VisitResult
+from ..settings.settings import StateSettings
+
+
+class ContainerRecords:
+    """`by_label` holds the records of the states that were needed so far."""
+
+    def __init__(self, history_length: int) -> None:
+        self.by_label: Dict[str, StateRecord] = {}
+        self.history = History(history_length)
+        self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
+        # what a rates file says of states that are not there yet
+        self._to_come: Dict[str, Dict[str, Any]] = {}
+
+    def make(self, label: str, settings: StateSettings, special: bool) -> StateRecord:
+        """Make the record of a state, with what a rates file says of it."""
+        record = self.by_label[label] = StateRecord(label, settings, special)
+        learned = self._to_come.pop(label, None)
+        if learned is not None:
+            record.restore(learned)
+        return record
+
+    def learned(self) -> Dict[str, Any]:
+        """Return what was learned of each state, as plain data."""
+        learned = dict(self._to_come)
+        learned.update((label, record.learned()) for label, record in list(self.by_label.items()))
+        return learned
+
+    def take_over(self, label: str, settings: StateSettings, learned: Mapping[str, Any]) -> None:
+        """Take over what was learned of a state, which may not be there yet.
+
+        :raises ValueError: where it cannot be read.
+        """
+        StateRecord(label, settings).restore(learned)  # raises here, not in the middle of a trial
+        if label in self.by_label:
+            self.by_label[label].restore(learned)
+        else:
+            self._to_come[label] = dict(learned)
+
+    def begin_trial(self) -> None:
+        """Forget what belongs to a trial; the rates stay."""
+        self.history.begin_trial()
+        for record in self.by_label.values():
+            record.begin_trial()
+
+    def drop_snapshots(self) -> None:
+        """Let go of the userdata that snapshots refer to."""
+        for record in self.by_label.values():
+            record.snapshot = None
+
+    def visit_ended(self, record: StateRecord, outcome: str, result: VisitResult) -> None:
+        """Add a visit to the history, and a success to the rate.
+
+        A failure is learned when it is judged.
+        """
+        if result is VisitResult.SUCCESS:
+            record.learn(False)
+        record.visit_ended()
+        self.history.visited(Visit(record.label, outcome, result), record.has_preconditions)
+
+    def add_edge(self, record: StateRecord, outcome: str, target: str, message: str) -> None:
+        """Let the next success of this kind take the short way through the records."""
+        if outcome in record.fast:
+            record.retire_edge(outcome)
+        record.fast[outcome] = FastEdge(target, message,
+                                    Visit(record.label, outcome, VisitResult.SUCCESS))
+
+    def count_oracle_edge(self, target: str) -> None:
+        """Count a way out of the meta state."""
+        self.oracle_edges[target] = self.oracle_edges.get(target, 0) + 1
+
+    def failure_context(self, record: StateRecord, initial: str) -> FailureContext:
+        """Return what the visits say about a failure of a state; changes nothing."""
+        return self.history.failure_context(record.label, initial, record.totals[0])
+
+    def note_failure(self, record: StateRecord) -> None:
+        """Note in the history that a state has failed, before its visit is added."""
+        self.history.failed(record.label, record.totals[0])
+
+    def twin(self) -> 'ContainerRecords':
+        """Return records for a shallow copy of the machine, which learns on its own."""
+        twin = copy.copy(self)
+        twin.by_label = copy.deepcopy(self.by_label)
+        twin.history = copy.deepcopy(self.history)
+        twin.oracle_edges = dict(self.oracle_edges)
+        twin._to_come = dict(self._to_come)
+        return twin

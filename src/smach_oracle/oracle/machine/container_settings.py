@@ -1,0 +1,33 @@
+"""The settings in force in one container."""
+from typing import Any, Dict
+
+from ..decision.policy import Policy, policy_named
+from ..settings.failing_outcomes import FailingNames
+from ..settings.settings import Settings, StateSettings
+
+
+class ContainerSettings:
+    """Those of the whole machine, those given with `add()`, and what follows from them."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.given_with_add: Dict[str, Dict[str, Any]] = {}  # by label
+        self.use(settings)
+
+    def use(self, settings: Settings) -> None:
+        """Put settings of the whole machine into force; those given with `add()` stay."""
+        self.of_machine = settings
+        self.policy: Policy = policy_named(settings.policy)
+        self.failing = FailingNames(settings.failing_outcomes)
+        self.deep_copy_keys = settings.deep_copy_keys
+
+    def of_state(self, path: str, label: str) -> StateSettings:
+        """Return the settings of a state of the container at `path`, relative to the top machine.
+
+        What was given with `add()` counts unless the same key is set from outside.
+        """
+        own = self.given_with_add.get(label)
+        settings = self.of_machine
+        if own:
+            settings = settings.with_states(
+                {label: {**own, **dict(settings.states.get(label, {}))}})
+        return settings.for_state(path, label)

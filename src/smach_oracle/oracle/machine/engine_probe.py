@@ -1,0 +1,40 @@
+"""What the engine is like that executes a machine."""
+import smach
+
+from .protocols import Machine
+
+
+class EngineProbe:
+    """Looked at when an execution comes to its first state.
+
+    `lock_is_held`: whether the engine holds the machine's lock around a step. `attentive`: whether
+    a step begins with a closer look at preempt requests. `tells_transitions`: whether the machine's
+    class wants every transition told. `stepped`: whether this execution has come to a state.
+    """
+
+    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'tells_transitions')
+
+    def __init__(self) -> None:
+        self.stepped = False
+        self.lock_is_held = False
+        self.attentive = True
+        self.tells_transitions = True
+
+    def begin_execution(self) -> None:
+        """Forget what was seen: the next step looks again."""
+        self.stepped = False
+        self.attentive = True
+
+    def look(self, machine: Machine) -> None:
+        """Find out how this engine steps.
+
+        Some engines hold the lock around a step, with a plain lock all do; others leave it to the
+        step.
+        """
+        self.stepped = True
+        # of a re-entrant lock
+        is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
+        self.lock_is_held = is_owned is None or is_owned()
+        cls = type(machine)
+        self.attentive = cls.preempt_requested is not smach.State.preempt_requested
+        self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs

@@ -1,0 +1,54 @@
+"""Userdata as it was: snapshots, and their restore."""
+import copy
+import pickle
+from typing import Any, Callable, Dict, Iterable, Mapping, Optional
+
+
+def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
+                  warn: Callable[[str], None]) -> Dict[str, Any]:
+    """Return the userdata as it is now.
+
+    It holds references; `deep_copy_keys` are copied through and through.
+    """
+    snapshot = dict(data)
+    for key in deep_copy_keys:
+        if key in snapshot:
+            try:
+                snapshot[key] = copy.deepcopy(snapshot[key])
+            except Exception as err:
+                # whatever a user's object raises: a reference is better than a dead machine
+                warn('Userdata key {!r} cannot be deep-copied, a reference is kept: {!r}'.format(
+                    key, err))
+    return snapshot
+
+
+def restore(data: Dict[str, Any], snapshot: Mapping[str, Any], keep: Iterable[str],
+            deep_copy_keys: Iterable[str]) -> None:
+    """Make `data` in place what it was at `snapshot`, but for the keys in `keep`.
+
+    In place, because scripts hold on to the dictionary. Deep copies are handed out as copies, so
+    that the snapshot itself stays what it was.
+    """
+    kept = set(keep)
+    deep = set(deep_copy_keys)
+    for key, value in snapshot.items():
+        if key not in kept:
+            data[key] = copied(value) if key in deep else value
+    for key in list(data):
+        if key not in snapshot and key not in kept:
+            del data[key]
+
+
+def copied(value: object) -> object:
+    try:
+        return copy.deepcopy(value)
+    except Exception:  # it could not be copied at entry either, and that was said then
+        return value
+
+
+def fingerprint(value: object) -> Optional[bytes]:
+    """Return bytes that differ where the value differs; None where that cannot be told."""
+    try:
+        return pickle.dumps(value)  # written to compare, never loaded
+    except Exception:  # unpicklable: only an assignment can be told
+        return None

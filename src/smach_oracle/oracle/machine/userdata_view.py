@@ -1,0 +1,121 @@
+"""What a state reads and writes: the container's userdata by the state's own key names."""
+from collections.abc import MutableMapping
+from typing import Any, Collection, Iterable, Iterator, Mapping, Tuple
+
+import smach
+
+from .node import Node
+from .protocols import Machine
+
+
+class _WithConstants(MutableMapping):
+    """A userdata dictionary in which some keys read as constants; writes go to the dictionary."""
+
+    def __init__(self, userdata: smach.UserData, fixed: Mapping[str, Any]) -> None:
+        self._userdata = userdata
+        self._fixed = fixed
+
+    def __getitem__(self, key: str) -> object:
+        return self._fixed[key] if key in self._fixed else self._userdata._data[key]
+
+    def __setitem__(self, key: str, value: object) -> None:
+        self._userdata._data[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        del self._userdata._data[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(set(self._fixed).union(self._userdata._data))
+
+    def __len__(self) -> int:
+        return len(set(self._fixed).union(self._userdata._data))
+
+
+def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
+    """Return the constants given with a state; engines without constants have none."""
+    return (getattr(machine, '_constants', None) or {}).get(label) or {}
+
+
+def view_of(machine: Machine, label: str, state: smach.State,
+            userdata: smach.UserData) -> smach.Remapper:
+    """Return what a state reads and writes, by its own key names.
+
+    `label` is '' for a state that is not in the machine.
+    """
+    remapping = machine._remappings.get(label) or {} if label else {}
+    constants = constants_of(machine, label)
+    if constants:
+        shown: Any = smach.UserData()
+        shown._data = _WithConstants(
+            userdata, {remapping.get(key, key): value
+                       for key, value in constants.items()})
+        userdata = shown
+    return smach.Remapper(userdata, state.get_registered_input_keys(),
+                          state.get_registered_output_keys(), remapping)
+
+
+def _keeps_key_sets() -> bool:
+    """Whether a Remapper of this engine sees keys that a state declares later."""
+    userdata, keys = smach.UserData(), {'before'}
+    userdata._data['after'] = None
+    remapper = smach.Remapper(userdata, keys, keys, {})
+    keys.add('after')
+    return 'after' in remapper
+
+
+_KEEPS_KEY_SETS = _keeps_key_sets()
+
+
+class StateView:
+    """What a state reads and writes, kept for its next visit where that is safe.
+
+    This engine and the state's class decide that.
+
+    It may be used again while nothing that it was made of has been exchanged: the machine looks at
+    each visit.
+    """
+
+    __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
+
+    def __init__(self, machine: Machine, label: str, state: smach.State) -> None:
+        self.remapping = machine._remappings[label]
+        self.userdata = machine.userdata
+        self.state = None  # what no state is: made for one visit
+        if _KEEPS_KEY_SETS and _has_plain_keys(state) and not constants_of(machine, label):
+            self.state = state
+            self.input_keys, self.output_keys = state._input_keys, state._output_keys
+            self.remapper = smach.Remapper(machine.userdata, self.input_keys, self.output_keys,
+                                           self.remapping)
+        else:
+            self.remapper = view_of(machine, label, state, machine.userdata)
+
+
+def _has_plain_keys(state: smach.State) -> bool:
+    """Whether the state declares its keys as `smach.State` does, in sets."""
+    methods = ('get_registered_input_keys', 'get_registered_output_keys')
+    return isinstance(state, smach.State) and all(
+        getattr(getattr(state, name), '__func__', None) is getattr(smach.State, name)
+        for name in methods)
+
+
+def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tuple[str, ...]:
+    """Return the input keys of a state that are not among the `available` keys.
+
+    They are named as the state names them; `available` are keys of the container.
+    """
+    present = set(available)
+    remapping = machine._remappings.get(label) or {}
+    constants = constants_of(machine, label)
+    inputs = machine._states[label].get_registered_input_keys()
+    return tuple(
+        sorted(key for key in inputs
+               if key not in constants and remapping.get(key, key) not in present))
+
+
+def keys_after_jump(node: Node, label: str, written: Collection[str]) -> Tuple[str, ...]:
+    """Return the container's userdata keys as they would be after a jump to a state."""
+    now = node.machine.userdata._data
+    snapshot = node.record(label).snapshot
+    if node.settings.userdata == 'keep' or snapshot is None:
+        return tuple(now)
+    return tuple(set(snapshot).difference(written).union(key for key in written if key in now))

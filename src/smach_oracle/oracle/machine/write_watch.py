@@ -1,0 +1,73 @@
+"""Which keys of a container's userdata were written, whoever wrote them; and taking that back."""
+from typing import Any, Dict, Iterable, NamedTuple, Optional, Set
+
+from .protocols import Machine
+from .snapshots import copied, fingerprint
+from .userdata_gate import UserdataGate
+
+
+class UserdataMark(NamedTuple):
+    """Userdata at a moment, and the keys written until then.
+
+    `copies` and `prints` (fingerprints) are those of the deep-copied keys.
+    """
+
+    data: Dict[str, Any]
+    copies: Dict[str, Any]
+    prints: Dict[str, Optional[bytes]]
+    written: Set[str]
+
+
+class WriteWatch:
+    """Finds the keys of a container's userdata that change, whoever writes them.
+
+    It compares the moment when it is made with that of `written`.
+
+    Writes through the gate are recorded; writes past it (a precondition that holds the machine
+    itself) show as another object under the key; changes in place show for `deep_copy_keys`, by a
+    fingerprint.
+    """
+
+    def __init__(self, machine: Machine, deep_copy_keys: Iterable[str]) -> None:
+        self._machine = machine
+        self._deep = tuple(deep_copy_keys)
+        self.gate = UserdataGate(machine)
+        self._before = dict(machine.userdata._data)
+        self._prints = {
+            key: fingerprint(self._before[key])
+            for key in self._deep if key in self._before
+        }
+
+    def begin(self) -> UserdataMark:
+        """Begin with what may be taken back."""
+        data = dict(self._machine.userdata._data)
+        copies = {key: copied(data[key]) for key in self._deep if key in data}
+        return UserdataMark(data, copies, {key: fingerprint(data[key])
+                                    for key in copies}, set(self.gate.written))
+
+    def take_back(self, begun: UserdataMark) -> None:
+        """Make the userdata what it was; it no longer counts as written.
+
+        Objects that were changed inside stay changed, but for the deep-copied keys.
+        """
+        data = self._machine.userdata._data
+        for key, value in begun.data.items():
+            if key in begun.prints and fingerprint(value) != begun.prints[key]:
+                if self._before.get(key) is value and self._prints.get(key) == begun.prints[key]:
+                    self._before[key] = begun.copies[key]
+                value = begun.copies[key]
+            data[key] = value
+        for key in set(data).difference(begun.data):
+            del data[key]
+        self.gate.written.intersection_update(begun.written)
+
+    def written(self) -> Set[str]:
+        """Return the keys set, deleted or changed so far."""
+        now = dict(self._machine.userdata._data)
+        keys = set(self.gate.written)
+        keys.update(key for key in now
+                    if key not in self._before or now[key] is not self._before[key])
+        keys.update(key for key in self._before if key not in now)
+        keys.update(key for key, seen in self._prints.items()
+                    if key in now and fingerprint(now[key]) != seen)
+        return keys

@@ -1,0 +1,1 @@
+"""What the executive remembers and reports: visits, rates, events. No ROS."""

@@ -1,0 +1,60 @@
+"""Facts about a trial that events carry in their `data`: who decided, and why the trial ended.
+
+Bags that were recorded before events carried them tell the same by the words of a text; those words
+are known here and nowhere else. Pure; no smach.
+"""
+from enum import Enum
+from typing import Any, Mapping, Optional
+
+from .events import NO_OUTCOME, Event
+
+DECIDED_BY = 'decided_by'  # key in the data of DECISION
+ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
+
+_OLD_SPENT = ' spent on it'
+_OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
+
+
+class Decider(str, Enum):
+    """What made a decision."""
+
+    POLICY = 'policy'
+    MAX_RECOVERIES = 'max_recoveries'  # the limit, outside every policy
+
+
+class TrialEnd(str, Enum):
+    """Why a trial ended."""
+
+    OUTCOME = 'outcome'
+    ERROR = 'error'  # an exception left the machine
+    STOPPED = 'stopped'  # Ctrl-C or SystemExit
+    SHUTDOWN = 'shutdown'  # while states ran; the machine has no outcome
+    INCONSISTENT = 'inconsistent'  # no state was entered
+
+
+def decided_by(event: Event) -> Decider:
+    """Return what made the decision of a DECISION event."""
+    stated = _stated(event, DECIDED_BY)
+    if stated in [each.value for each in Decider]:
+        return Decider(stated)
+    old = event.text.endswith(_OLD_SPENT)
+    return Decider.MAX_RECOVERIES if old else Decider.POLICY
+
+
+def ended_by(event: Event, entered_a_state: bool) -> TrialEnd:
+    """Return why a trial ended, by its TRIAL_END event.
+
+    :param entered_a_state: whether the trial has a STATE_START; needed for old bags alone.
+    """
+    stated = _stated(event, ENDED_BY)
+    if stated in [each.value for each in TrialEnd]:
+        return TrialEnd(stated)
+    if event.text.startswith(_OLD_STOPPED):
+        return TrialEnd.STOPPED
+    if event.text == NO_OUTCOME:
+        return TrialEnd.SHUTDOWN if entered_a_state else TrialEnd.INCONSISTENT
+    return TrialEnd.OUTCOME if event.outcome else TrialEnd.ERROR
+
+
+def _stated(event: Event, key: str) -> Optional[Any]:
+    return event.data.get(key) if isinstance(event.data, Mapping) else None

@@ -1,0 +1,20 @@
+"""Visits of states, and how each counts. Pure; no smach."""
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class VisitResult(IntEnum):
+    """How a visit counts; the numbers are those of VisitedState.msg."""
+
+    SUCCESS = 1
+    FAILURE = 2
+    SUPERSEDED = 3
+    PREEMPTED = 4
+
+
+class Visit(NamedTuple):
+    """One visit of a state that has ended."""
+
+    state: str
+    outcome: str  # '' where it raised or ran over its time limit
+    result: VisitResult

@@ -1,0 +1,1 @@
+"""From one failure to a verdict: judged, preconditions run, decided, asked (paper, IV-C)."""

@@ -1,0 +1,256 @@
+"""One failure, from the policy's question to the verdict (paper, Algorithm 1)."""
+import threading
+from typing import Any, List, Mapping, Tuple
+
+import smach
+
+from ..asking.inquiry import Inquiry
+from ..asking.question import Answer, AnswerKind, Expert, Question, names
+from ..decision.failure_rate import FailureClass
+from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..machine.failure import ContainerEnding, Failure, natural_ending
+from ..machine.node import Node
+from ..machine.write_watch import WriteWatch
+from ..records.events import EventKind
+from ..records.facts import DECIDED_BY, Decider
+from ..records.state_record import StateRecord
+from ..settings.failing_outcomes import PREEMPTED
+from ..settings.preconditions import PreconditionSpec
+from .precondition_runner import PreconditionRunner
+from .question_making import Account, make_question
+from .verdict import Verdict, VerdictKind
+
+
+class Recovery:
+    """The recovery from one failure.
+
+    `run` is called in the machine's thread, `cancel` from any thread. It asks as an
+    `inquiry.Asker`, and it alone makes the verdict.
+    """
+
+    def __init__(self, node: Node, record: StateRecord, failure: Failure, context: FailureContext,
+                 continuous: bool) -> None:
+        self._node = node
+        self._machine = node.machine
+        self._record = record
+        self._failure = failure
+        self._context = context
+        self._continuous = continuous
+        self._cancelled = threading.Event()
+        self._reason = ''
+        self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
+        self._preconditions = PreconditionRunner(node, self._watch)
+        self.tried: List[str] = []
+        self.query_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
+
+    def cancel(self) -> None:
+        """End the recovery soon: preempt what runs, take the question back."""
+        self._cancelled.set()
+        self.query_cancelled.set()
+        self._preconditions.cancel()
+
+    def stopped(self) -> bool:
+        """Whether a preempt or a shutdown ends the recovery."""
+        return self._cancelled.is_set() or smach.is_shutdown()
+
+    def run(self) -> Verdict:
+        """Decide, and ask where the policy says so."""
+        decider = Decider.MAX_RECOVERIES if self._limit_is_reached() else Decider.POLICY
+        action, target = self._decide(decider)
+        if self.stopped():
+            return self._preempted()
+        record = self._record
+        self.emit(EventKind.DECISION, outcome=action.value, target=target,
+                  failure_class=int(record.failure_class), rate=record.rate,
+                  continuous=self._continuous, text=self._reason,
+                  data={DECIDED_BY: decider.value})
+        if action is Action.ASK:
+            return self._ask()
+        record.recoveries += 1
+        return self._jump(target)
+
+    # -- deciding
+
+    def _limit_is_reached(self) -> bool:
+        return self._record.recoveries >= self._record.settings.max_recoveries
+
+    def _decide(self, decider: Decider) -> Tuple[Action, str]:
+        record, policy = self._record, self._node.in_force.policy
+        if decider is Decider.MAX_RECOVERIES:
+            count = record.recoveries
+            self._reason = '{} of this trial {} spent on it'.format(
+                '1 recovery' if count == 1 else '{} recoveries'.format(count),
+                'is' if count == 1 else 'are')
+            return Action.ASK, ''
+        failure_class = record.failure_class
+        preconditions = self._run_preconditions(failure_class)
+        action = policy.decide(Situation(failure_class, preconditions, self._continuous))
+        self._reason = '{}: {}, preconditions {}, {}continuous'.format(
+            policy.name, failure_class.name, preconditions.value,
+            '' if self._continuous else 'not ')
+        if action is Action.ASK:
+            return action, ''
+        revisits = action is Action.REVISIT
+        return self._checked(action,
+                             record.label if revisits else policy.step_back_target(self._context))
+
+    def _checked(self, action: Action, target: str) -> Tuple[Action, str]:
+        why = self._blocked(target)
+        if not why:
+            return action, target
+        self._reason += '; {} to {} is not possible: it {}'.format(action.value, target, why)
+        return Action.ASK, ''
+
+    def _blocked(self, label: str) -> str:
+        """Return why a state cannot be entered now, '' where it can."""
+        return self._node.tree.workers.blocked(self._machine._states[label])
+
+    def _run_preconditions(self, failure_class: FailureClass) -> Preconditions:
+        specs = self._record.settings.preconditions
+        if not specs:
+            return Preconditions.NONE
+        if not self._node.in_force.policy.runs_preconditions(failure_class):
+            return Preconditions.NOT_MET
+        for spec in specs:
+            if self.stopped() or not self._run_precondition(spec):
+                return Preconditions.NOT_MET
+        return Preconditions.MET
+
+    def _run_precondition(self, spec: PreconditionSpec) -> bool:
+        self.emit(EventKind.PRECONDITION_START, target=spec.name)
+        why_not = self._preconditions.run(spec)
+        outcome = 'not met' if why_not else 'met'
+        self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
+        self.tried.append('precondition {}: {}'.format(
+            spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
+        return not why_not
+
+    # -- asking
+
+    def _ask(self) -> Verdict:
+        node = self._node
+        if node.settings.escalate and node.has_running_ancestor():
+            return self._give_up('handed to the oracle above: ' + self._reason)
+        expert = node.tree.expert
+        if expert is None:
+            return self._fall_back('no expert is there to ask')
+        return self._ask_expert(expert)
+
+    def _ask_expert(self, expert: Expert) -> Verdict:
+        reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
+        if self.stopped():
+            if reply.query_id:
+                self.emit(EventKind.QUERY_CANCELLED, query_id=reply.query_id,
+                          text='preempted' if self._cancelled.is_set() else 'shutdown')
+            return self._preempted()
+        if reply.answer is not None:
+            return self._obey(reply.answer)._replace(query_id=reply.query_id)
+        self.emit(EventKind.QUERY_EXPIRED, query_id=reply.query_id,
+                  text='{}; fallback: {}'.format(reply.why_none, self._fallback_in_words()))
+        return self._fall_back(reply.why_none)
+
+    def make_question(self, deadline_s: float) -> Question:
+        """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
+        account = Account(self._continuous, self._reason, tuple(self.tried), self._watch.written(),
+                          self._fallback_in_words())
+        return make_question(self._node, self._record, self._failure, account, deadline_s)
+
+    def say_that_it_waits(self, question: Question) -> None:
+        """In the log: a machine that stands still for minutes looks as if it hung."""
+        fallback = ' '.join(self._node.settings.on_no_answer).strip()
+        limit = 'it waits on'
+        if question.deadline_s:
+            limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback)
+        smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
+            self._node.path, self._record.label, question.query_id, limit))
+
+    def states_now(self) -> Mapping[str, str]:
+        """Return the states by label, and why each cannot be entered now, '' where it can."""
+        return {label: self._blocked(label) for label in self._node.labels()}
+
+    def emit(self, kind: EventKind, **fields: Any) -> None:
+        """Tell the observers of a step that is about the failed state."""
+        self._node.emit(kind, state=self._record.label, **fields)
+
+    def warn(self, text: str) -> None:
+        """Log what the operator should know of this failure, and tell the observers."""
+        self._node.warn(text, self._record.label)
+
+    # -- verdicts
+
+    def _obey(self, answer: Answer) -> Verdict:
+        remapping = self._machine._remappings.get(self._record.label) or {}
+        for key, value in (answer.outputs or {}).items():
+            self._watch.gate[remapping.get(key, key)] = value
+        if answer.kind is AnswerKind.GOTO:
+            return self._jump(answer.state, answer.by, answer.why)
+        if answer.kind is AnswerKind.SUPERSEDE:
+            return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by,
+                           text=answer.why)
+        return self._give_up(answer.why, answer.outcome, answer.by)
+
+    def _jump(self, target: str, by: str = '', text: str = '') -> Verdict:
+        """Go to a state."""
+        return Verdict(VerdictKind.JUMP, state=target, by=by, text=text,
+                       written=frozenset(self._watch.written()))
+
+    def _give_up(self, text: str, outcome: str = '', by: str = '') -> Verdict:
+        """End the container with an outcome, or ('') as the failure would have ended it."""
+        ending = ContainerEnding(outcome=outcome) if outcome else self._natural_ending()
+        return Verdict(VerdictKind.GIVE_UP, ending=ending, by=by, text=text)
+
+    def _preempted(self) -> Verdict:
+        """End the container as preempted.
+
+        Where it has no such outcome, it ends as the failure would have ended it.
+        """
+        ending = self._natural_ending()
+        if PREEMPTED in self._machine.get_registered_outcomes():
+            ending = ContainerEnding(outcome=PREEMPTED)
+        return Verdict(VerdictKind.PREEMPTED, ending=ending)
+
+    def _natural_ending(self) -> ContainerEnding:
+        return natural_ending(self._failure, self._machine.get_registered_outcomes(),
+                              self._node.in_force.failing)
+
+    # -- nobody answers
+
+    def _fall_back(self, why: str) -> Verdict:
+        """Do what is configured for a question that nobody answers."""
+        verb, target = self._node.settings.on_no_answer
+        if verb == 'goto':
+            problem = self._why_not_fall_back_to(target)
+            if not problem:
+                self._record.fallbacks += 1
+                return self._jump(target, text=why)
+            self.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
+        elif verb == 'give_up':
+            if target in self._machine.get_registered_outcomes():
+                return self._give_up(why, target)
+            self.warn('on_no_answer: {!r} is no outcome of this container; stopping'.format(target))
+        return self._give_up(why)
+
+    def _why_not_fall_back_to(self, label: str) -> str:
+        """Return why `on_no_answer` cannot lead to a state, '' where it can.
+
+        It has a cap, or a trial without experts might not end.
+        """
+        record = self._record
+        if record.fallbacks >= max(1, record.settings.max_recoveries):
+            return 'this trial has gone there {} times for {} already'.format(
+                record.fallbacks, record.label)
+        states = self.states_now()
+        return states.get(label, 'no such state; there are ' + names(states))
+
+    def _fallback_in_words(self) -> str:
+        """Return what `_fall_back` will do."""
+        verb, target = self._node.settings.on_no_answer
+        if verb == 'goto' and not self._why_not_fall_back_to(target):
+            return 'go to {}'.format(target)
+        if verb == 'give_up' and target in self._machine.get_registered_outcomes():
+            return 'end with {}'.format(target)
+        ending = self._natural_ending()
+        if ending.error is not None:
+            return 'stop with the error {}'.format(type(ending.error).__name__)
+        return ('go on to {}'.format(ending.state) if ending.state
+                else 'stop with {}'.format(ending.outcome))
