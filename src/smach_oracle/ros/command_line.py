@@ -5,5 +5,10 @@ import rospy
 
 
 def parameters_only(description: str) -> None:
-    """Answer --help, and refuse any other argument that is no ROS remapping; both work without a master."""
+    """Answer --help, and refuse any other argument that is not a ROS remapping.
+
+    Both work without a master.
+
+    Both work without a master.
+    """
     argparse.ArgumentParser(description=description).parse_args(rospy.myargv()[1:])

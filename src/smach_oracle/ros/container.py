@@ -1,25 +1,27 @@
 """The OracleContainer of ROS programs: the bare one, attached to the node it runs in.
 
-Building and wrapping need no node. At its first execute in a process that has called rospy.init_node, a top-level
-machine gets its settings from the parameter `~oracle` as well, an expert (action server `~expert_query`, or the one
-that `~expert_query_server` names), the topics `~oracle/events` and `~oracle/rates`, an introspection server
-(`~introspection`, default true) and a recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves
-as the bare one.
+Building and wrapping need no node. At its first execute in a process that has called
+rospy.init_node, a top-level machine gets its settings from the parameter `~oracle` as well, an
+expert (action server `~expert_query`, or the one that `~expert_query_server` names), the topics
+`~oracle/events` and `~oracle/rates`, an introspection server (`~introspection`, default true) and a
+recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves as the bare one.
 """
 import weakref
 from typing import Any, List, Mapping, MutableMapping, NamedTuple, Optional, Sequence
 
 import rospy
-import smach
 
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.container import OracleContainer as BareContainer, SettingsLike
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.question import Expert
+import smach
+from smach_oracle.oracle import oracle_of
+from smach_oracle.oracle.asking.question import Expert
+from smach_oracle.oracle.container import OracleContainer as BareContainer
+from smach_oracle.oracle.container import SettingsLike
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.settings import Settings
 
 from .attachment import attachments
-from .failure_text import describe_failure
-from .settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_python
+from .expert.failure_text import describe_failure
+from .loaded_settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_python
 
 PreconditionLists = Optional[Mapping[str, List[Any]]]
 
@@ -32,48 +34,58 @@ class _Given(NamedTuple):
     nested: Optional[bool]
 
 
-_given: MutableMapping[Any, _Given] = weakref.WeakKeyDictionary()
+_given: MutableMapping[BareContainer, _Given] = weakref.WeakKeyDictionary()
 
 
 class OracleContainer(BareContainer):
     """A `smach.StateMachine` with an ORACLE state, attached to its ROS node.
 
-    Settings given as a dictionary lie under the parameter `~oracle`; a `Settings` object is taken as it is.
+    Settings given as a dictionary lie under the parameter `~oracle`; a `Settings` object is taken
+    as it is.
     """
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), *,
-                 settings: SettingsLike = None, preconditions: PreconditionLists = None, name: str = '',
-                 expert: Optional[Expert] = None, recover: bool = True, strict: bool = True) -> None:
+    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
+                 preconditions: PreconditionLists = None, name: str = '',
+                 expert: Optional[Expert] = None, recover: bool = True,
+                 strict: bool = True) -> None:
         """See `smach_oracle.oracle.OracleContainer`.
 
-        :raises ConfigError: naming key, value and what is allowed.
+        :raises SettingsError: naming key, value and what is allowed.
         """
-        super().__init__(outcomes, input_keys, output_keys, settings=checked(settings, preconditions), name=name,
-                         expert=expert, recover=recover, strict=strict)
+        super().__init__(outcomes, input_keys, output_keys,
+                         settings=checked(settings, preconditions), name=name, expert=expert,
+                         recover=recover, strict=strict)
         _remember(self, settings, preconditions, None)
 
     @classmethod
-    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None, settings: SettingsLike = None,
-             nested: Optional[bool] = None, name: str = '', expert: Optional[Expert] = None, strict: bool = True,
+    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
+             settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
+             expert: Optional[Expert] = None, strict: bool = True,
              recover: bool = True) -> 'OracleContainer':
-        """Put a machine under an oracle and return it: the same object. See `smach_oracle.oracle.OracleContainer.wrap`.
+        """Put a machine under an oracle and return it: the same object.
 
-        :raises ConfigError: naming key, value and what is allowed.
+        See `smach_oracle.oracle.OracleContainer.wrap`.
+
+        See `smach_oracle.oracle.OracleContainer.wrap`.
+
+        :raises SettingsError: naming key, value and what is allowed.
         """
         wrapped: OracleContainer = super().wrap(  # type: ignore[assignment]
-            machine, settings=checked(settings, preconditions), nested=nested, name=name, expert=expert, strict=strict,
-            recover=recover)
+            machine, settings=checked(settings, preconditions), nested=nested, name=name,
+            expert=expert, strict=strict, recover=recover)
         _remember(wrapped, settings, preconditions, nested)
         return wrapped
 
-    def execute(self, *args: Any, **kwargs: Any) -> Optional[str]:
+    def execute(self, *args: object, **kwargs: object) -> Optional[str]:
         """Run the machine; a top-level one is attached to its node first.
 
-        :raises ConfigError: where the parameters of the node are wrong.
+        :raises SettingsError: where the parameters of the node are wrong.
         :raises OSError: where the folder for the bags cannot be made or written.
         """
-        if self._oracle.parent is None and not self.is_running():
-            self._oracle.tree.describe_failure = describe_failure
+        oracle = oracle_of(self)
+        if oracle.is_top and not self.is_running():
+            oracle.describe_failure = describe_failure
             _take_parameters(self)
             attachments().attach(self)
         return super().execute(*args, **kwargs)
@@ -82,21 +94,24 @@ class OracleContainer(BareContainer):
 def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> Settings:
     """Settings with all names of Python objects resolved.
 
-    :raises ConfigError: naming key, value and what is allowed, and where the key was set if that is known.
+    :raises SettingsError: naming key, value and what is allowed, and where the key was set if that
+        is known.
     """
     try:
-        result = settings if isinstance(settings, Settings) else Settings.from_dict(settings, resolve_python)
-    except ConfigError as err:
+        result = settings if isinstance(settings, Settings) else Settings.from_dict(
+            settings, resolve_python)
+    except SettingsError as err:
         raise (settings.located(err) if isinstance(settings, LoadedSettings) else err) from err
     if preconditions is None:
         return result
     if not isinstance(preconditions, Mapping):
-        raise ConfigError('preconditions', preconditions, 'a mapping of state labels to lists')
-    return result.with_states({label: {'preconditions': given} for label, given in preconditions.items()},
-                              resolve_python)
+        raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
+    return result.with_states(
+        {label: {'preconditions': given}
+         for label, given in preconditions.items()}, resolve_python)
 
 
-def _remember(machine: Any, settings: SettingsLike, preconditions: PreconditionLists,
+def _remember(machine: BareContainer, settings: SettingsLike, preconditions: PreconditionLists,
               nested: Optional[bool]) -> None:
     if isinstance(settings, Settings):
         _given.pop(machine, None)
@@ -104,8 +119,11 @@ def _remember(machine: Any, settings: SettingsLike, preconditions: PreconditionL
         _given[machine] = _Given(settings, preconditions, nested)
 
 
-def _take_parameters(machine: Any) -> None:
-    """Lay the parameter `~oracle` over what the machine was given in code; once, and only in a node."""
+def _take_parameters(machine: BareContainer) -> None:
+    """Merge the parameter `~oracle` over what the machine was given in code.
+
+    Once, and only in a node.
+    """
     if machine not in _given or not rospy.core.is_initialized():
         return
     given = _given[machine]
@@ -113,7 +131,8 @@ def _take_parameters(machine: Any) -> None:
     if parameters:
         settings = LoadedSettings(given.settings)
         settings.put(parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM))
-        # Not strict: one parameter serves every machine of the node, and not each of them has every state.
-        BareContainer.wrap(machine, settings=checked(settings, given.preconditions), nested=given.nested,
-                           strict=False, recover=machine._oracle.tree.recover)
-    del _given[machine]  # only now: a program that tries again after an error is told again
+        # Not strict: one parameter serves every machine of the node, and not each of them has every
+        # state.
+        BareContainer.wrap(machine, settings=checked(settings, given.preconditions),
+                           nested=given.nested, strict=False, recover=oracle_of(machine).recovers)
+    del _given[machine]  # only now: a program that tries again after an error gets it again

@@ -1,13 +1,18 @@
-"""From the executive's events and rates to the messages of the ROS interface (OracleEvent, OracleRates)."""
+"""Translates the executive's events and rates to OracleEvent and OracleRates messages."""
 import json
-from typing import Any, Iterable, Optional
+from typing import TYPE_CHECKING, Iterable, Optional
 
 import genpy
 import rospy
 from std_msgs.msg import Header
 
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
-from smach_oracle.oracle.events import Event
+from smach_oracle.oracle.records.events import Event
+
+from .sendable_text import sendable_text
+
+if TYPE_CHECKING:  # the oracle imports smach, which a reader of events can do without
+    from smach_oracle.oracle.machine.oracle import StateRateRow, TransitionRow
 
 
 def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
@@ -16,41 +21,39 @@ def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
     :param stamp: ROS time of the step; none: now, or zero where this process runs without ROS.
     """
     header = Header(stamp=ros_now() if stamp is None else stamp)
-    return OracleEvent(
-        int(event.kind), header, float(event.wall_time), _text(event.trial_id), event.seq, _text(event.path),
-        _text(event.state), _text(event.outcome), _text(event.target), int(event.failure_kind),
-        int(event.failure_class), float(event.rate), bool(event.continuous), _text(event.query_id), _text(event.by),
-        _text(event.text), _json(event.data))
+    place = (event.path, event.state, event.outcome, event.target)
+    words = (event.query_id, event.by, event.text)
+    return OracleEvent(int(event.kind), header, float(event.wall_time),
+                       sendable_text(event.trial_id), event.seq, *map(sendable_text, place),
+                       int(event.failure_kind), int(event.failure_class), float(event.rate),
+                       bool(event.continuous), *map(sendable_text, words), _json(event.data))
 
 
-def rates_to_msg(trial_id: str, rates: Iterable[Any], transitions: Iterable[Any]) -> OracleRates:
+def rates_to_msg(trial_id: str, rates: Iterable['StateRateRow'],
+                 transitions: Iterable['TransitionRow']) -> OracleRates:
     """Translate what has been learned of one wrapped machine.
 
     :param rates: rows of `OracleContainer.rates()`.
-    :param transitions: rows of `OracleContainer.transition_counts()`: path, state, outcome, target, count.
+    :param transitions: rows of `OracleContainer.transition_counts()`.
     :returns: an OracleRates, stamped with ROS time now (zero where this process runs without ROS).
     """
-    return OracleRates(
-        Header(stamp=ros_now()), _text(trial_id),
-        [StateRate(_text(row.path), _text(row.state), float(row.rate), int(row.failure_class), row.successes,
-                   row.failures, row.recoveries, bool(row.has_preconditions)) for row in rates],
-        [TransitionCount(*[_text(part) for part in row[:4]], row[4]) for row in transitions])
+    return OracleRates(Header(stamp=ros_now()), sendable_text(trial_id), [
+        StateRate(sendable_text(row.path), sendable_text(row.state), float(row.rate),
+                  int(row.failure_class), row.successes, row.failures, row.recoveries,
+                  bool(row.has_preconditions))
+        for row in rates
+    ], [TransitionCount(*map(sendable_text, row[:4]), row[4]) for row in transitions])
 
 
 def ros_now() -> genpy.Time:
-    """ROS time, or zero where there is none (no node in this process, or simulated time that has not begun)."""
+    """ROS time now, or zero where there is none.
+
+    There is none without a node in this process, and before simulated time has begun.
+    """
     if not rospy.rostime.is_rostime_initialized():
         return genpy.Time()
     return rospy.rostime.get_rostime()
 
 
-def _text(value: Any) -> str:
-    """A string that can be put on the wire: a state's exception text may hold halves of surrogate pairs."""
-    text = value if isinstance(value, str) else str(value)
-    if text.isascii():
-        return text
-    return text.encode('utf-8', 'backslashreplace').decode('utf-8')
-
-
-def _json(data: Any) -> str:
+def _json(data: object) -> str:
     return json.dumps(data, default=str) if data else ''

@@ -1,20 +1,22 @@
-"""Goals to an action server as streams of events that one thread can wait for; the loss of the server is seen at once.
+"""Sends goals to an action server, and notices at once when the server is gone.
 
-actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and says nothing about a server
-that has died; this goes by the connections themselves.
+actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and does not
+notice a server that has died; this goes by the connections themselves.
 """
 import queue
 import threading
 import time
-from typing import Any, List, NamedTuple, Optional
+from typing import List, NamedTuple, Optional, Type
 
 import actionlib
+import genpy
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
-from .settling import Settling, live_connections
+from .connections import Connection, ConnectionGrace, live_connections
 
-POLL_S = 0.02  # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
+# how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
+POLL_S = 0.02
 _ACK_S = 3.0  # a goal that nobody acknowledged by then was lost on its way
 _RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
 
@@ -22,17 +24,18 @@ _RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
 class GoalEvent(NamedTuple):
     """Feedback (`feedback` set), or the end of the goal (`status` set; `result` may be None)."""
 
-    feedback: Any = None
+    feedback: Optional[genpy.Message] = None
     status: int = 0
-    result: Any = None
-    text: str = ''  # what the server says of the end
+    result: Optional[genpy.Message] = None
+    text: str = ''  # the server's reason for the end
 
 
 class SentGoal:
     """One goal on its way; `poll` waits for its next event."""
 
     def __init__(self, sent_s: float) -> None:
-        # not a SimpleQueue: its timed get waits for ever where a signal handler takes longer than the timeout
+        # not a SimpleQueue: its timed get waits for ever where a signal handler takes longer than
+        # the timeout
         self._events: 'queue.Queue[GoalEvent]' = queue.Queue()
         self._sent_s = sent_s
         self._acknowledged = False
@@ -51,7 +54,7 @@ class SentGoal:
             return None
 
     def unheard(self, now_s: float) -> bool:
-        """Whether the server's acknowledgement, or the result of a goal that has ended, should be here and is not."""
+        """Whether the server's acknowledgement or result is overdue."""
         if self._ended_s is not None:
             return now_s - self._ended_s > _RESULT_S
         return not self._acknowledged and now_s - self._sent_s > _ACK_S
@@ -61,7 +64,8 @@ class SentGoal:
         if self._handle is not None:
             try:
                 self._handle.cancel()
-            except rospy.ROSException:  # the topic is closed: the node is going down, and the server will notice
+            except rospy.ROSException:
+                # the topic is closed: the node is going down, and the server will notice
                 rospy.logdebug('A goal could not be cancelled while the node goes down.')
 
     def on_transition(self, handle: actionlib.ClientGoalHandle) -> None:
@@ -71,10 +75,11 @@ class SentGoal:
         if state == actionlib.CommState.WAITING_FOR_RESULT:
             self._ended_s = time.monotonic()
         elif state == actionlib.CommState.DONE:
-            self._events.put(GoalEvent(status=handle.get_terminal_state(), result=handle.get_result(),
-                                       text=handle.get_goal_status_text()))
+            self._events.put(
+                GoalEvent(status=handle.get_terminal_state(), result=handle.get_result(),
+                          text=handle.get_goal_status_text()))
 
-    def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: Any) -> None:
+    def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: genpy.Message) -> None:
         """actionlib's callback."""
         self._events.put(GoalEvent(feedback=feedback))
 
@@ -84,34 +89,40 @@ class GoalLink:
 
     _sending = threading.Lock()  # actionlib's goal ids are not made safely from several threads
 
-    def __init__(self, name: str, action_spec: Any) -> None:
+    def __init__(self, name: str, action_spec: Type[genpy.Message]) -> None:
         """`name` is resolved; connections are made in the background."""
         self.name = name
-        # Small messages that must not wait for a full packet; the first subscriber of a topic decides.
+        # Small messages that must not wait for a full packet; the first subscriber of a topic
+        # decides.
         self._fast = [rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
                       for end, kind in (('/result', type(action_spec().action_result)),
                                         ('/feedback', type(action_spec().action_feedback)))]
         self._client = actionlib.ActionClient(name, action_spec)
-        self._settling = Settling()
+        self._grace = ConnectionGrace()
 
     def ready(self) -> bool:
         """Whether one live server is connected to all five topics of the action.
 
-        Takes a moment where it has just been connected: the result of a goal that ends at once would get lost.
+        Takes a moment where it has just been connected: the result of a goal that ends at once
+        would get lost.
         """
         heard = self._heard()
         if heard:
-            self._settling.wait(heard)
+            self._grace.wait(heard)
         return bool(heard)
 
-    def _heard(self) -> List[Any]:
-        """The connections on which a server tells of goals; [] while any topic is without it."""
+    def _heard(self) -> List[Connection]:
+        """The connections that bring news of goals from a server; [] while any topic lacks one."""
         client = self._client
-        told = (client.status_sub, client.result_sub, client.feedback_sub)
+        news = (client.status_sub, client.result_sub, client.feedback_sub)
         for server in [each.callerid_pub for each in live_connections(client.status_sub)]:
-            heard = [next((each for each in live_connections(topic) if each.callerid_pub == server), None)
-                     for topic in told]
-            if all(heard) and _reaches(client.pub_goal, server) and _reaches(client.pub_cancel, server):
+            heard = [
+                next((each
+                      for each in live_connections(topic) if each.callerid_pub == server), None)
+                for topic in news
+            ]
+            if all(heard) and _reaches(client.pub_goal, server) and _reaches(
+                    client.pub_cancel, server):
                 return heard
         return []
 
@@ -119,7 +130,7 @@ class GoalLink:
         """Whether any server is connected; false within milliseconds of its death."""
         return bool(live_connections(self._client.status_sub))
 
-    def send(self, goal: Any, now_s: float) -> SentGoal:
+    def send(self, goal: genpy.Message, now_s: float) -> SentGoal:
         """Send a goal; the caller has seen `ready`."""
         sent = SentGoal(now_s)
         with self._sending:
@@ -141,8 +152,11 @@ def lost(event: GoalEvent) -> bool:
 
 
 def _reaches(publisher: rospy.Publisher, subscriber: str) -> bool:
-    """Whether a living node of that name listens. rospy looks only now and then whether one has died; one that was
-    started again under its name would seem to be there before it listens."""
+    """Whether a living node of that name listens.
+
+    rospy looks only now and then whether one has died; one that was started again under its name
+    would seem to be there before it listens.
+    """
     topic = publisher.impl
     if topic is None:
         return False

@@ -1,7 +1,8 @@
 """Settings of the executive from a YAML file, the parameter server and the command line.
 
-The parameter `~oracle` goes over the file, the command line over both; mappings are merged key by key, everything else
-is replaced. What the keys mean is checked by `smach_oracle.oracle`; here every error learns where the key came from.
+The parameter `~oracle` overrides the file, the command line overrides both. Mappings are merged key
+by key, everything else is replaced. `smach_oracle.oracle` checks the values; here every error
+learns where the key came from.
 """
 import importlib
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple
 import rospy
 import yaml
 
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.paths import path_of
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.paths import path_of
+
+from .parameters import read_or_default
 
 DEFAULT_PARAM = '~oracle'
 PYTHON_PREFIX = 'python:'
@@ -26,7 +29,8 @@ class LoadedSettings(Dict[str, Any]):
         if values:
             self.put(values, 'settings given in code')
 
-    def put(self, values: Mapping[str, Any], origin: str, lines: Optional[Mapping[str, int]] = None) -> None:
+    def put(self, values: Mapping[str, Any], origin: str,
+            lines: Optional[Mapping[str, int]] = None) -> None:
         """Merge values over those that are there.
 
         :param origin: what to call this source in an error.
@@ -45,10 +49,11 @@ class LoadedSettings(Dict[str, Any]):
             key = key[:max(key.rfind('.'), key.rfind('['), 0)]
         return ''
 
-    def located(self, err: ConfigError) -> ConfigError:
+    def located(self, err: SettingsError) -> SettingsError:
         """The same error, naming the source as well."""
         origin = self.origin(err.key)
-        return ConfigError('{}: {}'.format(origin, err.key), err.value, err.allowed) if origin else err
+        return SettingsError('{}: {}'.format(origin, err.key), err.value,
+                           err.allowed) if origin else err
 
 
 def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PARAM,
@@ -58,7 +63,7 @@ def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PAR
     :param path: a YAML file, or None.
     :param param: a parameter that holds a mapping; read only where this process is a ROS node.
     :param overrides: from the command line.
-    :raises ConfigError: naming file and line, or parameter, key, value and what is allowed.
+    :raises SettingsError: naming file and line, or parameter, key, value and what is allowed.
     """
     settings = LoadedSettings()
     if path:
@@ -75,59 +80,62 @@ def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
     """Read a YAML file that holds a mapping.
 
     :returns: the values, and dotted key -> line number.
-    :raises ConfigError: where it cannot be read, is no YAML, names a key twice or holds something else.
+    :raises SettingsError: where it cannot be read, is no YAML, names a key twice or holds something
+        else.
     """
     try:
         text = Path(path).read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as err:
-        raise ConfigError('settings file', str(path), 'a readable YAML file ({})'.format(err)) from err
+        raise SettingsError('settings file', str(path),
+                          'a readable YAML file ({})'.format(err)) from err
     try:
         lines = _line_numbers(str(path), yaml.compose(text, Loader=yaml.SafeLoader))
         values = yaml.safe_load(text)
         list(_dotted_keys(values if isinstance(values, dict) else {}))
-    except ConfigError:
+    except SettingsError:
         raise
     except yaml.YAMLError as err:
-        raise ConfigError(_marked(str(path), err), getattr(err, 'problem', None) or str(err), 'YAML') from err
+        raise SettingsError(_marked(str(path), err),
+                          getattr(err, 'problem', None) or str(err), 'YAML') from err
     except RecursionError as err:
-        raise ConfigError(str(path), 'something that contains itself', 'a tree of settings') from err
+        raise SettingsError(str(path), 'something that contains itself',
+                          'a tree of settings') from err
     except ValueError as err:  # what a tag such as !!int promises and the value does not keep
-        raise ConfigError(str(path), str(err), 'YAML') from err
+        raise SettingsError(str(path), str(err), 'YAML') from err
     if values is None:
         return {}, lines
     if not isinstance(values, dict):
-        raise ConfigError(str(path), values, 'a mapping of settings')
+        raise SettingsError(str(path), values, 'a mapping of settings')
     return values, lines
 
 
 def read_param(param: str) -> Dict[str, Any]:
     """Read a mapping from the parameter server.
 
-    :returns: empty where it is not set, or the master cannot be asked (logged): a robot starts without it.
-    :raises ConfigError: where it is set to something else.
+    :returns: empty where it is not set, or the master cannot be asked (logged): a robot starts
+        without it.
+    :raises SettingsError: where it is set to something else.
     """
-    try:
-        values = rospy.get_param(param, {})
-    except (OSError, rospy.ROSException) as err:
-        rospy.logwarn('Parameter %s could not be read: %s', rospy.resolve_name(param), err)
-        return {}
+    values = read_or_default(param, {})
     if not isinstance(values, dict):
-        raise ConfigError('parameter ' + rospy.resolve_name(param), values, 'a mapping of settings')
+        raise SettingsError('parameter ' + rospy.resolve_name(param), values,
+                            'a mapping of settings')
     if isinstance(values.get('states'), dict):
         values['states'] = dict(_state_entries(values['states']))
     return values
 
 
-def resolve_python(name: str) -> Any:
+def resolve_python(name: str) -> object:
     """What `python:module:attribute` names, e.g. `python:my_robot.checks:view_is_clear`.
 
     A dotted attribute is followed; the class of a state is instantiated without arguments.
 
     :raises ValueError: where the form is wrong or the module has no such attribute.
-    :raises ImportError: where the module cannot be imported; whatever else the module raises surfaces as it is.
+    :raises ImportError: where the module cannot be imported; whatever else the module raises
+        surfaces as it is.
     """
     module, attributes = split_python_name(name)
-    found: Any = importlib.import_module(module)
+    found: object = importlib.import_module(module)
     for attribute in attributes.split('.'):
         if not hasattr(found, attribute):
             raise ValueError('{} has no {!r}'.format(module, attribute))
@@ -165,9 +173,12 @@ def _dotted_keys(values: Mapping[str, Any], prefix: str = '') -> Iterator[str]:
 
 
 def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tuple[str, Any]]:
-    """Undo what the parameter server makes of the key "PATH/LABEL": a mapping PATH with a mapping LABEL in it.
+    """Restore the key "PATH/LABEL", which the parameter server splits.
 
-    No setting of a state is itself a mapping, so a mapping inside a state's settings is a state further down.
+    It makes of it a mapping PATH with a mapping LABEL in it.
+
+    No setting of a state is itself a mapping, so a mapping inside a state's settings is a state
+    further down.
     """
     for label, entry in states.items():
         if not isinstance(entry, dict):
@@ -183,7 +194,8 @@ def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tupl
 def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
     """Dotted key -> line, from 1, of every key in the file.
 
-    :raises ConfigError: where a key is given twice in one mapping, which YAML readers otherwise pass over.
+    :raises SettingsError: where a key is given twice in one mapping, which YAML readers otherwise
+        pass over.
     """
     lines: Dict[str, int] = {}
     open_nodes = [('', root)]
@@ -194,21 +206,24 @@ def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
             continue
         seen.add(id(node))
         if isinstance(node, yaml.SequenceNode):
-            open_nodes += [('{}[{}].'.format(prefix[:-1], index), item) for index, item in enumerate(node.value)]
+            open_nodes += [('{}[{}].'.format(prefix[:-1], index), item)
+                           for index, item in enumerate(node.value)]
         elif isinstance(node, yaml.MappingNode):
             open_nodes += _entries(path, prefix, node, lines)
     return lines
 
 
-def _entries(path: str, prefix: str, node: yaml.MappingNode, lines: Dict[str, int]) -> List[Tuple[str, yaml.Node]]:
+def _entries(path: str, prefix: str, node: yaml.MappingNode,
+             lines: Dict[str, int]) -> List[Tuple[str, yaml.Node]]:
     entries = []
     first_lines: Dict[str, int] = {}
     for key, value in node.value:
         dotted = prefix + str(key.value)
         line = key.start_mark.line + 1
         if dotted in first_lines and key.tag != 'tag:yaml.org,2002:merge':
-            raise ConfigError('{} line {}: {}'.format(path, line, dotted),
-                              'a second time (first in line {})'.format(first_lines[dotted]), 'each key once')
+            raise SettingsError('{} line {}: {}'.format(path, line, dotted),
+                              'a second time (first in line {})'.format(first_lines[dotted]),
+                              'each key once')
         first_lines[dotted] = line
         entries.append((dotted + '.', value))
     lines.update(first_lines)

@@ -1,23 +1,29 @@
 """Survive a restart of the ROS master.
 
-A node registers its topics and services once. A master that is restarted knows nothing of them: existing connections
-go on, but nobody new can find the node. `MasterWatch` notices and registers everything again.
+A node registers its topics and services once. A master that is restarted knows nothing of them:
+existing connections go on, but nobody new can find the node. `MasterWatch` notices and registers
+everything again.
 """
 import threading
 import xmlrpc.client
 from http.client import HTTPConnection
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import rosgraph
 import rospy
-from rospy.impl.registration import (RegManager, get_registration_listeners, get_service_manager, get_topic_manager)
+from rospy.impl.registration import (
+    RegManager,
+    get_registration_listeners,
+    get_service_manager,
+    get_topic_manager,
+)
 
 POLL_S = 1.0
 CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch for ever
 
 
 class MasterCallError(Exception):
-    """The master answered with an error; the text says which call and why."""
+    """The master answered with an error; the text names the call and the reason."""
 
 
 class Registrations(NamedTuple):
@@ -31,7 +37,7 @@ class Registrations(NamedTuple):
 class TimedTransport(xmlrpc.client.Transport):
     """XML-RPC over a connection with a time limit."""
 
-    def make_connection(self, host: Any) -> HTTPConnection:
+    def make_connection(self, host: Union[str, Tuple[str, Dict[str, str]]]) -> HTTPConnection:
         connection = super().make_connection(host)
         connection.timeout = CALL_LIMIT_S
         return connection
@@ -40,7 +46,8 @@ class TimedTransport(xmlrpc.client.Transport):
 class MasterLink:
     """The calls of the master's API that the watch needs, made in the node's own name.
 
-    Every method raises OSError, xmlrpc.client.Error or http.client.HTTPException where the master gives no answer.
+    :raises OSError, xmlrpc.client.Error, http.client.HTTPException: in every method, where the
+        master gives no answer.
     """
 
     def __init__(self, master_uri: str, caller_id: str, node_uri: str) -> None:
@@ -52,15 +59,18 @@ class MasterLink:
         """The master's process id, and whether it knows this node."""
         with self._proxy() as master:
             pid = master.getPid(self._caller_id)[2]
-            # a node of the same name elsewhere counts as known: it has replaced this one, which is being shut down
+            # a node of the same name elsewhere counts as known: it has replaced this one, which is
+            # being shut down
             return pid, master.lookupNode(self._caller_id, self._caller_id)[0] == 1
 
     def register(self, items: Registrations) -> List[Tuple[str, List[str]]]:
         """Register everything; harmless for what the master knows already.
 
-        Topics that others listen to come last: whoever hears from this node may call its services at once.
+        Topics that others listen to come last: a node that hears from this one may call its
+        services at once.
 
-        :returns: for each subscription its topic and the URIs of the publishers that the master knows.
+        :returns: for each subscription its topic and the URIs of the publishers that the master
+            knows.
         :raises MasterCallError: naming what the master refused.
         """
         with self._proxy() as master:
@@ -84,14 +94,15 @@ class MasterLink:
 
 
 class MasterWatch:
-    """Polls the master about once a second and registers this node again where the master has forgotten it.
+    """Polls the master and registers this node again where the master has forgotten it.
 
-    Three signs tell a new master: another process id, that it does not know this node, and an outage before. The poll
-    is two local calls of about a millisecond.
+    It polls about once a second: two local calls of about a millisecond. A new master has another
+    process id, or does not know this node, or could not be reached before.
     """
 
     def __init__(self, link: MasterLink, registrations: Callable[[], Registrations],
-                 found_publishers: Callable[[str, List[str]], None], poll_s: float = POLL_S) -> None:
+                 found_publishers: Callable[[str, List[str]],
+                                            None], poll_s: float = POLL_S) -> None:
         self._link = link
         self._registrations = registrations
         self._found_publishers = found_publishers
@@ -117,7 +128,8 @@ class MasterWatch:
                 self._known_pid = pid
             if self._lost or not known or pid != self._known_pid:
                 self._register(pid)
-        except Exception as err:  # refused, timed out, or any half answer of a master that is just dying
+        except Exception as err:
+            # refused, timed out, or any half answer of a master that is just dying
             self._note_loss(err)
 
     def _register(self, pid: int) -> None:
@@ -125,12 +137,15 @@ class MasterWatch:
         for topic, uris in self._link.register(items):
             self._found_publishers(topic, uris)
         self._known_pid, self._lost = pid, False
-        rospy.logwarn('The ROS master was restarted: registered %d publishers, %d subscribers and %d services again.',
-                      len(items.publications), len(items.subscriptions), len(items.services))
+        rospy.logwarn(
+            'The ROS master was restarted: registered %d publishers, %d subscribers and %d '
+            'services again.',
+            len(items.publications), len(items.subscriptions), len(items.services))
 
     def _note_loss(self, err: Exception) -> None:
         if not self._lost and not self._stop.is_set() and not rospy.is_shutdown():
-            rospy.logwarn('The ROS master does not answer (%s); looking again every %.1f s.', err, self._poll_s)
+            rospy.logwarn('The ROS master does not answer (%s); looking again every %.1f s.', err,
+                          self._poll_s)
         self._lost = True
 
     def _run(self) -> None:
@@ -152,7 +167,8 @@ def start_master_watch() -> MasterWatch:
         raise rospy.ROSInitException('start_master_watch needs rospy.init_node first')
     with _watch_lock:
         if _watch is None:
-            link = MasterLink(rosgraph.get_master_uri(), rospy.get_name(), rospy.core.get_node_uri())
+            link = MasterLink(rosgraph.get_master_uri(), rospy.get_name(),
+                              rospy.core.get_node_uri())
             _watch = MasterWatch(link, _own_registrations, _connect)
             _watch.start()
         return _watch
@@ -160,11 +176,15 @@ def start_master_watch() -> MasterWatch:
 
 def _own_registrations() -> Registrations:
     topics = get_topic_manager()
-    return Registrations(topics.get_publications(), topics.get_subscriptions(), get_service_manager().get_services())
+    return Registrations(topics.get_publications(), topics.get_subscriptions(),
+                         get_service_manager().get_services())
 
 
 def _connect(topic: str, publisher_uris: List[str]) -> None:
-    """What the node does when its master tells it of publishers; those already connected are left alone."""
+    """Connect to publishers, as when the master announces them.
+
+    Those already connected are left alone.
+    """
     for listener in get_registration_listeners().listeners:
         if isinstance(listener, RegManager):
             listener.publisher_update(topic, publisher_uris)

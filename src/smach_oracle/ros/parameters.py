@@ -1,54 +1,108 @@
-"""A node's private parameters, checked: what cannot be used is refused by name, with what is allowed."""
+"""A node's private parameters, checked: an error names the parameter and what is allowed."""
 from typing import Any, List, Mapping
 
 import rospy
 
-from ..oracle.errors import ConfigError
+from smach_oracle.oracle.settings import checks
 
 
 def number_of(key: str, default: float, low: float, high: float) -> float:
-    """A number from `low` to `high`. Raises ConfigError."""
+    """A number from `low` to `high`.
+
+    :raises SettingsError: for anything else.
+    """
     return checked_number(key, rospy.get_param(key, default), low, high)
 
 
 def name_of(key: str, default: str) -> str:
-    """A name or a text that is not empty. Raises ConfigError."""
-    value = rospy.get_param(key, default)
-    if not isinstance(value, str) or not value:
-        raise ConfigError(rospy.resolve_name(key), value, 'a name')
-    return value
+    """A name, or another text that is not empty.
+
+    :raises SettingsError: for anything else.
+    """
+    return checks.label(rospy.resolve_name(key), rospy.get_param(key, default))
 
 
 def names_of(key: str, default: List[str]) -> List[str]:
-    """A list of names. Raises ConfigError."""
-    value = rospy.get_param(key, default)
-    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        raise ConfigError(rospy.resolve_name(key), value, 'a list of names')
-    return value
+    """A list of names.
+
+    :raises SettingsError: for anything else.
+    """
+    return list(checks.words(rospy.resolve_name(key), rospy.get_param(key, default)))
 
 
 def flag_of(key: str, default: bool) -> bool:
-    """True or false. Raises ConfigError."""
-    value = rospy.get_param(key, default)
-    if not isinstance(value, bool):
-        raise ConfigError(rospy.resolve_name(key), value, 'true or false')
-    return value
+    """True or false.
+
+    :raises SettingsError: for anything else.
+    """
+    return checks.flag(rospy.resolve_name(key), rospy.get_param(key, default))
 
 
 def mapping_of(key: str) -> Mapping[str, Any]:
-    """A mapping, empty where it is not set. Raises ConfigError."""
+    """A mapping, empty where it is not set.
+
+    :raises SettingsError: for anything else.
+    """
     return checked_mapping(key, rospy.get_param(key, {}))
 
 
-def checked_number(key: str, value: Any, low: float, high: float) -> float:
-    """The value, if it is a number from `low` to `high`. Raises ConfigError."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise ConfigError(rospy.resolve_name(key), value, 'a number from {:g} to {:g}'.format(low, high))
-    return float(value)
+def checked_number(key: str, value: object, low: float, high: float) -> float:
+    """The value of a parameter, if it is a number from `low` to `high`.
+
+    :raises SettingsError: where it is not.
+    """
+    allowed = 'a number from {:g} to {:g}'.format(low, high)
+    return float(checks.number(low, high, allowed)(rospy.resolve_name(key), value))
 
 
-def checked_mapping(key: str, value: Any) -> Mapping[str, Any]:
-    """The value, if it is a mapping. Raises ConfigError."""
-    if not isinstance(value, Mapping):
-        raise ConfigError(rospy.resolve_name(key), value, 'a mapping')
+def checked_mapping(key: str, value: object) -> Mapping[str, Any]:
+    """The value of a parameter, if it is a mapping.
+
+    :raises SettingsError: where it is not.
+    """
+    return checks.mapping(rospy.resolve_name(key), value)
+
+
+def read_or_default(param: str, default: object) -> object:
+    """A parameter, unchecked; the default where it is not set or the master does not answer.
+
+    A master that does not answer is logged: a robot starts without it.
+    """
+    try:
+        value: object = rospy.get_param(param, default)
+    except (OSError, rospy.ROSException) as err:
+        rospy.logwarn('Parameter %s could not be read: %s', rospy.resolve_name(param), err)
+        return default
     return value
+
+
+def private_flag(name: str, default: bool) -> bool:
+    """A private parameter as `read_or_default` gives it, if it is true or false.
+
+    :raises SettingsError: where it is not.
+    """
+    return checks.flag(_key_of(name), read_or_default('~' + name, default))
+
+
+def private_text(name: str) -> str:
+    """A private parameter as `read_or_default` gives it, if it is a text.
+
+    It is '' where it is not set.
+
+    :raises SettingsError: where it is not.
+    """
+    return checks.text(_key_of(name), read_or_default('~' + name, ''))
+
+
+def private_names(name: str) -> List[str]:
+    """A private parameter as `read_or_default` gives it, if it is a list of names.
+
+    It is empty where it is not set.
+
+    :raises SettingsError: where it is not.
+    """
+    return list(checks.words(_key_of(name), read_or_default('~' + name, [])))
+
+
+def _key_of(name: str) -> str:
+    return 'parameter ' + str(rospy.resolve_name('~' + name))

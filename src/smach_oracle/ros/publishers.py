@@ -1,24 +1,64 @@
 """Publishers of what the executive does and learns: topics `~oracle/events` and `~oracle/rates`.
 
-Both are fed by the machine's own thread and never hold it: an event goes to rospy's send queue, which drops its oldest
-entry where a subscriber is too slow (the gap shows in the sequence numbers); rates go out from a thread of their own.
+Both are fed by the machine's own thread and never hold it: an event goes to rospy's send queue,
+which drops its oldest entry where a subscriber is too slow (the gap shows in the sequence numbers);
+rates go out from a thread of their own.
 """
 import threading
 import time
 import weakref
-from typing import Any, Dict, Optional
+from typing import Dict, Optional, Protocol, Sequence, Union
 
 import rospy
 
 from smach_oracle.msg import OracleEvent, OracleRates
-from smach_oracle.oracle.events import Event, EventKind
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.machine.oracle import StateRateRow, TransitionRow
+from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 
 from .event_messages import rates_to_msg, to_msg
 
 QUEUE_SIZE = 1000  # events waiting for one slow subscriber; about 0.3 MB
 RATES_PERIOD_S = 0.2  # at most 5 Hz
-STEPS_THAT_TEACH = frozenset([EventKind.TRIAL_START, EventKind.TRANSITION, EventKind.FAILURE, EventKind.JUMP,
-                              EventKind.SUPERSEDE, EventKind.GIVE_UP])
+KINDS_THAT_CHANGE_RATES = frozenset([
+    EventKind.TRIAL_START, EventKind.TRANSITION, EventKind.FAILURE, EventKind.JUMP,
+    EventKind.SUPERSEDE, EventKind.GIVE_UP
+])
+
+
+class RatesSource(Protocol):
+    """Has learned rates: a wrapped machine, or its oracle."""
+
+    @property
+    def trial_id(self) -> str:
+        """Id of the present or latest trial."""
+
+    @property
+    def events(self) -> EventSource:
+        """The events of its trials."""
+
+    def rates(self) -> Sequence[StateRateRow]:
+        """Return a row for each state."""
+
+    def transition_counts(self) -> Sequence[TransitionRow]:
+        """Return a row for each edge that was taken."""
+
+
+WatchedMachine = Union[OracleContainer, RatesSource]
+
+
+def rates_of(machine: WatchedMachine) -> OracleRates:
+    """What a machine has learned, as a message."""
+    source = _source_of(machine)
+    return rates_to_msg(source.trial_id, source.rates(), source.transition_counts())
+
+
+def _source_of(machine: WatchedMachine) -> RatesSource:
+    """The machine's oracle, where it has one.
+
+    A user's class may have taken the names of a container's attributes for its own ends.
+    """
+    return oracle_of(machine) if isinstance(machine, OracleContainer) else machine
 
 
 class EventPublisher:
@@ -32,7 +72,8 @@ class EventPublisher:
         try:
             if not rospy.is_shutdown() and self._publisher.get_num_connections():
                 self._publisher.publish(to_msg(event))
-        except (AttributeError, TypeError, rospy.ROSException):  # rospy takes a topic apart while it shuts down
+        except (AttributeError, TypeError, rospy.ROSException):
+            # rospy takes a topic apart while it shuts down
             if not rospy.core.is_shutdown_requested():
                 raise
 
@@ -44,44 +85,45 @@ class EventPublisher:
 class RatesPublisher:
     """Publishes what every watched machine has learned on `~oracle/rates` (latched).
 
-    A machine is published when it was first watched, at most `1 / period_s` times a second while it runs, and at the
-    end of each of its trials.
+    A machine is published when it was first watched, at most `1 / period_s` times a second while it
+    runs, and at the end of each of its trials.
     """
 
     def __init__(self, topic: str = '~oracle/rates', period_s: float = RATES_PERIOD_S) -> None:
         self._publisher = rospy.Publisher(topic, OracleRates, queue_size=10, latch=True)
         self._period_s = period_s
         self._wake = threading.Condition()
-        # Of two threads the one that looked last publishes last: its message stays latched. Re-entrant, as a signal
-        # handler may end a trial in the thread that publishes.
+        # Of two threads the one that looked last publishes last: its message stays latched.
+        # Re-entrant, as a signal handler may end a trial in the thread that publishes.
         self._publishing = threading.RLock()
-        self._pending: Dict[int, Any] = {}  # id(container) -> weak reference
+        self._pending: Dict[int, 'weakref.ref[WatchedMachine]'] = {}  # by id(machine)
         self._closed = False
         self._thread = threading.Thread(target=self._run, name='oracle_rates', daemon=True)
         self._thread.start()
 
-    def watch(self, container: Any) -> '_RatesObserver':
+    def watch(self, machine: WatchedMachine) -> '_RatesObserver':
         """Follow a wrapped machine.
 
-        :returns: the observer, already among `container.events.observers`.
+        :returns: the observer, already among the observers of its events.
         """
-        observer = _RatesObserver(self, container)
-        container.events.observers.append(observer)
-        self.request(container)
+        observer = _RatesObserver(self, machine)
+        _source_of(machine).events.observers.append(observer)
+        self.request(machine)
         return observer
 
-    def request(self, container: Any) -> None:
+    def request(self, machine: WatchedMachine) -> None:
         """Publish this machine's rates soon."""
-        if id(container) in self._pending:  # the common case, without the lock: the thread will look at it anyway
+        # the common case, without the lock: the thread will look at it anyway
+        if id(machine) in self._pending:
             return
         with self._wake:
-            self._pending[id(container)] = weakref.ref(container)
+            self._pending[id(machine)] = weakref.ref(machine)
             self._wake.notify()
 
-    def publish(self, container: Any) -> None:
+    def publish(self, machine: WatchedMachine) -> None:
         """Publish this machine's rates now."""
         with self._publishing:
-            message = rates_to_msg(container.trial_id, container.rates(), container.transition_counts())
+            message = rates_of(machine)
             if not rospy.is_shutdown() and not self._closed:
                 self._publisher.publish(message)
 
@@ -109,13 +151,14 @@ class RatesPublisher:
                 self._wake.wait()
             return not self._closed
 
-    def _publish_quietly(self, container: Optional[Any]) -> None:
-        if container is None:
+    def _publish_quietly(self, machine: Optional[WatchedMachine]) -> None:
+        if machine is None:
             return
         try:
-            self.publish(container)
-        except RuntimeError:  # a table grew while it was read: the machine goes on, the next round gets it
-            self.request(container)
+            self.publish(machine)
+        except RuntimeError:
+            # a table grew while it was read: the machine goes on, the next round gets it
+            self.request(machine)
         except Exception as err:  # this thread serves every machine of the process
             rospy.logerr('~oracle/rates: %r', err)
 
@@ -123,15 +166,15 @@ class RatesPublisher:
 class _RatesObserver:
     """Marks one machine as changed; publishes at once at the end of a trial."""
 
-    def __init__(self, publisher: RatesPublisher, container: Any) -> None:
+    def __init__(self, publisher: RatesPublisher, machine: WatchedMachine) -> None:
         self._publisher = publisher
-        self._container = weakref.ref(container)
+        self._machine = weakref.ref(machine)
 
     def __call__(self, event: Event) -> None:
-        container = self._container()
-        if container is None:
+        machine = self._machine()
+        if machine is None:
             return
         if event.kind == EventKind.TRIAL_END:
-            self._publisher.publish(container)
-        elif event.kind in STEPS_THAT_TEACH:
-            self._publisher.request(container)
+            self._publisher.publish(machine)
+        elif event.kind in KINDS_THAT_CHANGE_RATES:
+            self._publisher.request(machine)

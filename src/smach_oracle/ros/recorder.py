@@ -1,20 +1,35 @@
-"""Records each trial into a bag of its own, without losing an event and without ever holding the robot up for good."""
+"""Records each trial into a bag of its own.
+
+No event is lost, and the robot is never held up for good.
+"""
 import atexit
 import logging
 import os
 import threading
 import time
-from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Tuple, Union
 from weakref import WeakSet
 
+import genpy
 import rospy
 
-from ..oracle.events import Event, EventKind, EventSource
-from ..oracle.paths import path_of
-from .recorder_disk import Reporter, Topics, TrialBags, status_message
-from .recorder_queue import EndItem, EventItem, MessageItem, RecorderQueue, SnapshotItem
-from .recorder_status import DiskWatch, Losses, RecorderState, Status
-from .recorder_topics import TopicListener, now
+from smach_oracle.oracle.records.events import Event, EventKind, EventSource
+from smach_oracle.oracle.settings.paths import path_of
+
+from .recording.recorder_queue import (
+    EndItem,
+    EventItem,
+    MessageItem,
+    QueueItem,
+    RecorderQueue,
+    SnapshotItem,
+)
+from .recording.recorder_status import DiskWatch, LossCounter, RecorderState, RecordingStatus
+from .recording.recorder_topics import MessageClass, TopicListener, now
+from .recording.trial_bags import RecorderTopics, Reporter, TrialBags, status_message
+
+if TYPE_CHECKING:  # it imports smach, which events of another source can do without
+    from smach_oracle.oracle import OracleContainer
 
 MAX_EVENTS = 1000
 WEIGHT_OF_A_FILE = 20  # opening and closing one takes as long as writing so many events
@@ -22,39 +37,43 @@ MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 HUNG_AFTER_S = 5.0
 CLOSE_S = 1.0
 
-Snapshots = Mapping[str, Callable[[], Any]]  # topic -> genpy.Message or None
+Snapshots = Mapping[str, Callable[[], Optional[genpy.Message]]]  # by topic
+Log = Callable[[str], None]
+StatusCallback = Callable[[RecordingStatus], None]
 
 
 class TrialRecorder:
     """Writes the events of every attached machine, and the messages of other topics, to `folder`.
 
-    While the disk works, the machine waits for the recorder where it must (bounded queue). Where the disk fails, or
-    hangs for more than `hung_after_s`, events are dropped, counted and reported, and the robot goes on. With a node
-    (rospy initialised before), topics are subscribed to and `~record/status` is published; without one, the events
-    alone are recorded.
+    While the disk works, the machine waits for the recorder where it must (bounded queue). Where
+    the disk fails, or hangs for more than `hung_after_s`, events are dropped, counted and reported,
+    and the robot goes on. With a node (rospy initialised before), topics are subscribed to and
+    `~record/status` is published; without one, the events alone are recorded.
     """
 
-    def __init__(self, folder: str, topics: Sequence[str] = (), *, types: Optional[Mapping[str, Any]] = None,
-                 warn: Optional[Callable[[str], None]] = None,
-                 say: Optional[Callable[[str], None]] = None, on_status: Optional[Callable[[Status], None]] = None,
+    def __init__(self, folder: str, topics: Sequence[str] = (), *,
+                 types: Optional[Mapping[str, MessageClass]] = None, warn: Optional[Log] = None,
+                 say: Optional[Log] = None, on_status: Optional[StatusCallback] = None,
                  max_events: int = MAX_EVENTS, max_message_bytes: int = MAX_MESSAGE_BYTES,
                  hung_after_s: float = HUNG_AFTER_S) -> None:
         """Create the folder, mend the bags of recorders that died in it, and start.
 
         :param topics: names of other topics to record, each from when it is first published.
         :param types: message classes of those of them that are known beforehand.
-        :param warn: told what went wrong, `say`: what is good to know; default: rospy's log, or without a node the
-            log `smach_oracle.recorder`.
-        :param on_status: told each change of status, in the recorder's threads.
-        :raises OSError: where the folder cannot be made or written: better known before the robot moves.
+        :param warn: logs faults; default: rospy's log, or without a node the log
+            `smach_oracle.recorder`.
+        :param say: logs good news; default as for `warn`.
+        :param on_status: called with each change of status, in the recorder's threads.
+        :raises OSError: where the folder cannot be made or written: better known before the robot
+            moves.
         """
         self.folder = os.path.abspath(path_of(folder))
         prepare_folder(self.folder)
-        default_say, default_warn = default_log()
+        default_info, default_warn = default_log()
         self._on_status = on_status
         self._publisher = StatusPublisher() if has_node() else None
-        self._reporter = Reporter(say or default_say, warn or default_warn, self._report)
-        self.losses = Losses()
+        self._reporter = Reporter(say or default_info, warn or default_warn, self._report)
+        self.losses = LossCounter()
         self._watch = DiskWatch(hung_after_s)
         self._queue = RecorderQueue(max_events, max_message_bytes)
         self._topics = own_topics()
@@ -66,21 +85,25 @@ class TrialRecorder:
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
         self._thread.start()
-        self._listener = TopicListener(topics, self._take_message, types) if topics and has_node() else None
+        self._listener = TopicListener(topics, self._take_message,
+                                       types) if topics and has_node() else None
         atexit.register(self.close)
 
-    def attach(self, machine: Any, snapshots: Optional[Snapshots] = None) -> None:
+    def attach(self, machine: Union['OracleContainer', EventSource],
+               snapshots: Optional[Snapshots] = None) -> None:
         """Record the trials of a machine: an OracleContainer, or any EventSource. Twice is once.
 
-        :param snapshots: by topic, what gives a message (or None) to be recorded at the start and at the end of each
-            trial; called in the machine's thread.
+        :param snapshots: by topic, what gives a message (or None) to be recorded at the start and
+            at the end of each trial; called in the machine's thread.
         """
         source = machine if isinstance(machine, EventSource) else machine.events
         if source in self._attached:
             return
         self._attached.add(source)
-        source.observers.append(_Attachment(self._observe, self._put_snapshot, self._put_end, self._reporter.warn,
-                                            {resolve(topic): take for topic, take in (snapshots or {}).items()}))
+        source.observers.append(
+            _MachineObserver(self._observe, self._put_snapshot, self._put_end, self._reporter.warn,
+                        {resolve(topic): take
+                         for topic, take in (snapshots or {}).items()}))
 
     def __call__(self, event: Event) -> None:
         """Record one event; the observer that a machine without snapshots may be given directly."""
@@ -95,7 +118,7 @@ class TrialRecorder:
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
 
-    def _put_snapshot(self, trial_id: str, topic: str, message: Any) -> None:
+    def _put_snapshot(self, trial_id: str, topic: str, message: genpy.Message) -> None:
         self._queue.put_event(SnapshotItem(trial_id, topic, message, now()), self._may_wait)
 
     def _put_end(self, trial_id: str) -> None:
@@ -112,9 +135,13 @@ class TrialRecorder:
         if self._hung or self._closed:
             return
         self._hung = True
-        text = '{}: the disk has hung for more than {:g} s'.format(self.folder, self._watch.hung_after_s)
-        self._reporter.warn('Trials are not recorded any more, events are dropped and counted; {}'.format(text))
-        self._report(Status(RecorderState.DROPPING, events_lost_in_total=self.losses.events, text=text))
+        text = '{}: the disk has hung for more than {:g} s'.format(self.folder,
+                                                                   self._watch.hung_after_s)
+        self._reporter.warn(
+            'Trials are not recorded any more, events are dropped and counted; {}'.format(text))
+        self._report(
+            RecordingStatus(RecorderState.DROPPING, events_lost_in_total=self.losses.events,
+                            text=text))
 
     def _write_all(self) -> None:
         try:
@@ -129,12 +156,13 @@ class TrialRecorder:
         finally:
             self._queue.finish()
 
-    def _note_answer(self, items: Sequence[Any]) -> None:
+    def _note_answer(self, items: Sequence[QueueItem]) -> None:
         if self._hung and items:
             self._hung = False
-            self._reporter.say('The disk answers again; {} events were lost so far'.format(self.losses.events))
+            self._reporter.info('The disk answers again; {} events were lost so far'.format(
+                self.losses.events))
 
-    def _write(self, item: Any) -> None:
+    def _write(self, item: QueueItem) -> None:
         try:
             self._bags.write(item)
         except Exception as err:  # one event that cannot be converted must not cost all later ones
@@ -142,43 +170,52 @@ class TrialRecorder:
                 self.losses.add_events(item.event.trial_id, 1)
             self._reporter.warn('Not recorded: {!r}: {!r}'.format(item, err))
 
-    def _report(self, status: Status) -> None:
-        for tell in (self._on_status, self._publisher):
-            if tell is not None:
+    def _report(self, status: RecordingStatus) -> None:
+        for publish in (self._on_status, self._publisher):
+            if publish is not None:
                 try:
-                    tell(status)
-                except Exception as err:  # whoever listens must not stop the writer
+                    publish(status)
+                except Exception as err:  # a listener must not stop the writer
                     self._reporter.warn('Recorder status not passed on: {!r}'.format(err))
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
-        """Write what waits, close all bags, also of trials that have not ended, and stop. Idempotent, any thread.
+        """Write what waits, close all bags, also of trials that have not ended, and stop.
 
-        :returns: whether all was done within `timeout_s`; False where the disk hangs: the bags are mended at the next
-            start.
+        Idempotent, any thread.
+
+        :returns: whether all was done within `timeout_s`; False where the disk hangs: the bags are
+            mended at the next start.
         """
         if os.getpid() != self._process:
             return True
         first, self._closed = not self._closed, True
         done = self._queue.close(timeout_s)
-        if first and self._listener is not None:  # unsubscribing talks to the master, which may be gone
-            threading.Thread(target=self._listener.close, name='recorder unsubscribes', daemon=True).start()
+        # unsubscribing talks to the master, which may be gone
+        if first and self._listener is not None:
+            threading.Thread(target=self._listener.close, name='recorder unsubscribes',
+                             daemon=True).start()
         if first:
-            self._say_goodbye(done)
+            self._report_closing(done)
         return done
 
-    def _say_goodbye(self, done: bool) -> None:
+    def _report_closing(self, done: bool) -> None:
         atexit.unregister(self.close)
         if not done:
-            self._reporter.warn('{}: the disk did not let the recorder close its bags in time'.format(self.folder))
-        self._report(Status(RecorderState.CLOSED, events_lost_in_total=self.losses.events,
+            self._reporter.warn(
+                '{}: the disk did not let the recorder close its bags in time'.format(self.folder))
+        self._report(RecordingStatus(RecorderState.CLOSED, events_lost_in_total=self.losses.events,
                             messages_dropped=self.losses.messages))
 
 
-class _Attachment:
-    """The observer of one machine: knows which trial it is in, and takes the snapshots around it."""
+class _MachineObserver:
+    """The observer of one machine.
 
-    def __init__(self, observe: Callable[[Event], None], put_snapshot: Callable[[str, str, Any], None],
-                 put_end: Callable[[str], None], warn: Callable[[str], None], snapshots: Snapshots) -> None:
+    It knows which trial the machine is in, and takes the snapshots around it.
+    """
+
+    def __init__(self, observe: Callable[[Event], None],
+                 put_snapshot: Callable[[str, str, genpy.Message], None],
+                 put_end: Callable[[str], None], warn: Log, snapshots: Snapshots) -> None:
         self._observe = observe
         self._put_snapshot = put_snapshot
         self._put_end = put_end
@@ -208,13 +245,14 @@ class _Attachment:
 
 
 class StatusPublisher:
-    """Tells the operator: latched topic `~record/status`."""
+    """Publishes the status on the latched topic `~record/status`."""
 
     def __init__(self) -> None:
         from smach_oracle.msg import RecorderStatus
-        self._publisher = rospy.Publisher('~record/status', RecorderStatus, latch=True, queue_size=10)
+        self._publisher = rospy.Publisher('~record/status', RecorderStatus, latch=True,
+                                          queue_size=10)
 
-    def __call__(self, status: Status) -> None:
+    def __call__(self, status: RecordingStatus) -> None:
         message = status_message(status)
         message.header.stamp.secs, message.header.stamp.nsecs = now().ros or (0, 0)
         self._publisher.publish(message)
@@ -226,17 +264,20 @@ def has_node() -> bool:
 
 
 def resolve(topic: str) -> str:
-    """A topic's name as it is in the bag; without a node there is no name to put in front of `~`."""
+    """A topic's name as it is in the bag.
+
+    Without a node there is no name to put in front of `~`.
+    """
     return str(rospy.resolve_name(topic)) if has_node() else '/' + topic.lstrip('~/')
 
 
-def own_topics() -> Topics:
+def own_topics() -> RecorderTopics:
     """Where the events and the recorder's status are, in the bag and on the wire."""
-    return Topics(resolve('~oracle/events'), resolve('~record/status'))
+    return RecorderTopics(resolve('~oracle/events'), resolve('~record/status'))
 
 
-def default_log() -> Tuple[Callable[[str], None], Callable[[str], None]]:
-    """What to say good news and bad news to."""
+def default_log() -> Tuple[Log, Log]:
+    """Functions that log good news and faults."""
     if has_node():
         return rospy.loginfo, rospy.logerr
     log = logging.getLogger('smach_oracle.recorder')
@@ -244,7 +285,10 @@ def default_log() -> Tuple[Callable[[str], None], Callable[[str], None]]:
 
 
 def prepare_folder(folder: str) -> None:
-    """Make the folder and try that a file can be made in it; raises OSError."""
+    """Make the folder and try that a file can be made in it.
+
+    :raises OSError: where it cannot.
+    """
     os.makedirs(folder, exist_ok=True)
     probe = os.path.join(folder, '.recorder-{}-{}'.format(os.getpid(), time.monotonic_ns()))
     os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))

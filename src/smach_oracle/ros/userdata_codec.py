@@ -1,24 +1,26 @@
-"""Userdata across a process border: JSON for plain data, serialised ROS messages for messages and lists of them.
+"""Encodes userdata for other processes.
+
+Plain data becomes JSON; messages and lists of them become serialised ROS messages.
 
     encode(key, value) -> UserdataItem     encode_all(mapping) -> [UserdataItem]
     decode(item) -> value                  decode_all(items) -> {key: value}
 
-What fits neither encoding, or is larger than a limit, becomes an UNSENT item that names its Python type, so that a
-person at least sees that the key exists. Nothing is ever pickled. A tuple arrives as a list.
+What fits neither encoding, or is larger than a limit, becomes an UNSENT item that names its Python
+type, so that a person at least sees that the key exists. Nothing is ever pickled. A tuple arrives
+as a list.
 """
 import io
 import json
 import math
 import re
 import struct
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, NoReturn, Optional, Sequence
 
 import genpy
 import roslib.message
 
 from smach_oracle.msg import UserdataItem
-
-from ..oracle.errors import OracleError
+from smach_oracle.oracle.errors import OracleError
 
 SUMMARY_BYTES = 4096  # a question is read by people: larger values only slow the list down
 TRANSFER_BYTES = 64 * 1024 * 1024  # between programs: a camera image passes, a runaway does not
@@ -28,10 +30,10 @@ _MESSAGE_TYPE = re.compile(r'[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z')
 
 
 class UserdataCodecError(OracleError, ValueError):
-    """An item that is not what it says it is; the text names the key."""
+    """A malformed item; the text names the key."""
 
 
-def encode(key: str, value: Any, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
+def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
     """One value for the wire; never raises for a value: what cannot be sent becomes UNSENT.
 
     :raises UserdataCodecError: if the key is not a string.
@@ -40,8 +42,9 @@ def encode(key: str, value: Any, limit_bytes: int = TRANSFER_BYTES) -> UserdataI
         raise UserdataCodecError('userdata key {!r} is not a string'.format(key))
     if isinstance(value, genpy.Message):
         return _encode_messages(key, UserdataItem.ROS_MESSAGE, [value], limit_bytes)
-    if _is_message_list(value):
-        return _encode_messages(key, UserdataItem.ROS_MESSAGES, value, limit_bytes)
+    messages = _message_list(value)
+    if messages is not None:
+        return _encode_messages(key, UserdataItem.ROS_MESSAGES, messages, limit_bytes)
     text = _json_bytes(value, limit_bytes)
     if text is None:
         return _unsent(key, _python_type(value))
@@ -70,9 +73,11 @@ def decode(item: UserdataItem) -> Any:
         message_class = _message_class(item)
         return [_deserialize(item, part, message_class) for part in _parts(item)]
     if item.encoding == UserdataItem.UNSENT:
-        raise UserdataCodecError('userdata {!r}: its value (a {}) was not sent'.format(item.key, item.type or '?'))
-    raise UserdataCodecError('userdata {!r}: encoding {} is unknown; allowed: JSON (1), ROS_MESSAGE (2), UNSENT (3), '
-                             'ROS_MESSAGES (4)'.format(item.key, item.encoding))
+        raise UserdataCodecError('userdata {!r}: its value (a {}) was not sent'.format(
+            item.key, item.type or '?'))
+    raise UserdataCodecError(
+        'userdata {!r}: encoding {} is unknown; allowed: JSON (1), ROS_MESSAGE (2), UNSENT (3), '
+        'ROS_MESSAGES (4)'.format(item.key, item.encoding))
 
 
 def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict[str, Any]:
@@ -90,13 +95,14 @@ def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict
     return values
 
 
-def _is_message_list(value: Any) -> bool:
-    """Whether this is a list of messages of one type, such as the objects of a detection."""
-    return (isinstance(value, (list, tuple)) and bool(value) and isinstance(value[0], genpy.Message)
-            and all(type(item) is type(value[0]) for item in value))
+def _message_list(value: object) -> Optional[Sequence[genpy.Message]]:
+    """The messages in a list of one type, such as the objects of a detection; else None."""
+    if not isinstance(value, (list, tuple)) or not value or not isinstance(value[0], genpy.Message):
+        return None
+    return value if all(type(item) is type(value[0]) for item in value) else None
 
 
-def _json_bytes(value: Any, limit_bytes: int) -> Optional[bytes]:
+def _json_bytes(value: object, limit_bytes: int) -> Optional[bytes]:
     """UTF-8 JSON, or None where the value is not plain data or too large."""
     try:
         if not _is_plain(value, limit_bytes):
@@ -107,7 +113,8 @@ def _json_bytes(value: Any, limit_bytes: int) -> Optional[bytes]:
     return text if len(text) <= limit_bytes else None
 
 
-def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message], limit_bytes: int) -> UserdataItem:
+def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
+                     limit_bytes: int) -> UserdataItem:
     buffer = io.BytesIO()
     single = encoding == UserdataItem.ROS_MESSAGE
     try:
@@ -117,32 +124,36 @@ def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
                 buffer.write(_LENGTH.pack(0))
             message.serialize(buffer)
             if not single:
-                buffer.getbuffer()[start:start + _LENGTH.size] = _LENGTH.pack(buffer.tell() - start - _LENGTH.size)
+                buffer.getbuffer()[start:start + _LENGTH.size] = _LENGTH.pack(buffer.tell() -
+                                                                              start - _LENGTH.size)
             if buffer.tell() > limit_bytes:
                 return _unsent(key, _python_type(messages) if not single else message._type)
     except (genpy.SerializationError, ValueError, TypeError, AttributeError):
-        return _unsent(key, messages[0]._type)  # fields of the wrong type: the message itself is broken
-    return UserdataItem(key=key, encoding=encoding, type=messages[0]._type, md5sum=messages[0]._md5sum,
-                        value=buffer.getvalue())
+        return _unsent(key,
+                       messages[0]._type)  # fields of the wrong type: the message itself is broken
+    return UserdataItem(key=key, encoding=encoding, type=messages[0]._type,
+                        md5sum=messages[0]._md5sum, value=buffer.getvalue())
 
 
-def _decode_json(item: UserdataItem) -> Any:
+def _decode_json(item: UserdataItem) -> object:
     try:
         return json.loads(bytes(item.value).decode('utf-8'), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as err:
         raise UserdataCodecError('userdata {!r} is not JSON: {}'.format(item.key, err)) from err
 
 
-def _refuse_constant(name: str) -> Any:
+def _refuse_constant(name: str) -> NoReturn:
     raise ValueError('{} is not a JSON number'.format(name))
 
 
 def _message_class(item: UserdataItem) -> type:
     if not _MESSAGE_TYPE.match(item.type):  # also keeps odd names away from the import that follows
-        raise UserdataCodecError('userdata {!r}: {!r} is not the name of a message type'.format(item.key, item.type))
+        raise UserdataCodecError('userdata {!r}: {!r} is not the name of a message type'.format(
+            item.key, item.type))
     message_class = roslib.message.get_message_class(item.type)
     if message_class is None:
-        raise UserdataCodecError('userdata {!r}: message type {} is not installed here'.format(item.key, item.type))
+        raise UserdataCodecError('userdata {!r}: message type {} is not installed here'.format(
+            item.key, item.type))
     if message_class._md5sum != item.md5sum:
         raise UserdataCodecError('userdata {!r}: {} has md5 {} here and {} at the sender'.format(
             item.key, item.type, message_class._md5sum, item.md5sum or '(none)'))
@@ -178,8 +189,8 @@ def _deserialize(item: UserdataItem, data: bytes, message_class: type) -> genpy.
     return message
 
 
-def _is_plain(value: Any, budget_bytes: int) -> bool:
-    """Whether JSON says it without loss, looking at no more of it than the budget can hold.
+def _is_plain(value: object, budget_bytes: int) -> bool:
+    """Whether JSON holds it without loss, looking at no more of it than the budget allows.
 
     Goes by a list, not by recursion: neither depth nor a cycle can overrun the stack.
     """
@@ -203,7 +214,7 @@ def _is_plain(value: Any, budget_bytes: int) -> bool:
     return True
 
 
-def _is_plain_leaf(item: Any) -> bool:
+def _is_plain_leaf(item: object) -> bool:
     if isinstance(item, float):
         return math.isfinite(item)
     return item is None or isinstance(item, (bool, int, str))
@@ -213,6 +224,7 @@ def _unsent(key: str, type_name: str) -> UserdataItem:
     return UserdataItem(key=key, encoding=UserdataItem.UNSENT, type=type_name)
 
 
-def _python_type(value: Any) -> str:
+def _python_type(value: object) -> str:
     kind = type(value)
-    return kind.__qualname__ if kind.__module__ == 'builtins' else '{}.{}'.format(kind.__module__, kind.__qualname__)
+    return kind.__qualname__ if kind.__module__ == 'builtins' else '{}.{}'.format(
+        kind.__module__, kind.__qualname__)

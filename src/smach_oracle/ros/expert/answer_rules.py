@@ -1,11 +1,18 @@
 """Does an expert's decision fit the question? Pure: works on the fields of the messages alone."""
-from typing import Callable, Dict, Iterable
+from typing import Dict, Iterable
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, UserdataItem
+from smach_oracle.oracle.asking.answer_rules import (
+    AnswerChoices,
+    check_answer,
+    check_output_keys,
+)
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, names
+from smach_oracle.oracle.errors import AnswerError
 
-from ..oracle.errors import AnswerError
-from ..oracle.question import names
-from .userdata_codec import UserdataCodecError, decode
+from ..userdata_codec import UserdataCodecError, decode
+
+_KINDS = [int(kind) for kind in AnswerKind]
 
 
 def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
@@ -15,18 +22,28 @@ def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
     """
     if not decision.by.strip():
         raise AnswerError('the answer does not say who gives it: `by` is empty')
-    check = _CHECKS.get(decision.kind)
-    if check is None:
-        raise AnswerError('decision kind {} is unknown; allowed: GOTO (1), SUPERSEDE (2), GIVE_UP (3), INTERFACE (4)'
-                          .format(decision.kind))
-    check(goal, decision)
-    _check_outputs(goal, decision)
+    if decision.kind not in _KINDS:
+        raise AnswerError('decision kind {} is unknown; allowed: GOTO (1), SUPERSEDE (2), '
+                          'GIVE_UP (3), INTERFACE (4)'.format(decision.kind))
+    choices = choices_in(goal)
+    check_answer(Answer(AnswerKind(decision.kind), decision.state, decision.outcome,
+                        decision.interface), choices)
+    _check_outputs(choices, decision)
+
+
+def choices_in(goal: ExpertQueryGoal) -> AnswerChoices:
+    """Return what an answer to a question may choose from."""
+    return AnswerChoices(goal.container_path, goal.failed_state,
+                   {choice.state: choice.blocked for choice in goal.choices},
+                   [choice.outcome for choice in goal.supersede_outcomes], goal.give_up_outcomes,
+                   [offer.name for offer in goal.interfaces], goal.output_keys)
 
 
 def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
     """Whether both ask the same of the robot, whoever gave them and why."""
-    return all(getattr(one, field) == getattr(other, field) for field in ('kind', 'state', 'outcome', 'interface')) \
-        and _items(one) == _items(other)
+    fields = ('kind', 'state', 'outcome', 'interface')
+    return (all(getattr(one, field) == getattr(other, field) for field in fields)
+            and _items(one) == _items(other))
 
 
 def describe_decision(decision: ExpertDecision) -> str:
@@ -42,53 +59,12 @@ def describe_decision(decision: ExpertDecision) -> str:
     return 'no decision'
 
 
-def _check_goto(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
-    choices = {choice.state: choice for choice in goal.choices}
-    free = [choice.state for choice in goal.choices if not choice.blocked]
-    if decision.state not in choices:
-        raise AnswerError('{} has no state {!r} to go to; allowed: {}'.format(
-            goal.container_path, decision.state, names(free)))
-    if choices[decision.state].blocked:
-        raise AnswerError('{} cannot be entered now: {}; allowed: {}'.format(
-            decision.state, choices[decision.state].blocked, names(free)))
-
-
-def _check_supersede(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
-    allowed = [choice.outcome for choice in goal.supersede_outcomes]
-    if decision.outcome not in allowed:
-        raise AnswerError('{} has no outcome {!r} to supersede it with; allowed: {}'.format(
-            goal.failed_state, decision.outcome, names(allowed)))
-
-
-def _check_give_up(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
-    if decision.outcome and decision.outcome not in goal.give_up_outcomes:
-        raise AnswerError('{} has no outcome {!r} to give up with; allowed: {}, or none at all'
-                          .format(goal.container_path, decision.outcome, names(goal.give_up_outcomes)))
-
-
-def _check_interface(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
-    allowed = [offer.name for offer in goal.interfaces]
-    if decision.interface not in allowed:
-        raise AnswerError('no interface {!r} is on offer for {}; allowed: {}'.format(
-            decision.interface, goal.failed_state, names(allowed)))
-
-
-_CHECKS: Dict[int, Callable[[ExpertQueryGoal, ExpertDecision], None]] = {
-    ExpertDecision.GOTO: _check_goto,
-    ExpertDecision.SUPERSEDE: _check_supersede,
-    ExpertDecision.GIVE_UP: _check_give_up,
-    ExpertDecision.INTERFACE: _check_interface,
-}
-
-
-def _check_outputs(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
+def _check_outputs(choices: AnswerChoices, decision: ExpertDecision) -> None:
     keys = [item.key for item in decision.outputs]
-    unknown = [key for key in keys if key not in goal.output_keys]
-    if unknown:
-        raise AnswerError('{} has no output keys {}; allowed: {}'.format(
-            goal.failed_state, names(unknown), names(goal.output_keys)))
+    check_output_keys(keys, choices)
     if len(set(keys)) < len(keys):
-        raise AnswerError('output keys come twice: {}'.format(names({key for key in keys if keys.count(key) > 1})))
+        raise AnswerError('output keys come twice: {}'.format(
+            names({key for key in keys if keys.count(key) > 1})))
     _check_values(decision.outputs)
 
 
@@ -103,4 +79,7 @@ def _check_values(items: Iterable[UserdataItem]) -> None:
 
 
 def _items(decision: ExpertDecision) -> Dict[str, object]:
-    return {item.key: (item.encoding, item.type, item.md5sum, bytes(item.value)) for item in decision.outputs}
+    return {
+        item.key: (item.encoding, item.type, item.md5sum, bytes(item.value))
+        for item in decision.outputs
+    }

@@ -1,4 +1,4 @@
-"""The executive's way to its experts: questions as goals to an ExpertQuery server, own or shared."""
+"""Asks the experts: sends questions as goals to an ExpertQuery server, own or shared."""
 import math
 import threading
 import time
@@ -8,38 +8,55 @@ import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
-from smach_oracle.msg import (ExpertQueryAction, ExpertQueryFeedback, ExpertQueryGoal, ExpertQueryResult,
-                              InterfaceOutput, SharedAutonomyAction, SharedAutonomyResult)
+from smach_oracle.msg import (
+    ExpertQueryAction,
+    ExpertQueryFeedback,
+    ExpertQueryGoal,
+    ExpertQueryResult,
+    InterfaceOutput,
+    SharedAutonomyAction,
+    SharedAutonomyResult,
+)
+from smach_oracle.oracle.asking.question import (
+    Answer,
+    AnswerKind,
+    Expert,
+    Progress,
+    Question,
+)
+from smach_oracle.oracle.errors import InterfaceError
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
-from ..oracle.errors import InterfaceError
-from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progress, Question, names
-from .expert_server import ExpertQueryServer
-from .failure_frames import FailureCameras
-from .goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
-from .interface_starting import InterfaceStarter, StartedInterface
+from ..goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
+from ..interfaces.starting import InterfaceStarter, StartedInterface
+from ..userdata_codec import UserdataCodecError, decode_all
+from .failure_images import FailureCameras
 from .precondition_watch import PreconditionWatch
 from .question_messages import to_answer, to_goal, to_interface_goal
-from .userdata_codec import UserdataCodecError, decode_all
+from .server import ExpertQueryServer
 
 OWN_SERVER = '~expert_query'
 SERVER_WAIT_S = 5.0
-_EXPIRY_GRACE_S = 1.0  # the server's word that nobody answered is better than our own clock's, where it comes soon
+# the server's word that nobody answered is better than our own clock's, where it comes soon
+_EXPIRY_GRACE_S = 1.0
 _RETRY_S = 0.3
 
 
 class ExpertQueryClient(Expert):
     """Asks the experts behind an ExpertQuery server; may be used from several threads at once.
 
-    A server that dies while a question waits is waited for, and asked again under the same query id, until the
-    deadline.
+    A server that dies while a question waits is waited for, and asked again under the same query
+    id, until the deadline.
     """
 
     def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S,
                  cameras: Sequence[str] = ()) -> None:
-        """`server`: name of a shared server; '' hosts one of this node's own, `~expert_query`, and asks that.
-
-        `robot`: who asks, the node's name where ''. `server_wait_s`: how long a shared-autonomy interface that an
-        expert chose is waited for. `cameras`: topics whose newest frames are told with each question.
+        """
+        :param server: name of a shared server; '' hosts one of this node's own, `~expert_query`,
+            and asks that.
+        :param robot: who asks; '' is the node's name.
+        :param server_wait_s: how long to wait for a shared-autonomy interface that an expert chose.
+        :param cameras: topics whose newest images are published with each question.
         """
         self.robot = robot or rospy.get_name()
         self.server: Optional[ExpertQueryServer] = None if server else ExpertQueryServer(OWN_SERVER)
@@ -51,19 +68,22 @@ class ExpertQueryClient(Expert):
         self._interfaces: Dict[str, GoalLink] = {}
         self._interfaces_lock = threading.Lock()
 
-    def ask(self, question: Question, cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
-        """The answer, or None where nobody gave one by the deadline or `cancelled` was set.
+    def ask(self, question: Question, cancelled: threading.Event,
+            progress: Progress) -> Optional[Answer]:
+        """The answer, or None where there is none by the deadline or `cancelled` was set.
 
-        :raises AnswerError: if the answer cannot be used here, such as outputs of a message type that is not
-            installed.
+        :raises AnswerError: if the answer cannot be used here, such as outputs of a message type
+            that is not installed.
         """
-        self._cameras.tell(question)
-        with self._watch.over(question):
-            return _Asking(self._link, to_goal(question, self.robot), progress).run(cancelled)
+        self._cameras.publish_for(question)
+        with self._watch.while_open(question):
+            return _SentQuestion(self._link, to_goal(question, self.robot), progress).run(cancelled)
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Run a shared-autonomy interface, which is started where it is not there; None where it fails or is cancelled.
+        """Run a shared-autonomy interface; None where it fails or is cancelled.
+
+        It is started where it is not there.
 
         :raises InterfaceError: where it is not there, and cannot be started or does not come up.
         """
@@ -72,7 +92,7 @@ class ExpertQueryClient(Expert):
         answer = None
         try:
             result = self._run(offer, question, cancelled)
-            answer = _to_supersede(offer, question, result) if result is not None else None
+            answer = _to_supersede(offer, result) if result is not None else None
         finally:
             if announcement is not None:
                 announcement.cancel()
@@ -89,7 +109,7 @@ class ExpertQueryClient(Expert):
             self.server.stop()
 
     def _announce(self, offer: InterfaceOffer, question: Question) -> Optional[SentGoal]:
-        """Let the front ends see, for as long as this goal lives, that an interface runs for the question."""
+        """Show the front ends, while this goal lives, that an interface runs for the question."""
         if not self._link.ready():
             return None
         goal = to_goal(question, self.robot)
@@ -105,33 +125,37 @@ class ExpertQueryClient(Expert):
             return self._result(offer, link, question, cancelled)
         finally:
             if started is not None:
-                started.tell(InterfaceOutput.STOPPED, 'it is being stopped')
+                started.publish_status(InterfaceOutput.STOPPED, 'it is being stopped')
                 started.stop()
 
     def _provide(self, offer: InterfaceOffer, link: GoalLink, query_id: str,
                  cancelled: threading.Event) -> Optional[StartedInterface]:
         """Wait for the action server; start it where it can be started and nobody else has."""
-        if (offer.start is None or _advertised(link)) and _wait_until_ready(link, self._server_wait_s, cancelled):
+        if (offer.start is None or _advertised(link)) and _wait_until_ready(
+                link, self._server_wait_s, cancelled):
             return None
         if offer.start is None or cancelled.is_set():
-            raise InterfaceError('taken back' if cancelled.is_set() else 'no action server at {} within {:g} s'.format(
-                link.name, self._server_wait_s))
+            raise InterfaceError('taken back' if cancelled.is_set(
+            ) else 'no action server at {} within {:g} s'.format(link.name, self._server_wait_s))
         started = self._starter.start(offer, query_id)
         until_s = time.monotonic() + offer.start.limit_s
         while not link.ready():
             why = ''
             if started.exit_code is not None:
-                why = 'it ended by itself with exit code {}: {}'.format(started.exit_code, started.last_words)
+                why = 'it ended by itself with exit code {}: {}'.format(
+                    started.exit_code, started.last_lines)
             elif cancelled.is_set() or rospy.is_shutdown():
                 why = 'taken back'
             elif time.monotonic() > until_s:
-                why = 'it brought up no action server {} within {:g} s'.format(link.name, offer.start.limit_s)
+                why = 'it brought up no action server {} within {:g} s'.format(
+                    link.name, offer.start.limit_s)
             if why:
-                started.tell(InterfaceOutput.FAILED, why)
+                started.publish_status(InterfaceOutput.FAILED, why)
                 started.stop()
                 raise InterfaceError(why)
             cancelled.wait(POLL_S)
-        started.tell(InterfaceOutput.RUNNING, 'its action server {} is there'.format(link.name))
+        started.publish_status(InterfaceOutput.RUNNING,
+                               'its action server {} is there'.format(link.name))
         return started
 
     def _result(self, offer: InterfaceOffer, link: GoalLink, question: Question,
@@ -143,7 +167,7 @@ class ExpertQueryClient(Expert):
             event = sent.poll()
             if event is not None and event.status:
                 return _interface_result(offer, event)
-            if event is None and (not link.alive() or sent.unheard(time.monotonic())):
+            if event is None and _server_lost(link, sent, time.monotonic()):
                 rospy.logwarn('Interface %s: its action server %s is gone', offer.name, link.name)
                 break
         sent.cancel()
@@ -157,7 +181,7 @@ class ExpertQueryClient(Expert):
             return self._interfaces[name]
 
 
-class _Asking:
+class _SentQuestion:
     """One question on its way: sent, sent again after a loss, until it is settled."""
 
     def __init__(self, link: GoalLink, goal: ExpertQueryGoal, progress: Progress) -> None:
@@ -180,7 +204,7 @@ class _Asking:
             if event is None:
                 continue
             if event.feedback is not None:
-                self._tell(event.feedback)
+                self._note_feedback(event.feedback)
             elif self._settled(event):
                 return _answer_of(event)
         if self._sent is not None:
@@ -195,7 +219,7 @@ class _Asking:
                 cancelled.wait(POLL_S)
             return None
         event = self._sent.poll()
-        if event is None and (not self._link.alive() or self._sent.unheard(now_s)):
+        if event is None and _server_lost(self._link, self._sent, now_s):
             self._lose('is gone')
         return event
 
@@ -209,8 +233,8 @@ class _Asking:
             rospy.loginfo('Question %s is asked again at %s', self._goal.query_id, self._link.name)
 
     def _lose(self, what: str) -> None:
-        rospy.logwarn('The expert query server %s %s; question %s waits for it to come back', self._link.name, what,
-                      self._goal.query_id)
+        rospy.logwarn('The expert query server %s %s; question %s waits for it to come back',
+                      self._link.name, what, self._goal.query_id)
         self._sent = None
         self._retry_s = time.monotonic() + _RETRY_S
         self._released('the expert query server {}'.format(what))
@@ -220,12 +244,13 @@ class _Asking:
         if lost(event):
             self._lose('was restarted')
             return False
-        if event.status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED):  # not by us: we would not be here
+        # not by us: we would not be here
+        if event.status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED):
             self._lose('dropped the question')
             return False
         return True
 
-    def _tell(self, feedback: ExpertQueryFeedback) -> None:
+    def _note_feedback(self, feedback: ExpertQueryFeedback) -> None:
         if feedback.status == ExpertQueryFeedback.CLAIMED and feedback.by != self._holder:
             self._holder = feedback.by
             self._progress('claimed', feedback.by, feedback.text)
@@ -238,9 +263,15 @@ class _Asking:
             self._progress('released', holder, text)
 
 
+def _server_lost(link: GoalLink, sent: SentGoal, now_s: float) -> bool:
+    """Whether the server is gone; at a shutdown it goes down with this node, and is not missed."""
+    return not rospy.core.is_shutdown_requested() and (not link.alive() or sent.unheard(now_s))
+
+
 def _answer_of(event: GoalEvent) -> Optional[Answer]:
     result: Optional[ExpertQueryResult] = event.result
-    if event.status == GoalStatus.SUCCEEDED and result is not None and result.status == ExpertQueryResult.ANSWERED:
+    if (event.status == GoalStatus.SUCCEEDED and result is not None
+            and result.status == ExpertQueryResult.ANSWERED):
         return to_answer(result.decision)
     if event.status == GoalStatus.REJECTED:
         rospy.logerr('The expert query server refused a question; nobody was asked')
@@ -267,26 +298,22 @@ def _advertised(link: GoalLink) -> bool:
 def _interface_result(offer: InterfaceOffer, event: GoalEvent) -> Optional[SharedAutonomyResult]:
     if event.status == GoalStatus.SUCCEEDED and event.result is not None:
         return event.result
-    rospy.logwarn('Interface %s ended as %s%s', offer.name, GoalStatus.to_string(event.status),
-                  ': ' + event.result.text if event.result is not None and event.result.text else '')
+    rospy.logwarn(
+        'Interface %s ended as %s%s', offer.name, GoalStatus.to_string(event.status),
+        ': ' + event.result.text if event.result is not None and event.result.text else '')
     return None
 
 
-def _to_supersede(offer: InterfaceOffer, question: Question, result: SharedAutonomyResult) -> Optional[Answer]:
-    """The interface's result as an answer, where it fits the question."""
-    outcomes = [choice.outcome for choice in question.supersede_outcomes]
-    if result.outcome not in outcomes:
-        rospy.logwarn('Interface %s returned outcome %r; allowed: %s', offer.name, result.outcome, names(outcomes))
-        return None
+def _to_supersede(offer: InterfaceOffer, result: SharedAutonomyResult) -> Optional[Answer]:
+    """Return the interface's result as an answer.
+
+    The caller checks whether it fits the question.
+    """
     try:
         outputs = decode_all(result.outputs)
     except UserdataCodecError as err:
         rospy.logwarn('Interface %s: %s', offer.name, err)
         return None
-    unknown = sorted(set(outputs) - set(question.output_keys))
-    if unknown:
-        rospy.logwarn('Interface %s returned outputs %s; allowed: %s', offer.name, names(unknown),
-                      names(question.output_keys))
-        return None
     # no `by`: the decision was that of the expert who started the interface
-    return Answer(AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None, why=result.text)
+    return Answer(AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None,
+                  why=result.text)

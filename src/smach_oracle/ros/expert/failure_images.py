@@ -1,41 +1,43 @@
-"""What the robot's cameras saw when a question was put: told on a latched topic, for those, too, who come later.
+"""Publishes what the robot's cameras saw when a question was put, on a latched topic.
 
-The cameras are listened to all the time, for the frame must be there when the failure is. Nothing of it is waited for.
+The cameras are listened to all the time, for the frame must be there when the failure is. Nothing
+of it is waited for.
 """
 import threading
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Dict, List, Sequence, Tuple, Union
 
 import rosgraph
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
 from smach_oracle.msg import FailureFrames
-
-from ..oracle.errors import ConfigError
-from ..oracle.question import Question
+from smach_oracle.oracle.asking.question import Question
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
 
 TOPIC = '~failure_frames'
 PARAMETER = '~failure_cameras'
 MOST_CAMERAS = 4
 JPEG_QUALITY = 85
-OLDEST_S = 10.0  # ROS time: what a camera saw before it fell silent tells nothing of the failure
+OLDEST_S = 10.0  # ROS time: an older image does not show the failure
 LOOK_AGAIN_S = 1.0  # for the types of topics that nobody has advertised yet
+CameraMessage = Union[Image, CompressedImage]
 _TYPES = {Image._type: Image, CompressedImage._type: CompressedImage}
 
 
 class FailureCameras:
-    """Of a node: holds the newest frame of each camera, and tells them when a question is put."""
+    """Holds the newest image of each camera of a node, and publishes them with a question."""
 
     def __init__(self, topics: Sequence[str]) -> None:
         """`topics` of type Image or CompressedImage, four at most, in colour or grey.
 
-        :raises ConfigError: where they are no names of topics, or more.
+        :raises SettingsError: where they are no names of topics, or more.
         """
-        if not all(isinstance(topic, str) and topic for topic in topics) or len(topics) > MOST_CAMERAS:
-            raise ConfigError('parameter ' + rospy.resolve_name(PARAMETER), topics,
-                              'at most {} names of topics'.format(MOST_CAMERAS))
+        key = 'parameter ' + rospy.resolve_name(PARAMETER)
+        if len(checks.words(key, topics)) > MOST_CAMERAS:
+            raise SettingsError(key, topics, 'at most {} names of topics'.format(MOST_CAMERAS))
         self._topics = [rospy.resolve_name(topic) for topic in topics]
-        self._newest: Dict[str, Tuple[Any, rospy.Time]] = {}  # and when it came
+        self._newest: Dict[str, Tuple[CameraMessage, rospy.Time]] = {}  # and when it came
         self._stopped = threading.Event()
         self._subscribers: Dict[str, rospy.Subscriber] = {}
         self._lock = threading.Lock()
@@ -43,14 +45,20 @@ class FailureCameras:
             self._publisher = rospy.Publisher(TOPIC, FailureFrames, latch=True, queue_size=5)
             threading.Thread(target=self._listen, name='failure cameras', daemon=True).start()
 
-    def tell(self, question: Question) -> None:
-        """Publish what is there now, in a thread of its own; nothing where no camera has been heard of late."""
+    def publish_for(self, question: Question) -> None:
+        """Publish the newest images, in a thread of its own.
+
+        Nothing is published where no camera has been heard lately.
+        """
         now = rospy.get_rostime()
         with self._lock:
-            newest = [(topic, *self._newest[topic]) for topic in self._topics if topic in self._newest]
-        frames = [(topic, image) for topic, image, came in newest if abs((now - came).to_sec()) <= OLDEST_S]
-        if frames:
-            threading.Thread(target=self._publish, args=(question, frames), name='failure frames', daemon=True).start()
+            newest = [(topic, *self._newest[topic]) for topic in self._topics
+                      if topic in self._newest]
+        images = [(topic, image) for topic, image, came in newest
+                  if abs((now - came).to_sec()) <= OLDEST_S]
+        if images:
+            threading.Thread(target=self._publish, args=(question, images), name='failure images',
+                             daemon=True).start()
 
     def stop(self) -> None:
         """Listen no longer."""
@@ -60,44 +68,49 @@ class FailureCameras:
 
     def _listen(self) -> None:
         """Subscribe to each as soon as its type is known."""
-        while len(self._subscribers) < len(self._topics) and not rospy.is_shutdown() and not self._stopped.is_set():
+        while len(self._subscribers) < len(
+                self._topics) and not rospy.is_shutdown() and not self._stopped.is_set():
             try:
                 types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
             except (OSError, rosgraph.MasterException):
                 types = {}
             for topic in self._topics:
                 if topic not in self._subscribers and types.get(topic) in _TYPES:
-                    self._subscribers[topic] = rospy.Subscriber(topic, _TYPES[types[topic]], self._keep,
-                                                                callback_args=topic, queue_size=1, buff_size=1 << 24)
+                    self._subscribers[topic] = rospy.Subscriber(topic, _TYPES[types[topic]],
+                                                                self._keep, callback_args=topic,
+                                                                queue_size=1, buff_size=1 << 24)
             self._stopped.wait(LOOK_AGAIN_S)
 
-    def _keep(self, image: Any, topic: str) -> None:
+    def _keep(self, image: CameraMessage, topic: str) -> None:
         with self._lock:
             self._newest[topic] = image, rospy.get_rostime()
 
-    def _publish(self, question: Question, frames: List[Any]) -> None:
+    def _publish(self, question: Question, images: List[Tuple[str, CameraMessage]]) -> None:
         message = FailureFrames(trial_id=question.trial_id, query_id=question.query_id)
-        for topic, image in frames:
+        for topic, image in images:
             try:
                 message.images.append(compressed(image))
                 message.topics.append(topic)
             except ValueError as err:
-                rospy.logwarn('What %s saw at the failure cannot be told: %s', topic, err)
+                rospy.logwarn('The image of %s at the failure cannot be published: %s', topic, err)
         message.header.stamp = rospy.get_rostime()
         if message.images and not rospy.is_shutdown():
             self._publisher.publish(message)
 
 
-def compressed(image: Any) -> CompressedImage:
+def compressed(image: CameraMessage) -> CompressedImage:
     """A JPEG of an Image; a CompressedImage as it is.
 
-    :raises ValueError: where the image is none in colour or grey.
+    :raises ValueError: where the image is not in colour or grey.
     """
     if not isinstance(image, Image):
         return image
     import cv2  # takes a moment, and is wanted only where there are cameras
-    from .images import colour_of
-    done, data = cv2.imencode('.jpg', colour_of(image)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+
+    from ..images import colour_of
+    done, data = cv2.imencode('.jpg',
+                              colour_of(image)[:, :, ::-1],
+                              [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     if not done:
         raise ValueError('it cannot be encoded')
     return CompressedImage(image.header, 'jpeg', bytes(data))

@@ -1,19 +1,25 @@
-"""The book of open questions: who asked what, who works on it, what was decided. No ROS calls, no threads, no timers.
+"""Open questions: who asked what, who works on it, what was decided. No ROS calls, no threads.
 
-Every method looks at the clock first, so that a lease or a deadline that has passed counts as passed even where nobody
-has called `tick` since. What others must be told is collected as notices, in order, until `drain` takes them. The
-caller serialises the calls.
+Every method looks at the clock first, so that a lease or a deadline that has passed counts as
+passed even where nobody has called `tick` since. News for the askers is collected as notices,
+in order, until `take_notices` takes them. The caller serialises the calls.
 """
 import math
 import time
 from collections import OrderedDict
 from typing import Callable, Dict, List, NamedTuple, Optional
 
-from smach_oracle.msg import ExpertDecision, ExpertQueryFeedback, ExpertQueryGoal, ExpertQueryResult, OpenQuery
+from smach_oracle.msg import (
+    ExpertDecision,
+    ExpertQueryFeedback,
+    ExpertQueryGoal,
+    ExpertQueryResult,
+    OpenQuery,
+)
+from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.srv import ClaimQueryRequest
 
-from ..oracle.errors import AnswerError
-from .decision_check import check_decision, describe_decision, same_decision
+from .answer_rules import check_decision, describe_decision, same_decision
 
 LEASE_S = 15.0
 LONGEST_LEASE_S = 3600.0
@@ -21,23 +27,23 @@ REMEMBERED = 1000
 _IDENTITY = ('robot', 'container_path', 'failed_state', 'interface')
 
 
-class Settled(NamedTuple):
+class SettledQuestion(NamedTuple):
     """How a question ended."""
 
-    goal: ExpertQueryGoal  # once remembered: no more of it than tells it from another question
+    goal: ExpertQueryGoal  # once remembered: no more of it than identifies the question
     status: int  # ExpertQueryResult.ANSWERED, EXPIRED or CANCELLED
     decision: ExpertDecision  # kind 0 where there is none
     text: str  # for people
 
 
-class Notice(NamedTuple):
-    """Something to tell the asker of a question."""
+class QuestionNotice(NamedTuple):
+    """News for the asker of a question."""
 
     query_id: str
     status: int  # ExpertQueryFeedback.PENDING, CLAIMED or INTERFACE_RUNNING; 0 where it is settled
     by: str
     text: str
-    settled: Optional[Settled] = None
+    settled: Optional[SettledQuestion] = None
 
 
 class ClaimReply(NamedTuple):
@@ -56,17 +62,18 @@ class AnswerReply(NamedTuple):
     settled: ExpertDecision
 
 
-class BadQuestion(AnswerError):
-    """A question that the book does not take; the text says why."""
+class QuestionRefusedError(AnswerError):
+    """A question that cannot be taken in; the text gives the reason."""
 
 
 class OpenQuestion:
-    """One question that waits, or whose interface runs. Times are the book's clock's, in seconds."""
+    """One question that waits, or whose interface runs. Times are in s, by the given clock."""
 
     def __init__(self, goal: ExpertQueryGoal, now_s: float) -> None:
         self.goal = goal
         self.opened_s = now_s
-        self.deadline_s = now_s + goal.deadline if goal.deadline > 0 and not goal.interface else math.inf
+        expires = goal.deadline > 0 and not goal.interface
+        self.deadline_s = now_s + goal.deadline if expires else math.inf
         self.holder = ''
         self.lease_until_s = math.inf
 
@@ -79,12 +86,12 @@ class OpenQuestion:
 
     def to_msg(self, now_s: float) -> OpenQuery:
         """As it stands in the open list."""
-        return OpenQuery(
-            query=self.goal, status=self.status, claimed_by=self.holder, age=now_s - self.opened_s,
-            remaining=_remaining(self.deadline_s, now_s), lease_remaining=_remaining(self.lease_until_s, now_s))
+        return OpenQuery(query=self.goal, status=self.status, claimed_by=self.holder,
+                         age=now_s - self.opened_s, remaining=_remaining(self.deadline_s, now_s),
+                         lease_remaining=_remaining(self.lease_until_s, now_s))
 
 
-class QueryBook:
+class OpenQuestions:
     """Open and settled questions by query id."""
 
     def __init__(self, lease_s: float = LEASE_S, remember: int = REMEMBERED,
@@ -93,8 +100,8 @@ class QueryBook:
         self._remember = remember
         self._clock = clock
         self._open: Dict[str, OpenQuestion] = {}
-        self._settled: 'OrderedDict[str, Settled]' = OrderedDict()
-        self._notices: List[Notice] = []
+        self._settled: 'OrderedDict[str, SettledQuestion]' = OrderedDict()
+        self._notices: List[QuestionNotice] = []
 
     def __len__(self) -> int:
         return len(self._open)
@@ -103,14 +110,18 @@ class QueryBook:
         """The open list, oldest first, with the ages and remaining times of this moment."""
         self.tick()
         now_s = self._clock()
-        return [question.to_msg(now_s) for question in sorted(self._open.values(), key=lambda each: each.opened_s)]
+        return [
+            question.to_msg(now_s)
+            for question in sorted(self._open.values(), key=lambda each: each.opened_s)
+        ]
 
-    def open(self, goal: ExpertQueryGoal) -> Optional[Settled]:
-        """Take a question in, or the same one again; returns how it ended where it is settled already.
+    def open(self, goal: ExpertQueryGoal) -> Optional[SettledQuestion]:
+        """Take a question in, or the same one again.
 
         A question that was taken back (or whose asker was thought gone) opens again.
 
-        :raises BadQuestion: no id, a deadline that is no time, or another question's id.
+        :returns: how it ended, where it is settled already; else None.
+        :raises QuestionRefusedError: no id, a deadline that is no time, or another question's id.
         """
         self.tick()
         _check_goal(goal)
@@ -138,22 +149,26 @@ class QueryBook:
         if action == ClaimQueryRequest.RELEASE:
             self._release(question, '{} gave it back'.format(expert))
             return ClaimReply(True, '', '')
-        return self._hold(question, expert, min(lease_s or self._lease_s, LONGEST_LEASE_S))
+        return self._take_claim(question, expert, min(lease_s or self._lease_s, LONGEST_LEASE_S))
 
     def answer(self, query_id: str, decision: ExpertDecision) -> AnswerReply:
-        """Settle a question, or say why not; the question stays open where the answer does not fit."""
+        """Settle a question, or say why not.
+
+        The question stays open where the answer does not fit.
+        """
         self.tick()
         question = self._open.get(query_id)
         settled = self._settled.get(query_id)
         if question is None or question.goal.interface:
-            return self._late(query_id, settled, decision)
+            return self._answer_closed(query_id, settled, decision)
         try:
             check_decision(question.goal, decision)
         except AnswerError as err:
             return AnswerReply(False, str(err), ExpertDecision())
         if question.holder not in ('', decision.by):
-            return AnswerReply(False, '{} works on this question; take it over first'.format(question.holder),
-                               ExpertDecision())
+            return AnswerReply(
+                False, '{} works on this question; take it over first'.format(question.holder),
+                ExpertDecision())
         self._settle(question, ExpertQueryResult.ANSWERED, decision, describe_decision(decision))
         return AnswerReply(True, '', decision)
 
@@ -169,67 +184,76 @@ class QueryBook:
         now_s = self._clock()
         for question in list(self._open.values()):
             if now_s >= question.deadline_s:
-                self._settle(question, ExpertQueryResult.EXPIRED, ExpertDecision(), 'nobody answered by the deadline')
+                self._settle(question, ExpertQueryResult.EXPIRED, ExpertDecision(),
+                             'nobody answered by the deadline')
             elif now_s >= question.lease_until_s:
                 self._release(question, 'the claim of {} ran out'.format(question.holder))
 
     def next_due_s(self) -> float:
-        """When the next lease or deadline passes, by the book's clock; infinity where none will."""
-        times = [min(question.deadline_s, question.lease_until_s) for question in self._open.values()]
+        """When the next lease or deadline passes, by the given clock; infinity where none will."""
+        times = [
+            min(question.deadline_s, question.lease_until_s) for question in self._open.values()
+        ]
         return min(times, default=math.inf)
 
-    def drain(self) -> List[Notice]:
+    def take_notices(self) -> List[QuestionNotice]:
         """The notices since the last call, oldest first."""
         notices, self._notices = self._notices, []
         return notices
 
-    def _admit(self, goal: ExpertQueryGoal, settled: Optional[Settled]) -> None:
+    def _admit(self, goal: ExpertQueryGoal, settled: Optional[SettledQuestion]) -> None:
         question = OpenQuestion(goal, self._clock())
         self._open[goal.query_id] = question
         if not goal.interface:
             self._settled.pop(goal.query_id, None)
-            self._tell(question, '')
+            self._notify(question, '')
             return
         if settled is not None:
             question.holder = settled.decision.by
-        self._tell(question, goal.interface)
+        self._notify(question, goal.interface)
 
-    def _hold(self, question: OpenQuestion, expert: str, lease_s: float) -> ClaimReply:
+    def _take_claim(self, question: OpenQuestion, expert: str, lease_s: float) -> ClaimReply:
         before, question.holder = question.holder, expert
         question.lease_until_s = self._clock() + lease_s
         if before == expert:
             return ClaimReply(True, 'renewed', expert)
         message = 'taken over from {}'.format(before) if before else 'claimed'
-        self._tell(question, message)
+        self._notify(question, message)
         return ClaimReply(True, message, expert)
 
     def _release(self, question: OpenQuestion, text: str) -> None:
         before, question.holder = question.holder, ''
         question.lease_until_s = math.inf
         if before:
-            self._notices.append(Notice(question.goal.query_id, ExpertQueryFeedback.PENDING, before, text))
+            self._notices.append(
+                QuestionNotice(question.goal.query_id, ExpertQueryFeedback.PENDING, before, text))
 
-    def _settle(self, question: OpenQuestion, status: int, decision: ExpertDecision, text: str) -> None:
+    def _settle(self, question: OpenQuestion, status: int, decision: ExpertDecision,
+                text: str) -> None:
         goal = question.goal
         del self._open[goal.query_id]
-        settled = Settled(goal, status, decision, text)
-        self._notices.append(Notice(goal.query_id, 0, decision.by, text, settled))
+        settled = SettledQuestion(goal, status, decision, text)
+        self._notices.append(QuestionNotice(goal.query_id, 0, decision.by, text, settled))
         if goal.interface:
             return  # the answer that started the interface stays the question's settlement
         self._settled[goal.query_id] = settled._replace(goal=_identity(goal))
         while len(self._settled) > self._remember:
             self._settled.popitem(last=False)
 
-    def _tell(self, question: OpenQuestion, text: str) -> None:
-        self._notices.append(Notice(question.goal.query_id, question.status, question.holder, text))
+    def _notify(self, question: OpenQuestion, text: str) -> None:
+        self._notices.append(
+            QuestionNotice(question.goal.query_id, question.status, question.holder, text))
 
-    def _late(self, query_id: str, settled: Optional[Settled], decision: ExpertDecision) -> AnswerReply:
+    def _answer_closed(self, query_id: str, settled: Optional[SettledQuestion],
+              decision: ExpertDecision) -> AnswerReply:
         if settled is None or settled.status != ExpertQueryResult.ANSWERED:
             return AnswerReply(False, self._why_closed(query_id), ExpertDecision())
         first = settled.decision
         if not same_decision(first, decision):
             return AnswerReply(False, self._why_closed(query_id), first)
-        message = 'accepted before' if first.by == decision.by else '{} was first with the same'.format(first.by)
+        message = '{} was first with the same'.format(first.by)
+        if first.by == decision.by:
+            message = 'accepted before'
         return AnswerReply(True, message, first)
 
     def _why_closed(self, query_id: str) -> str:
@@ -243,21 +267,29 @@ class QueryBook:
 
 def _check_goal(goal: ExpertQueryGoal) -> None:
     if not goal.query_id:
-        raise BadQuestion('a question needs a query id')
+        raise QuestionRefusedError('a question needs a query id')
     if not 0 <= goal.deadline < math.inf:
-        raise BadQuestion('deadline {} is not allowed; allowed: seconds, 0 waits without end'.format(goal.deadline))
+        raise QuestionRefusedError(
+            'deadline {} is not allowed; allowed: seconds, 0 waits without end'.format(
+                goal.deadline))
 
 
 def _identity(goal: ExpertQueryGoal) -> ExpertQueryGoal:
-    """The goal without its userdata, history and the like: thousands of them are no light luggage."""
-    return ExpertQueryGoal(query_id=goal.query_id, **{field: getattr(goal, field) for field in _IDENTITY})
+    """The goal without its userdata, history and the like.
+
+    Thousands of them are remembered.
+    """
+    return ExpertQueryGoal(query_id=goal.query_id,
+                           **{field: getattr(goal, field)
+                              for field in _IDENTITY})
 
 
 def _check_same(known: ExpertQueryGoal, goal: ExpertQueryGoal) -> None:
     for field in _IDENTITY:
         if getattr(known, field) != getattr(goal, field):
-            raise BadQuestion('query id {!r} belongs to another question, with {} {!r} instead of {!r}'.format(
-                goal.query_id, field, getattr(known, field), getattr(goal, field)))
+            raise QuestionRefusedError(
+                'query id {!r} belongs to another question, with {} {!r} instead of {!r}'.format(
+                    goal.query_id, field, getattr(known, field), getattr(goal, field)))
 
 
 def _claim_problem(question: OpenQuestion, action: int, expert: str, lease_s: float) -> str:
@@ -265,10 +297,12 @@ def _claim_problem(question: OpenQuestion, action: int, expert: str, lease_s: fl
     if not expert.strip():
         return 'the claim does not say who claims: `expert` is empty'
     if not 0 <= lease_s < math.inf:
-        return 'lease {} is not allowed; allowed: seconds from 0 (the server\'s own setting)'.format(lease_s)
+        return ('lease {} is not allowed; '
+                'allowed: seconds from 0 (the server\'s own setting)'.format(lease_s))
     if action not in (ClaimQueryRequest.CLAIM, ClaimQueryRequest.RENEW, ClaimQueryRequest.RELEASE,
                       ClaimQueryRequest.TAKE_OVER):
-        return 'action {} is unknown; allowed: CLAIM (1), RENEW (2), RELEASE (3), TAKE_OVER (4)'.format(action)
+        return ('action {} is unknown; '
+                'allowed: CLAIM (1), RENEW (2), RELEASE (3), TAKE_OVER (4)'.format(action))
     if question.goal.interface:
         return 'interface {} runs for this question'.format(question.goal.interface)
     if action == ClaimQueryRequest.TAKE_OVER or question.holder == expert:

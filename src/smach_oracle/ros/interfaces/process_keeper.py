@@ -1,9 +1,9 @@
 """Keeps one command and everything that it starts; ends all of it when its standard input closes.
 
-Run as a program, by its path and in isolation (`python3 -I`); standard library only. Arguments: the limits after SIGINT
-and after SIGTERM (s), then the command.
-Whoever started it holds the other end of the pipe: if that process dies, in whatever way, the pipe closes as well. All
-descendants stay its own, also those that begin a session of their own, because it is their subreaper.
+Run as a program, by its path and in isolation (`python3 -I`); standard library only. Arguments: the
+limits after SIGINT and after SIGTERM (s), then the command. Whoever started it holds the other end
+of the pipe: if that process dies, in whatever way, the pipe closes as well. All descendants stay
+its own, also those that begin a session of their own, because it is their subreaper.
 """
 import ctypes
 import os
@@ -20,12 +20,16 @@ _PR_SET_CHILD_SUBREAPER = 36
 
 
 def descendants(root: int) -> List[int]:
-    """Process ids of all descendants of a process; those that have ended, too, until they are collected."""
+    """Process ids of all descendants of a process.
+
+    Those that have ended count until they are collected.
+    """
     children: Dict[int, List[int]] = {}
     for name in os.listdir('/proc'):
         if name.isdigit():
             try:
-                with open('/proc/{}/stat'.format(name), 'rb') as file:  # a name may be cut within a letter
+                # a name may be cut within a letter
+                with open('/proc/{}/stat'.format(name), 'rb') as file:
                     parent = file.read().rpartition(b')')[2].split()[1]
             except (OSError, IndexError):
                 continue
@@ -41,7 +45,7 @@ def descendants(root: int) -> List[int]:
 
 def _reap() -> List[Tuple[int, int]]:
     """Collect all that have ended; (process id, status) of each."""
-    ended = []
+    ended: List[Tuple[int, int]] = []
     while True:
         try:
             pid, status = os.waitpid(-1, os.WNOHANG)
@@ -72,7 +76,10 @@ def _gone_within(limit_s: float) -> bool:
 
 
 def end_all(main_pid: int, interrupt_s: float, terminate_s: float) -> None:
-    """End everything: SIGINT to the command, which ends its children in order; SIGTERM to all that is left; SIGKILL."""
+    """End everything: SIGINT to the command, SIGTERM to all that is left, SIGKILL.
+
+    The command ends its children in order.
+    """
     left = descendants(os.getpid())
     _send([main_pid] if main_pid in left else left, signal.SIGINT)
     if _gone_within(interrupt_s):
@@ -90,7 +97,7 @@ def _prepare(prctl: Callable[..., Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _raise_exit(*_: Any) -> None:
+def _raise_exit(*_: object) -> None:
     raise SystemExit(0)
 
 
@@ -101,7 +108,8 @@ def main(interrupt_s: float, terminate_s: float, command: Sequence[str]) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _raise_exit)
     try:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, preexec_fn=lambda: _prepare(prctl))
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL,
+                                   preexec_fn=lambda: _prepare(prctl))
     except OSError as err:
         print('{}: {}'.format(command[0], err), flush=True)
         return 127
@@ -110,7 +118,8 @@ def main(interrupt_s: float, terminate_s: float, command: Sequence[str]) -> int:
         while True:
             for pid, status in _reap():
                 if pid == process.pid:
-                    code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else 128 + os.WTERMSIG(status)
+                    code = os.WEXITSTATUS(status) if os.WIFEXITED(
+                        status) else 128 + os.WTERMSIG(status)
                     return code
             if select.select([0], [], [], _PERIOD_S)[0] and not os.read(0, 1024):
                 return code

@@ -1,4 +1,7 @@
-"""Starts shared-autonomy interfaces that are not there, shows what they print, and ends them with all they started."""
+"""Starts shared-autonomy interfaces, publishes what they print, and ends them.
+
+An interface is ended with all that it has started.
+"""
 import os
 import re
 import subprocess
@@ -7,16 +10,15 @@ import threading
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any, Callable, Deque, Dict, List, Optional
+from typing import Callable, Deque, Dict, List, Optional
 
 import roslib.packages
 import rospkg
 import rospy
 
 from smach_oracle.msg import InterfaceOutput
-
-from ..oracle.errors import InterfaceError
-from ..oracle.question import InterfaceOffer, InterfaceStart
+from smach_oracle.oracle.errors import InterfaceError
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 
 OUTPUT_TOPIC = '~interface_output'
 MOST_LINES = 200
@@ -24,33 +26,39 @@ LONGEST_LINE = 500
 INTERRUPT_S = 12.0  # how long its command has after SIGINT
 TERMINATE_S = 3.0  # and all that is left after SIGTERM, before SIGKILL
 END_LIMIT_S = 25.0  # longer than both
-_TELL_PERIOD_S = 0.2
+_PUBLISH_PERIOD_S = 0.2
 _KEEPER = Path(__file__).with_name('process_keeper.py')
-_STEERING = re.compile(r'\x1b(\[[0-9;?]*[ -/]*[@-~]|\][^\x07]*\x07|.)')
+_ESCAPE_SEQUENCE = re.compile(r'\x1b(\[[0-9;?]*[ -/]*[@-~]|\][^\x07]*\x07|.)')
 
 
 def command_of(start: InterfaceStart) -> List[str]:
     """The command line.
 
-    :raises InterfaceError: where the package or the node is not there; of a launch file roslaunch itself tells.
+    :raises InterfaceError: where the package or the node is not there; roslaunch itself reports a
+        launch file that is not.
     """
     try:
         if start.kind == 'launch':
             rospkg.RosPack().get_path(start.package)
             # never a master of its own: it would be one that nobody else knows
-            return ['roslaunch', '--wait', '--screen', '--disable-title', start.package, start.target, *start.args]
+            return [
+                'roslaunch', '--wait', '--screen', '--disable-title', start.package, start.target,
+                *start.args
+            ]
         found = roslib.packages.find_node(start.package, start.target)
     except (rospkg.ResourceNotFound, roslib.packages.ROSPkgException) as err:
         raise InterfaceError('there is no package {}'.format(start.package)) from err
     if not found:
-        raise InterfaceError('there is no node {} in package {}'.format(start.target, start.package))
+        raise InterfaceError('there is no node {} in package {}'.format(
+            start.target, start.package))
     return [found[0], *start.args]
 
 
 class StartedInterface:
     """One interface's processes, from their start to their end."""
 
-    def __init__(self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput], None]) -> None:
+    def __init__(self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput],
+                                                                               None]) -> None:
         """Start it.
 
         :raises InterfaceError: where it cannot be started.
@@ -62,12 +70,13 @@ class StartedInterface:
         self._lock = threading.Lock()
         self._status, self._text = InterfaceOutput.STARTING, ''
         self._changed = threading.Event()
-        self._over = False
+        self._stopping = False
         if offer.start is None:
             raise InterfaceError('nothing is said about how to start it')
         command = command_of(offer.start)
         # relative names mean the same in it as in this node's settings
-        environment = dict(os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/', PYTHONUNBUFFERED='1')
+        environment = dict(os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/',
+                           PYTHONUNBUFFERED='1')
         try:
             self._process = subprocess.Popen(
                 [sys.executable, '-I', str(_KEEPER), str(INTERRUPT_S), str(TERMINATE_S), *command],
@@ -75,8 +84,8 @@ class StartedInterface:
                 stderr=subprocess.STDOUT, env=environment, start_new_session=True)
         except OSError as err:
             raise InterfaceError('it cannot be started: {}'.format(err)) from err
-        self.tell(InterfaceOutput.STARTING, 'started: ' + ' '.join(command))
-        for target in (self._read, self._tell_on):
+        self.publish_status(InterfaceOutput.STARTING, 'started: ' + ' '.join(command))
+        for target in (self._read, self._publish_changes):
             threading.Thread(target=target, name='output of ' + offer.name, daemon=True).start()
 
     @property
@@ -85,23 +94,26 @@ class StartedInterface:
         return self._process.poll()
 
     @property
-    def last_words(self) -> str:
-        """The last lines that say something, for an error."""
+    def last_lines(self) -> str:
+        """The last lines that are not empty, for an error."""
         with self._lock:
             return ' / '.join([line for line in self._lines if line.strip()][-3:])
 
-    def tell(self, status: int, text: str) -> None:
-        """Publish how it stands."""
+    def publish_status(self, status: int, text: str) -> None:
+        """Publish its status."""
         with self._lock:
             self._status, self._text = status, text
         rospy.loginfo('Interface %s: %s', self._name, text)
         self._send()
 
     def stop(self) -> None:
-        """Begin its end; returns at once. Nothing of it is left after some seconds, by force where needed."""
+        """Begin its end; returns at once.
+
+        Nothing of it is left after some seconds, by force where needed.
+        """
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._process.stdin.close()
-        self._over = True
+        self._stopping = True
         self._changed.set()
 
     def ended(self, limit_s: float) -> bool:
@@ -113,24 +125,23 @@ class StartedInterface:
         return True
 
     def _read(self) -> None:
-        stream: Any = self._process.stdout
-        for line in stream:
-            text = _STEERING.sub('', line.decode('utf-8', 'replace')).rstrip()[:LONGEST_LINE]
+        for line in self._process.stdout or ():
+            text = _ESCAPE_SEQUENCE.sub('', line.decode('utf-8', 'replace')).rstrip()[:LONGEST_LINE]
             with self._lock:
                 self._lines.append(text)
             self._changed.set()
 
-    def _tell_on(self) -> None:
-        while not self._over:
+    def _publish_changes(self) -> None:
+        while not self._stopping:
             self._changed.wait()
             self._changed.clear()
             self._send()
-            time.sleep(_TELL_PERIOD_S)
+            time.sleep(_PUBLISH_PERIOD_S)
 
     def _send(self) -> None:
         with self._lock:
-            message = InterfaceOutput(query_id=self._query_id, interface=self._name, status=self._status,
-                                      text=self._text, lines=list(self._lines))
+            message = InterfaceOutput(query_id=self._query_id, interface=self._name,
+                                      status=self._status, text=self._text, lines=list(self._lines))
         if not rospy.is_shutdown():
             self._publish(message)
 
@@ -153,8 +164,9 @@ class InterfaceStarter:
         if before is not None:
             before.stop()
             if not before.ended(END_LIMIT_S):
-                raise InterfaceError('what was started for an earlier question has not ended within {:g} s'.format(
-                    END_LIMIT_S))
+                raise InterfaceError(
+                    'what was started for an earlier question has not ended within {:g} s'.format(
+                        END_LIMIT_S))
         try:
             started = StartedInterface(offer, query_id, self._publisher.publish)
         except InterfaceError as err:
@@ -166,7 +178,10 @@ class InterfaceStarter:
         return started
 
     def stop(self) -> None:
-        """Begin the end of all that was started; each has a keeper that sees to it, this node alive or not."""
+        """Begin the end of all that was started.
+
+        Each has a keeper that sees to it, whether this node lives or not.
+        """
         with self._lock:
             for started in self._last.values():
                 started.stop()

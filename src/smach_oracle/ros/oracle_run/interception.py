@@ -1,15 +1,15 @@
-"""Put every top-level machine of a program under an oracle, without a word in the program.
+"""Puts every top-level machine of a program under an oracle, without changing the program.
 
-`execute` of smach.StateMachine and of every subclass that overrides it, present and future, first asks whether the
-machine is to be wrapped. What is called is always the outermost `execute`, so that an author's override runs once.
+`execute` of smach.StateMachine and of every subclass that overrides it, present and future, first
+asks whether the machine is to be wrapped. What is called is always the outermost `execute`, so that
+an author's override runs once.
 """
 import functools
 import threading
 import weakref
-from typing import Any, Callable, Iterator, MutableSet, Tuple, Type
+from typing import Any, Callable, Iterator, List, Tuple, Type
 
 import smach
-
 from smach_oracle.oracle import OracleContainer
 
 WrapFunction = Callable[[smach.StateMachine], None]
@@ -19,15 +19,17 @@ MARK = '_asks_for_an_oracle'
 class Interception:
     """Calls `wrap(machine)` before the first execute of every top-level machine.
 
-    Machines inside a wrapped one are its `wrap`'s business: what it leaves bare stays bare. A machine that a state
-    runs inside its own `execute`, or that a Concurrence or an Iterator at the top contains, is a top-level one.
+    Machines inside a wrapped one are its `wrap`'s business: what it leaves bare stays bare. A
+    machine that a state runs inside its own `execute`, or that a Concurrence or an Iterator at the
+    top contains, is a top-level one.
 
-    :param wrap: swaps the machine's class; an error it raises surfaces from the machine's `execute`.
+    :param wrap: swaps the machine's class; an error it raises surfaces from the machine's
+        `execute`.
     """
 
     def __init__(self, wrap: WrapFunction) -> None:
         self._wrap = wrap
-        self._left_bare: MutableSet[smach.StateMachine] = weakref.WeakSet()
+        self._left_bare: 'weakref.WeakSet[smach.StateMachine]' = weakref.WeakSet()
         self._lock = threading.RLock()  # machines may start in several threads at once
 
     def install(self) -> None:
@@ -87,10 +89,10 @@ def _family(cls: type) -> Iterator[type]:
         yield from _family(child)
 
 
-def machines_inside(container: Any) -> Iterator[smach.StateMachine]:
+def machines_inside(container: smach.Container) -> Iterator[smach.StateMachine]:
     """Every StateMachine below a container, at any depth, through Concurrences and Iterators."""
     seen = {id(container)}
-    open_containers = [container]
+    open_containers: List[smach.State] = [container]
     while open_containers:
         for child in _children(open_containers.pop()):
             if id(child) in seen:
@@ -101,8 +103,11 @@ def machines_inside(container: Any) -> Iterator[smach.StateMachine]:
                 yield child
 
 
-def _children(state: Any) -> Tuple[Any, ...]:
-    """Of a container; nothing of any other state or of an Iterator that has no contained state yet."""
+def _children(state: smach.State) -> Tuple[smach.State, ...]:
+    """The children of a container; none of any other state.
+
+    An Iterator may have no contained state yet.
+    """
     if not isinstance(state, smach.Container):
         return ()
     try:

@@ -1,7 +1,7 @@
-"""Run an unmodified SMACH script with all its state machines under an oracle: `rosrun smach_oracle oracle_run SCRIPT`.
+"""Run an unmodified SMACH script under an oracle: `rosrun smach_oracle oracle_run SCRIPT`.
 
-The script runs as `python3 SCRIPT` would run it: __main__, __file__, sys.argv, sys.path[0], exit code and tracebacks
-are its own.
+All state machines of the script are wrapped. It runs as `python3 SCRIPT` would run it: __main__,
+__file__, sys.argv, sys.path[0], exit code and tracebacks are its own.
 """
 import argparse
 import atexit
@@ -10,16 +10,28 @@ import sys
 import types
 from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
-from typing import Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.paths import check_writable, path_of
-from smach_oracle.oracle.policy import POLICIES
+import smach
+from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.paths import check_writable, path_of
+from smach_oracle.oracle.settings.settings import Settings
 
-from . import attachment
-from .settings import LoadedSettings, load_settings, resolve_python, split_python_name
-from .shutdown import ShutdownGuard
+from .. import attachment
+from ..loaded_settings import LoadedSettings, load_settings, resolve_python, split_python_name
+from ..shutdown import ShutdownGuard
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 USAGE_ERROR = 2  # exit code
@@ -36,10 +48,10 @@ class CommandLine(NamedTuple):
 
 
 def split(args: Sequence[str]) -> CommandLine:
-    """Tell our options from the script and its arguments.
+    """Separate our options from the script and its arguments.
 
-    The first word that is neither an option, nor an option's value, nor a ROS remapping (`a:=b`), is the script. All
-    that follows belongs to the script; so do remappings that stand before it.
+    The first word that is neither an option, nor an option's value, nor a ROS remapping (`a:=b`),
+    is the script. All that follows belongs to the script; so do remappings that stand before it.
     """
     options: List[str] = []
     remappings: List[str] = []
@@ -64,11 +76,14 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='oracle_run', usage=USAGE, allow_abbrev=False,
         description='Run a SMACH script, as it is, with all its state machines under an oracle.',
-        epilog='Options stand before SCRIPT; all that follows it belongs to the script. The parameter ~oracle of the '
-               "script's node goes over the file; options go over both.")
+        epilog=
+        'Options stand before SCRIPT; all that follows it belongs to the script. The parameter '
+        '~oracle of the '
+        "script's node overrides the file; options override both.")
     parser.add_argument('--config', metavar='FILE', help='settings of the oracle (YAML)')
     parser.add_argument('--policy', choices=sorted(POLICIES), help='how the oracle decides')
-    parser.add_argument('--rates-file', metavar='FILE', help='learned failure rates are kept here across runs')
+    parser.add_argument('--rates-file', metavar='FILE',
+                        help='learned failure rates are kept here across runs')
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
     parser.add_argument('--without-oracle', action='store_true',
                         help='recover nothing: events and bags only, everything ends as without us')
@@ -78,7 +93,7 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-class Run(NamedTuple):
+class Invocation(NamedTuple):
     """A command line that has been understood."""
 
     script: str
@@ -86,15 +101,15 @@ class Run(NamedTuple):
     config: Optional[str]
     overrides: Mapping[str, Any]
     recover: bool
-    options: attachment.Options
+    options: attachment.RecordingOptions
 
 
-def parse(args: Sequence[str]) -> Run:
+def parse(args: Sequence[str]) -> Invocation:
     """Understand the command line; ends the process with a message and code 2 where it is wrong."""
     line = split(args)
     parser = make_parser()
     given = parser.parse_args(line.options)
-    if line.script in (None, NONE):
+    if line.script is None or line.script == NONE:
         parser.error('which SCRIPT? (under roslaunch: script:=FILE)')
     script = path_of(line.script)
     why = _why_not_readable(script)
@@ -108,8 +123,8 @@ def parse(args: Sequence[str]) -> Run:
     if given.no_nested:
         overrides['nested'] = False
     record = os.path.abspath(path_of(given.record)) if given.record else ''
-    return Run(script, line.script_args, given.config, overrides, not given.without_oracle,
-               attachment.Options(record, tuple(given.record_topic)))
+    return Invocation(script, line.script_args, given.config, overrides, not given.without_oracle,
+                      attachment.RecordingOptions(record, tuple(given.record_topic)))
 
 
 def _why_not_readable(script: str) -> str:
@@ -122,38 +137,39 @@ def _why_not_readable(script: str) -> str:
     return ''
 
 
-def check(run: Run) -> None:
+def check(invocation: Invocation) -> None:
     """Find mistakes before the robot moves.
 
-    :raises ConfigError: in the settings file or the command line; the file of the rates cannot be written.
+    :raises SettingsError: in the settings file or the command line; the file of the rates cannot be
+        written.
     :raises OSError: where the folder for the bags cannot be made or written.
     """
-    loaded = load_settings(run.config, None, run.overrides)
+    loaded = load_settings(invocation.config, None, invocation.overrides)
     with _located(loaded):
-        settings = Settings.from_dict(loaded, _looked_through)
+        settings = Settings.from_dict(loaded, _check_python_name)
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
-    if run.options.record:
-        from .recorder import prepare_folder
-        prepare_folder(run.options.record)
+    if invocation.options.record:
+        from ..recorder import prepare_folder
+        prepare_folder(invocation.options.record)
 
 
-def _looked_through(name: str) -> Callable[[Any], bool]:
+def _check_python_name(name: str) -> Callable[[smach.UserData], bool]:
     split_python_name(name)
     return _never_called
 
 
-def _never_called(userdata: Any) -> bool:
-    """Stands for a precondition of the script's own while the settings are looked through; never called."""
+def _never_called(userdata: smach.UserData) -> bool:
+    """Stands for a precondition of the script's own while the settings are checked."""
     raise NotImplementedError
 
 
-def read_settings(run: Run) -> Settings:
-    """The settings for the machines of this run.
+def read_settings(invocation: Invocation) -> Settings:
+    """The settings for the machines of this invocation.
 
-    :raises ConfigError: naming where the mistake is.
+    :raises SettingsError: naming where the mistake is.
     """
-    loaded = load_settings(run.config, overrides=run.overrides)
+    loaded = load_settings(invocation.config, overrides=invocation.overrides)
     with _located(loaded):
         return Settings.from_dict(loaded, resolve_python)
 
@@ -163,35 +179,41 @@ def _located(loaded: LoadedSettings) -> Iterator[None]:
     """Let errors name where the setting was given."""
     try:
         yield
-    except ConfigError as err:
+    except SettingsError as err:
         raise loaded.located(err) from err
 
 
-class Wrapper:
+class MachineWrapper:
     """Wraps the script's machines, and finds names for them.
 
-    The first is named after the script; machines of the same structure share a name, so that a script that builds a
-    new one for each trial goes on learning where it was.
+    The first is named after the script; machines of the same structure share a name, so that a
+    script that builds a new one for each trial goes on learning where it was.
     """
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
+    def __init__(self, invocation: Invocation) -> None:
+        self._invocation = invocation
         self._names: Dict[Tuple[Any, ...], str] = {}
-        self._stem = os.path.splitext(os.path.basename(run.script))[0].upper().replace(' ', '_')
+        file_name = os.path.basename(invocation.script)
+        self._stem = os.path.splitext(file_name)[0].upper().replace(' ', '_')
 
-    def __call__(self, machine: Any) -> None:
+    def __call__(self, machine: smach.StateMachine) -> None:
         """Swap the machine's class.
 
-        :raises ConfigError: where the settings do not fit the machine.
+        :raises SettingsError: where the settings do not fit the machine.
         """
-        from .container import OracleContainer
-        settings = read_settings(self._run)
-        OracleContainer.wrap(machine, settings=settings, nested=settings.nested, name=self.name(machine),
-                             strict=False, recover=self._run.recover)
+        from ..container import OracleContainer
+        settings = read_settings(self._invocation)
+        OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
+                             name=self.name(machine), strict=False,
+                             recover=self._invocation.recover)
 
-    def name(self, machine: Any) -> str:
-        """E.g. "PICK_AND_PLACE", and "PICK_AND_PLACE_2" for a machine of another structure in the same script."""
-        structure = (tuple(machine.get_children()), tuple(sorted(machine.get_registered_outcomes())))
+    def name(self, machine: smach.StateMachine) -> str:
+        """A name for the machine, such as "PICK_AND_PLACE".
+
+        A machine of another structure in the same script is "PICK_AND_PLACE_2".
+        """
+        structure = (tuple(machine.get_children()),
+                     tuple(sorted(machine.get_registered_outcomes())))
         if structure not in self._names:
             count = len(self._names) + 1
             self._names[structure] = self._stem if count == 1 else '{}_{}'.format(self._stem, count)
@@ -199,14 +221,18 @@ class Wrapper:
 
 
 def run_script(script: str, script_args: Sequence[str]) -> None:
-    """Execute a file as `python3 script script_args...` would; returns or raises as the script does."""
+    """Execute a file as `python3 script script_args...` would.
+
+    Returns or raises as the script does.
+    """
     with open(script, 'rb') as source:
         text = source.read()
     file_name = os.path.abspath(script) if sys.version_info >= (3, 9) else script
     module = types.ModuleType('__main__')
-    module.__dict__.update(__file__=file_name, __builtins__=__builtins__, __cached__=None, __annotations__={},
-                           __loader__=SourceFileLoader('__main__', file_name))
-    # It stays there: threads and exit handlers of the script may pickle its classes after its last line.
+    module.__dict__.update(__file__=file_name, __builtins__=__builtins__, __cached__=None,
+                           __annotations__={}, __loader__=SourceFileLoader('__main__', file_name))
+    # It stays there: threads and exit handlers of the script may pickle its classes after its last
+    # line.
     sys.modules['__main__'] = module
     sys.argv[:] = [script] + list(script_args)
     sys.path[0] = os.path.dirname(os.path.realpath(script))
@@ -231,16 +257,16 @@ def _show_only_frames_of(file_name: str) -> None:
 
 def main(args: Optional[Sequence[str]] = None) -> None:
     """Entry point."""
-    run = parse(sys.argv[1:] if args is None else args)
+    invocation = parse(sys.argv[1:] if args is None else args)
     try:
-        check(run)
-    except (ConfigError, OSError) as err:
+        check(invocation)
+    except (SettingsError, OSError) as err:
         print('oracle_run: {}'.format(err), file=sys.stderr)
         sys.exit(USAGE_ERROR)
     from .interception import Interception
-    attachment.configure(run.options)
+    attachment.configure(invocation.options)
     guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)
-    Interception(Wrapper(run)).install()
-    run_script(run.script, run.script_args)
+    Interception(MachineWrapper(invocation)).install()
+    run_script(invocation.script, invocation.script_args)

@@ -1,7 +1,7 @@
 """Gives the bags of recorders that died an index, so that they can be read.
 
-Only files that this package's recorder made (they say so in their header) and that no living process holds (their
-writer's lock is gone) are touched: `rosbag record` names its files alike.
+Only files that this package's recorder made (they say so in their header) and that no living
+process holds (their writer's lock is gone) are touched: `rosbag record` names its files alike.
 """
 import fcntl
 import os
@@ -24,11 +24,14 @@ class _Scan(NamedTuple):
     chunks: List[ChunkInfo]
 
 
-def recover_folder(folder: str, say: Callable[[str], None], warn: Callable[[str], None]) -> List[str]:
-    """Turn the orphaned `.bag.active` files of a folder into `.bag` files; returns their paths.
+def recover_folder(folder: str, info: Callable[[str], None], warn: Callable[[str],
+                                                                           None]) -> List[str]:
+    """Turn the orphaned `.bag.active` files of a folder into `.bag` files.
 
-    A file that cannot be mended is left as it is and named in a warning. Raises OSError where the folder cannot be
-    listed.
+    A file that cannot be mended is left as it is and named in a warning.
+
+    :returns: the paths of the mended bags.
+    :raises OSError: where the folder cannot be listed.
     """
     recovered = []
     for name in sorted(os.listdir(folder)):
@@ -41,7 +44,7 @@ def recover_folder(folder: str, say: Callable[[str], None], warn: Callable[[str]
             warn('The bag {} of a recorder that died cannot be mended: {}'.format(path, err))
             continue
         if target is not None:
-            say('Mended the bag of a recorder that died: {}'.format(target))
+            info('Mended the bag of a recorder that died: {}'.format(target))
             recovered.append(target)
     return recovered
 
@@ -99,7 +102,9 @@ def _read_bag_header(bag: BinaryIO) -> Fields:
 def repair(bag: BinaryIO) -> bool:
     """Cut a bag (open 'r+b', uncompressed) off after its last whole chunk and index it anew.
 
-    Returns whether there is a message in it. Raises BagFormatError where it is no bag, OSError.
+    :returns: whether there is a message in it.
+    :raises BagFormatError: where it is not a bag.
+    :raises OSError: where the disk does not take it.
     """
     size = os.fstat(bag.fileno()).st_size
     if size:
@@ -129,7 +134,10 @@ def _scan(bag: BinaryIO) -> _Scan:
 
 
 def _read_chunk(bag: BinaryIO, size: int, connections: Dict[int, bytes]) -> Tuple[ChunkInfo, int]:
-    """Read the chunk at the file's position; returns it and where its last index record ends."""
+    """Read the chunk at the file's position.
+
+    :returns: the chunk, and where its last index record ends.
+    """
     position = bag.tell()
     if bag_format.op_of(bag_format.read_header(bag, size)) != bag_format.OP_CHUNK:
         raise BagFormatError('no chunk at {}'.format(position))
@@ -149,7 +157,10 @@ def _read_chunk(bag: BinaryIO, size: int, connections: Dict[int, bytes]) -> Tupl
 
 
 def _read_indexes(bag: BinaryIO, chunk_position: int, size: int) -> Tuple[ChunkInfo, int, bool]:
-    """Read the index records at the file's position: what they say, where they end, whether nothing sound follows."""
+    """Read the index records at the file's position.
+
+    :returns: their contents, where they end, and whether nothing sound follows.
+    """
     counts: Dict[int, int] = {}
     stamps: List[Stamp] = []
     end = bag.tell()
@@ -159,14 +170,18 @@ def _read_indexes(bag: BinaryIO, chunk_position: int, size: int) -> Tuple[ChunkI
             if bag_format.op_of(fields) != bag_format.OP_INDEX:
                 is_last = False
                 break
-            entries = bag_format.read_exactly(bag, bag_format.UINT32.unpack(bag_format.read_exactly(bag, 4))[0])
+            entries = bag_format.read_exactly(
+                bag,
+                bag_format.UINT32.unpack(bag_format.read_exactly(bag, 4))[0])
             if len(entries) < bag_format.INDEX_ENTRY.size:
                 raise BagFormatError('an index without entries')
         except BagFormatError:
             is_last = True
             break
-        stamps += [bag_format.STAMP.unpack_from(entries, 0),
-                   bag_format.STAMP.unpack_from(entries, len(entries) - bag_format.INDEX_ENTRY.size)]
+        stamps += [
+            bag_format.stamp_at(entries, 0),
+            bag_format.stamp_at(entries, len(entries) - bag_format.INDEX_ENTRY.size)
+        ]
         counts[bag_format.uint32_field(fields, 'conn')] = bag_format.uint32_field(fields, 'count')
         end = bag.tell()
     if not counts:
@@ -193,7 +208,10 @@ def _look_into(chunk: bytes) -> Tuple[Dict[int, bytes], int]:
 
 
 def free_name(path: str) -> str:
-    """`path`, or where a bag of that name is there or being written `..._2.bag`, `..._3.bag` and so on."""
+    """`path`, or `..._2.bag`, `..._3.bag` and so on.
+
+    A name is taken where a bag of that name is there or being written.
+    """
     stem, number = path[:-len('.bag')], 1
     while os.path.exists(path) or os.path.exists(path + '.active'):
         number += 1

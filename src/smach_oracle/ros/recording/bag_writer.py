@@ -1,9 +1,10 @@
 """Writes rosbag 2.0 files so that a crash or a full disk costs at most the chunk in memory.
 
-rosbag.Bag opens a chunk on disk and patches its length in afterwards, keeps an index entry of every message in memory
-until it is closed, and is left undefined by a failing write. A recorder beside a robot wants the opposite: here a chunk
-is put together in memory and appended whole, with its index, at a known end; a failing write is cut off again, so that
-what was written stays a valid bag; memory holds one chunk, and some ten bytes for each chunk before it.
+rosbag.Bag opens a chunk on disk and patches its length in afterwards, keeps an index entry of every
+message in memory until it is closed, and is left undefined by a failing write. A recorder beside a
+robot wants the opposite: here a chunk is put together in memory and appended whole, with its index,
+at a known end; a failing write is cut off again, so that what was written stays a valid bag; memory
+holds one chunk, and some ten bytes for each chunk before it.
 """
 import errno
 import fcntl
@@ -20,7 +21,7 @@ _NO_LOCKS_HERE = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 class MessageType(NamedTuple):
-    """What a connection record says of its messages."""
+    """The type of messages, as a connection record holds it."""
 
     name: str  # e.g. smach_oracle/OracleEvent
     md5sum: str
@@ -43,12 +44,16 @@ def _lock(fd: int) -> None:
 class BagWriter:
     """One bag file being written. Not thread-safe: one thread writes.
 
-    The file is locked (flock) while it is open, which is how a recorder that starts tells a file that is being written
-    from one whose writer died. On a file system without locks it is written unlocked.
+    The file is locked (flock) while it is open, which is how a recorder that starts knows a file
+    that is being written from one whose writer died. On a file system without locks it is written
+    unlocked.
     """
 
     def __init__(self, path: str) -> None:
-        """Create the file and write its header; raises OSError (FileExistsError where it is there already)."""
+        """Create the file and write its header.
+
+        :raises OSError: where that cannot be done; FileExistsError where it is there already.
+        """
         self.path = path
         self._connections: Dict[Tuple[str, str, str], _Connection] = {}
         self._chunks: List[ChunkInfo] = []
@@ -85,10 +90,12 @@ class BagWriter:
         if header is None:
             header = _message_header(connection.number)
             self._message_headers[connection.number] = header
-        self._buffer += header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(len(data)) + data
+        self._buffer += header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(
+            len(data)) + data
         self._index.setdefault(connection.number, []).append((stamp[0], stamp[1], offset))
 
-    def _connection(self, topic: str, message_type: MessageType, details: Dict[str, str]) -> _Connection:
+    def _connection(self, topic: str, message_type: MessageType, details: Dict[str,
+                                                                               str]) -> _Connection:
         key = (topic, message_type.md5sum, details.get('callerid', ''))
         connection = self._connections.get(key)
         if connection is None:
@@ -101,9 +108,12 @@ class BagWriter:
         return connection
 
     def flush(self) -> None:
-        """Hand the chunk in memory to the operating system; raises OSError, the file then ends where it did before.
+        """Hand the chunk in memory to the operating system.
 
-        From here on the messages survive the death of this process (not that of the machine: see `sync`).
+        From here on the messages survive the death of this process (not that of the machine: see
+        `sync`).
+
+        :raises OSError: where the disk does not take it; the file then ends where it did before.
         """
         if not self._index:
             return
@@ -115,17 +125,23 @@ class BagWriter:
         self._reset_chunk()
 
     def sync(self) -> None:
-        """Make the disk hold what was flushed; raises OSError."""
+        """Make the disk hold what was flushed.
+
+        :raises OSError: where it does not.
+        """
         os.fsync(self._fd)
 
     def close(self, sync: bool = True) -> None:
-        """Flush, write the index and close; raises OSError, the file is then closed, unindexed, and can be repaired.
+        """Flush, write the index and close.
 
-        `sync`: return only when the disk holds it.
+        :param sync: return only when the disk holds it.
+        :raises OSError: where the disk does not take it; the file is then closed, unindexed, and
+            can be repaired.
         """
         try:
             self.flush()
-            write_bag_index(self._fd, self._end, [item.record for item in self._connections.values()], self._chunks)
+            write_bag_index(self._fd, self._end,
+                            [item.record for item in self._connections.values()], self._chunks)
             if sync:
                 self.sync()
         finally:
@@ -165,15 +181,19 @@ class BagWriter:
 def write_bag_index(fd: int, end: int, connections: List[bytes], chunks: List[ChunkInfo]) -> None:
     """Write the bag's index at `end` and point the bag header to it.
 
-    Raises OSError; the file is then cut off at `end`. A power cut in here can leave a header that points to nothing:
-    repairing therefore never trusts an index, it makes a new one.
+    A power cut in here can leave a header that points to nothing: repairing therefore never trusts
+    an index, it makes a new one.
+
+    :raises OSError: where the disk does not take it; the file is then cut off at `end`.
     """
     try:
-        _write_at(fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)), end)
+        _write_at(fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)),
+                  end)
     except OSError:
         _cut_off(fd, end)
         raise
-    _write_at(fd, bag_format.pack_bag_header(end, len(connections), len(chunks)), len(bag_format.MAGIC))
+    _write_at(fd, bag_format.pack_bag_header(end, len(connections), len(chunks)),
+              len(bag_format.MAGIC))
 
 
 def _message_header(connection: int) -> bytes:

@@ -1,17 +1,23 @@
-"""Serialised OracleEvents, fast: through a message object an event costs five times as much, and the machine waits."""
+"""Serialises OracleEvents fast.
+
+Through a message object an event costs five times as much, and the machine waits.
+"""
 import io
 import json
 import struct
-from typing import Any, Callable
+from typing import Callable
+
+import genpy
 
 from smach_oracle.msg import OracleEvent
+from smach_oracle.oracle.records.events import Event
 
-from ..oracle.events import Event
-from . import event_messages
+from .. import event_messages
 from .bag_format import Stamp
 from .bag_writer import MessageType
 
-# Of the definition that `_pack_directly` is written for; with any other, events go through the message object.
+# Of the definition that `_pack_directly` is written for; with any other, events go through the
+# message object.
 PACKED_MD5 = '04f09f94edfdd6b539964b195d7837e8'
 EVENT_TYPE = MessageType(OracleEvent._type, OracleEvent._md5sum, OracleEvent._full_text)
 
@@ -22,7 +28,7 @@ _FAILURE = struct.Struct('<BBdB')  # kind, class, rate, continuous
 _LENGTH = struct.Struct('<I')
 
 
-def serialise(message: Any) -> bytes:
+def serialise(message: genpy.Message) -> bytes:
     """A message (genpy.Message) as it is on the wire."""
     buffer = io.BytesIO()
     message.serialize(buffer)
@@ -36,22 +42,26 @@ def _pack_through_message(event: Event, stamp: Stamp) -> bytes:
 
 
 def _pack_directly(event: Event, stamp: Stamp) -> bytes:
-    return b''.join((
-        _HEAD.pack(event.kind, 0, stamp[0], stamp[1], 0), _WALL_TIME.pack(event.wall_time), _string(event.trial_id),
-        _UINT64.pack(event.seq), _string(event.path), _string(event.state), _string(event.outcome),
-        _string(event.target),
-        _FAILURE.pack(event.failure_kind, event.failure_class, event.rate, bool(event.continuous)),
-        _string(event.query_id), _string(event.by), _string(event.text),
-        _string(json.dumps(event.data, default=str) if event.data else '')))
+    return b''.join(
+        (_HEAD.pack(event.kind, 0, stamp[0], stamp[1],
+                    0), _WALL_TIME.pack(event.wall_time), _string(event.trial_id),
+         _UINT64.pack(event.seq), _string(event.path), _string(event.state), _string(event.outcome),
+         _string(event.target),
+         _FAILURE.pack(event.failure_kind, event.failure_class, event.rate,
+                       bool(event.continuous)), _string(event.query_id), _string(event.by),
+         _string(event.text), _string(json.dumps(event.data, default=str) if event.data else '')))
 
 
-def _string(value: Any) -> bytes:
+def _string(value: object) -> bytes:
     data = (value if isinstance(value, str) else str(value)).encode('utf-8', 'backslashreplace')
     return _LENGTH.pack(len(data)) + data
 
 
 def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
-    """The fastest way to serialise an OracleEvent of this definition (its md5); the stamp is ROS time, or (0, 0)."""
+    """The fastest way to serialise an OracleEvent of this definition (its md5).
+
+    The stamp is ROS time, or (0, 0).
+    """
     return _pack_directly if md5sum == PACKED_MD5 else _pack_through_message
 
 

@@ -1,17 +1,23 @@
-"""What stands between the machine's threads and the recorder's writer thread."""
+"""The queue between the machine's threads and the recorder's writer thread."""
 import threading
 import time
-from typing import Any, Callable, List, NamedTuple, Optional, Tuple
+from typing import Callable, List, NamedTuple, Optional, Tuple, Union
 
-from ..oracle.events import Event
+import genpy
+
+from smach_oracle.oracle.records.events import Event
+
 from .bag_format import Stamp
 from .bag_writer import MessageType
 
 BACK_PRESSURE_POLL_S = 0.1  # how soon a blocked machine notices that the disk hangs
 
 
-class When(NamedTuple):
-    """The moment of an event or a message; whether a bag uses ROS or wall time is decided once per bag."""
+class Moment(NamedTuple):
+    """The moment of an event or a message.
+
+    Whether a bag uses ROS or wall time is decided once per bag.
+    """
 
     ros: Optional[Stamp]  # None where there is no ROS time (yet)
     wall: float  # s since the epoch
@@ -22,7 +28,7 @@ class EventItem(NamedTuple):
     """An event on its way to the bag of its trial."""
 
     event: Event
-    when: When
+    when: Moment
 
 
 class SnapshotItem(NamedTuple):
@@ -30,15 +36,15 @@ class SnapshotItem(NamedTuple):
 
     trial_id: str
     topic: str
-    message: Any  # genpy.Message
-    when: When
+    message: genpy.Message
+    when: Moment
 
 
 class EndItem(NamedTuple):
     """A trial that ended without TRIAL_END: the next one of the same machine has begun."""
 
     trial_id: str
-    when: When
+    when: Moment
 
 
 class MessageItem(NamedTuple):
@@ -47,31 +53,38 @@ class MessageItem(NamedTuple):
     topic: str
     message_type: MessageType
     data: bytes
-    when: When
+    when: Moment
     latching: bool
     callerid: str
+
+
+QueueItem = Union[EventItem, SnapshotItem, EndItem, MessageItem]
 
 
 class RecorderQueue:
     """Two bounds in one line: events wait for room, messages of other topics are turned away.
 
-    One line, so that a message stays between the events between which it came. Memory: at most twice `max_events`
-    events and `max_message_bytes` of messages (a batch being written, a batch waiting). The bound on events is also one
-    on how long they wait, so an item that takes long to write, such as one that opens a file, weighs more than one.
+    One line, so that a message stays between the events between which it came. Memory: at most
+    twice `max_events` events and `max_message_bytes` of messages (a batch being written, a batch
+    waiting). The bound on events is also one on how long they wait, so an item that takes long to
+    write, such as one that opens a file, weighs more than one.
     """
 
     def __init__(self, max_events: int, max_message_bytes: int) -> None:
         self._max_events = max_events
         self._max_message_bytes = max_message_bytes
         self._changed = threading.Condition(threading.RLock())
-        self._items: List[Any] = []
+        self._items: List[QueueItem] = []
         self._weight = 0
         self._message_bytes = 0
         self._closing = False
         self._finished = False
 
-    def put_event(self, item: Any, may_wait: Callable[[], bool], weight: int = 1) -> bool:
-        """Append an event or a snapshot, waiting for room for as long as `may_wait()`; whether it was appended."""
+    def put_event(self, item: QueueItem, may_wait: Callable[[], bool], weight: int = 1) -> bool:
+        """Append an event or a snapshot, waiting for room for as long as `may_wait()`.
+
+        :returns: whether it was appended.
+        """
         with self._changed:
             while self._weight >= self._max_events and not self._closing:
                 if not may_wait():
@@ -92,13 +105,16 @@ class RecorderQueue:
             self._append(item)
             return True
 
-    def _append(self, item: Any) -> None:
+    def _append(self, item: QueueItem) -> None:
         self._items.append(item)
         if len(self._items) == 1:
             self._changed.notify_all()
 
-    def take(self, timeout_s: Optional[float]) -> Tuple[List[Any], bool]:
-        """All that waits, in order, after at most `timeout_s` (None: without end), and whether it is closing."""
+    def take(self, timeout_s: Optional[float]) -> Tuple[List[QueueItem], bool]:
+        """All that waits, in order, and whether the queue is closing.
+
+        :param timeout_s: how long to wait where it is empty; None: without end.
+        """
         with self._changed:
             if not self._items and not self._closing:
                 self._changed.wait(timeout_s)
@@ -108,10 +124,13 @@ class RecorderQueue:
             return items, self._closing
 
     def close(self, timeout_s: float) -> bool:
-        """Let nothing more in and wait until the writer has finished with what is in; whether it has.
+        """Let nothing more in and wait until the writer has finished with what is in.
 
-        Often called by a signal handler that struck while its own thread was in here: waiting on the condition lets go
-        of the lock however often that thread holds it, where joining the writer would keep it from the writer.
+        Often called by a signal handler that struck while its own thread was in here: waiting on
+        the condition lets go of the lock however often that thread holds it, where joining the
+        writer would keep it from the writer.
+
+        :returns: whether the writer has finished.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -122,7 +141,7 @@ class RecorderQueue:
             return self._finished
 
     def finish(self) -> None:
-        """The writer's last word."""
+        """The writer has finished."""
         with self._changed:
             self._finished = True
             self._changed.notify_all()

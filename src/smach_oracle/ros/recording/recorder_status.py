@@ -1,4 +1,4 @@
-"""What the recorder knows about itself: what was lost, whether the disk hangs, what the operator is told."""
+"""The recorder's state: what was lost, and whether the disk hangs."""
 import threading
 import time
 from collections import OrderedDict
@@ -17,8 +17,8 @@ class RecorderState(IntEnum):
     CLOSED = 3
 
 
-class Status(NamedTuple):
-    """What the operator is told; the fields are those of RecorderStatus.msg."""
+class RecordingStatus(NamedTuple):
+    """The status that is published; the fields are those of RecorderStatus.msg."""
 
     state: RecorderState
     file: str = ''
@@ -30,11 +30,12 @@ class Status(NamedTuple):
     text: str = ''
 
 
-class Losses:
+class LossCounter:
     """Counts what was not recorded. Thread-safe."""
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()  # a signal handler may close the recorder while this thread counts
+        # a signal handler may close the recorder while this thread counts
+        self._lock = threading.RLock()
         self._by_trial: 'OrderedDict[str, int]' = OrderedDict()
         self.events = 0
         self.messages = 0
@@ -61,7 +62,10 @@ class Losses:
 
 
 class DiskWatch:
-    """Tells whether the writer thread hangs in a call to the disk. `with watch:` around each such call."""
+    """Whether the writer thread hangs in a call to the disk.
+
+    `with watch:` around each such call.
+    """
 
     def __init__(self, hung_after_s: float) -> None:
         self.hung_after_s = hung_after_s

@@ -1,11 +1,12 @@
 """Other topics for the recorder: names worth recording, and their subscribers.
 
-rospy has one subscriber per topic and process, of the type that came first: with rospy.AnyMsg, the recorder would hand
-undecoded messages to the robot's own callbacks. So it subscribes with the true type of a topic, and takes what comes.
+rospy has one subscriber per topic and process, of the type that came first: with rospy.AnyMsg, the
+recorder would hand undecoded messages to the robot's own callbacks. So it subscribes with the true
+type of a topic, and takes what comes.
 """
 import threading
 import time
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
+from typing import Callable, Dict, List, Mapping, Optional, Sequence, Type
 
 import genpy
 import rosgraph
@@ -13,43 +14,54 @@ import rospy
 from rospy.topics import get_topic_manager
 
 from .bag_writer import MessageType
-from .recorder_bag import ros_stamp_of
-from .recorder_packing import serialise
-from .recorder_queue import MessageItem, When
+from .event_packing import serialise
+from .recorder_queue import MessageItem, Moment
+from .trial_bag import ros_stamp_of
 
+MessageClass = Type[genpy.Message]
 LOOK_AGAIN_S = 0.5  # for the types of topics that nobody has advertised yet
 
 
 def action_topics(server: str) -> List[str]:
     """The topics of an action server."""
-    return ['{}/{}'.format(server, name) for name in ('goal', 'cancel', 'status', 'feedback', 'result')]
+    return [
+        '{}/{}'.format(server, name) for name in ('goal', 'cancel', 'status', 'feedback', 'result')
+    ]
 
 
 def smach_topics(server: str) -> List[str]:
     """The topics of a SMACH introspection server."""
-    return ['{}/smach/{}'.format(server, name) for name in ('container_structure', 'container_status')]
+    return [
+        '{}/smach/{}'.format(server, name) for name in ('container_structure', 'container_status')
+    ]
 
 
 def audit_topic(server: str) -> str:
-    """Where operator consoles tell of the commands that people give about the questions of an expert query server."""
+    """The topic on which consoles publish the commands that people give.
+
+    :param server: name of the expert query server that the commands are about.
+    """
     return server + '/audit'
 
 
-def now() -> When:
+def now() -> Moment:
     """The present moment by both clocks."""
     stamp = None
     if rospy.rostime.is_rostime_initialized():
         time_now = rospy.rostime.get_rostime()
         stamp = ros_stamp_of(time_now.secs, time_now.nsecs)
-    return When(stamp, time.time(), time.monotonic())
+    return Moment(stamp, time.time(), time.monotonic())
 
 
 class TopicListener:
     """Subscribes to topics of any type, as soon as the type is known, and hands on each message."""
 
     def __init__(self, topics: Sequence[str], hand_on: Callable[[MessageItem], None],
-                 types: Optional[Mapping[str, Any]] = None) -> None:
-        """`types`: message classes of topics that nobody may have advertised yet, so that nothing is missed."""
+                 types: Optional[Mapping[str, MessageClass]] = None) -> None:
+        """
+        :param types: message classes of topics that nobody may have advertised yet, so that nothing
+            is missed.
+        """
         self._hand_on = hand_on
         self._unknown = list(dict.fromkeys(rospy.resolve_name(topic) for topic in topics))
         self._subscribers: List[rospy.Subscriber] = []
@@ -67,19 +79,21 @@ class TopicListener:
                 pass  # the master is away; it is asked again
             self._closing.wait(LOOK_AGAIN_S)
 
-    def _subscribe(self, classes: Dict[str, Any]) -> None:
+    def _subscribe(self, classes: Dict[str, MessageClass]) -> None:
         for topic in [topic for topic in self._unknown if topic in classes]:
             with self._lock:
                 if self._closing.is_set():
                     return
                 self._unknown.remove(topic)
                 # No queue_size: it would be that of the robot's own subscriber of this topic, too.
-                self._subscribers.append(rospy.Subscriber(topic, classes[topic], self._received, callback_args=topic))
+                self._subscribers.append(
+                    rospy.Subscriber(topic, classes[topic], self._received, callback_args=topic))
 
-    def _received(self, message: Any, topic: str) -> None:
+    def _received(self, message: genpy.Message, topic: str) -> None:
         header = message._connection_header
-        self._hand_on(MessageItem(topic, type_of(message), data_of(message), now(), header.get('latching') == '1',
-                                  header.get('callerid', '')))
+        self._hand_on(
+            MessageItem(topic, type_of(message), data_of(message), now(),
+                        header.get('latching') == '1', header.get('callerid', '')))
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -90,39 +104,47 @@ class TopicListener:
             subscriber.unregister()
 
 
-def types_in_process() -> Dict[str, Any]:
-    """Message classes of the topics that this process publishes or subscribes to, by resolved name."""
+def types_in_process() -> Dict[str, MessageClass]:
+    """Message classes of the topics of this process, by resolved name.
+
+    It publishes or subscribes to them.
+    """
     manager = get_topic_manager()
     with manager.lock:
         return {name: known.data_class for known_by_name in (manager.pubs, manager.subs)
                 for name, known in known_by_name.items() if known.data_class is not None}
 
 
-def types_at_master() -> Dict[str, Any]:
-    """Message classes of all topics that the master knows; AnyMsg where the class is not installed here.
+def types_at_master() -> Dict[str, MessageClass]:
+    """Message classes of all topics that the master knows.
 
-    Raises OSError or rosgraph.MasterException where the master does not answer.
+    AnyMsg stands for a class that is not installed here.
+
+    :raises OSError, rosgraph.MasterException: where the master does not answer.
     """
     types = rosgraph.Master(rospy.get_name()).getTopicTypes()
-    return {name: _class_of(type_name) or rospy.AnyMsg for name, type_name in types if type_name != '*'}
+    return {
+        name: _class_of(type_name) or rospy.AnyMsg
+        for name, type_name in types if type_name != '*'
+    }
 
 
-def _class_of(type_name: str) -> Optional[Any]:
+def _class_of(type_name: str) -> Optional[MessageClass]:
     try:
         return genpy.message.get_message_class(type_name)
     except (ValueError, ImportError):
         return None
 
 
-def type_of(message: Any) -> MessageType:
-    """What a bag must say of a received message's type."""
+def type_of(message: genpy.Message) -> MessageType:
+    """The type of a received message, as a bag records it."""
     if not isinstance(message, rospy.AnyMsg):
         return MessageType(message._type, message._md5sum, message._full_text)
     header = message._connection_header
     return MessageType(header['type'], header['md5sum'], header.get('message_definition', ''))
 
 
-def data_of(message: Any) -> bytes:
+def data_of(message: genpy.Message) -> bytes:
     """A received message as it was on the wire."""
     if isinstance(message, rospy.AnyMsg):
         return bytes(message._buff)

@@ -2,14 +2,17 @@
 import os
 import re
 import time
-from typing import Any, Callable, Dict, Optional
+from typing import Callable, Dict, Optional
 
-from ..oracle.events import Event
+import genpy
+
+from smach_oracle.oracle.records.events import Event
+
 from .bag_format import Stamp
 from .bag_repair import ACTIVE_SUFFIX, free_name
 from .bag_writer import MAX_CHUNK_BYTES, BagWriter, MessageType
-from .recorder_packing import EVENT_TYPE, pack_event, serialise
-from .recorder_queue import MessageItem, When
+from .event_packing import EVENT_TYPE, pack_event, serialise
+from .recorder_queue import MessageItem, Moment
 from .recorder_status import DiskWatch
 
 FLUSH_AFTER_S = 0.2  # what a crash of this process may cost, at most, while the disk works
@@ -19,7 +22,10 @@ _LONGEST_ID = 80
 
 
 class SyncBudget:
-    """Keeps waiting for the disk (fsync) to a share of the time, on slow disks and with short trials."""
+    """Limits the share of time spent waiting for the disk (fsync).
+
+    That matters on slow disks and with short trials.
+    """
 
     def __init__(self, share: float = SYNC_SHARE) -> None:
         self._share = share
@@ -38,44 +44,52 @@ class SyncBudget:
 
 
 class TrialBag:
-    """One trial's file; all methods raise OSError where the disk does not take it.
+    """One trial's file.
 
     Named `<UTC stamp>_<trial id>.bag.active` until it is closed, then without `.active`.
+
+    :raises OSError: in all methods, where the disk does not take it.
     """
 
-    def __init__(self, folder: str, trial_id: str, when: When, watch: DiskWatch, budget: SyncBudget) -> None:
+    def __init__(self, folder: str, trial_id: str, when: Moment, watch: DiskWatch,
+                 budget: SyncBudget) -> None:
         self.trial_id = trial_id
         self.events_written = 0
         self._events_in_chunk = 0
         self._events_unsynced = 0
-        self._at_risk = 0  # events that are lost if the next call to the disk fails
+        self._events_at_risk = 0  # events that are lost if the next call to the disk fails
         self._watch = watch
         self._budget = budget
         self._uses_ros_time = when.ros is not None
         self._last_stamp: Stamp = when.ros or wall_stamp(when.wall)
         self._chunk_since: Optional[float] = None
-        self._flush_after_s = 0.0  # the first events at once: even a trial killed early tells what it was
+        # the first events at once: even a trial killed early leaves a trace
+        self._flush_after_s = 0.0
         self._synced = time.monotonic()
         with watch:
             self.path = free_name(os.path.join(folder, file_name(trial_id, when.wall)))
             self._writer = BagWriter(self.path + '.active')
 
-    def stamp(self, when: When) -> Stamp:
-        """The moment by this bag's clock: ROS time where there was one at its beginning, else wall time."""
+    def stamp(self, when: Moment) -> Stamp:
+        """The moment by this bag's clock.
+
+        ROS time where there was one at its beginning, else wall time.
+        """
         if not self._uses_ros_time:
             self._last_stamp = wall_stamp(when.wall)
         elif when.ros is not None:
             self._last_stamp = when.ros
         return self._last_stamp
 
-    def add_event(self, topic: str, event: Event, when: When) -> None:
+    def add_event(self, topic: str, event: Event, when: Moment) -> None:
         """Add an event."""
         data = pack_event(event, when.ros or (0, 0))
         self.events_written += 1
         self._events_in_chunk += 1  # before the chunk may be flushed: it is lost with it
         self._add(topic, EVENT_TYPE, data, when, {})
 
-    def add_message(self, topic: str, message: Any, when: When, latching: bool = False) -> None:
+    def add_message(self, topic: str, message: genpy.Message, when: Moment,
+                    latching: bool = False) -> None:
         """Add another message (genpy.Message) of this process."""
         kind = MessageType(message._type, message._md5sum, message._full_text)  # genpy's own names
         self._add(topic, kind, serialise(message), when, {'latching': '1'} if latching else {})
@@ -87,7 +101,8 @@ class TrialBag:
             details['latching'] = '1'
         self._add(item.topic, item.message_type, item.data, item.when, details)
 
-    def _add(self, topic: str, kind: MessageType, data: bytes, when: When, details: Dict[str, str]) -> None:
+    def _add(self, topic: str, kind: MessageType, data: bytes, when: Moment,
+             details: Dict[str, str]) -> None:
         self._writer.add(topic, kind, self.stamp(when), data, details)
         if self._chunk_since is None:
             self._chunk_since = when.monotonic
@@ -105,17 +120,17 @@ class TrialBag:
         with self._watch:
             self._flush()
             if time.monotonic() - self._synced >= SYNC_AFTER_S and self._budget.affordable():
-                self._at_risk = self._events_unsynced
+                self._events_at_risk = self._events_unsynced
                 self._budget.spend(self._writer.sync)
                 os.stat(self.path + '.active')  # a removed file takes everything and keeps nothing
-                self._events_unsynced = self._at_risk = 0
+                self._events_unsynced = self._events_at_risk = 0
                 self._synced = time.monotonic()
 
     def _flush(self) -> None:
-        self._at_risk = self._events_in_chunk
+        self._events_at_risk = self._events_in_chunk
         self._writer.flush()
         self._events_unsynced += self._events_in_chunk
-        self._events_in_chunk = self._at_risk = 0
+        self._events_in_chunk = self._events_at_risk = 0
         self._chunk_since = None
         self._flush_after_s = FLUSH_AFTER_S
 
@@ -130,16 +145,18 @@ class TrialBag:
             os.rename(self.path + '.active', self.path)
 
     def abandon(self) -> int:
-        """Leave the file after an error; returns how many of the events written into it are lost.
+        """Leave the file after an error.
 
         What reached the disk stays there, to be indexed when the disk works again.
+
+        :returns: how many of the events written into it are lost.
         """
         with self._watch:
             self._writer.abandon()
             try:
                 if self._writer.has_chunks:
                     os.stat(self.path + '.active')
-                    return max(self._at_risk, self._events_in_chunk)
+                    return max(self._events_at_risk, self._events_in_chunk)
                 os.unlink(self.path + '.active')
             except OSError:
                 pass  # the file has vanished, and what was in it
@@ -153,15 +170,20 @@ def wall_stamp(wall_time: float) -> Stamp:
 
 
 def file_name(trial_id: str, wall_time: float) -> str:
-    """E.g. 20150401T101112.345Z_pick_1.bag; what a file name should not contain becomes an underscore."""
+    """A file name such as 20150401T101112.345Z_pick_1.bag.
+
+    Characters that a file name should not contain become underscores.
+    """
     seconds, nanoseconds = wall_stamp(wall_time)
-    stamp = time.strftime('%Y%m%dT%H%M%S', time.gmtime(seconds)) + '.{:03d}Z'.format(nanoseconds // 10 ** 6)
+    stamp = time.strftime('%Y%m%dT%H%M%S', time.gmtime(seconds)) + '.{:03d}Z'.format(
+        nanoseconds // 10**6)
     clean = re.sub(r'[^A-Za-z0-9._-]', '_', trial_id)[:_LONGEST_ID] or 'trial'
     return '{}_{}{}'.format(stamp, clean, ACTIVE_SUFFIX[:-len('.active')])
 
 
 def ros_stamp_of(seconds: int, nanoseconds: int) -> Optional[Stamp]:
-    """A ROS time as a stamp; None for zero, which is what a simulated clock shows before it runs."""
+    """A ROS time as a stamp; None for zero.
+
+    A simulated clock shows zero before it runs.
+    """
     return (seconds, nanoseconds) if seconds or nanoseconds else None
-
-

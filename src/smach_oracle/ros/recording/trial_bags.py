@@ -1,18 +1,24 @@
-"""The bags of the trials that run: opened, flushed, closed, and given up where the disk does not take them."""
-import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional
+"""Opens, flushes and closes the bags of the trials that run.
 
-from ..oracle.events import Event, EventKind
+A bag is given up where the disk does not take it.
+"""
+import time
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
+
+from smach_oracle.msg import RecorderStatus
+from smach_oracle.oracle.records.events import Event, EventKind
+
 from .bag_repair import recover_folder
-from .recorder_bag import SyncBudget, TrialBag
-from .recorder_queue import EndItem, EventItem, MessageItem, SnapshotItem, When
-from .recorder_status import DiskWatch, Losses, RecorderState, Status
+from .recorder_queue import EndItem, EventItem, MessageItem, Moment, QueueItem, SnapshotItem
+from .recorder_status import DiskWatch, LossCounter, RecorderState, RecordingStatus
+from .trial_bag import SyncBudget, TrialBag
 
 FIRST_RETRY_S, LONGEST_RETRY_S = 0.5, 5.0
+KeptKey = Tuple[Union[str, bytes], ...]
 KEPT_FOR_NEXT_BAG = 500  # latched messages and structures with which every bag begins
 
 
-class Topics(NamedTuple):
+class RecorderTopics(NamedTuple):
     """Resolved names of the recorder's own topics."""
 
     events: str
@@ -20,21 +26,27 @@ class Topics(NamedTuple):
 
 
 class Reporter(NamedTuple):
-    """How the recorder speaks to people; called in its writer thread, or in the machine's where the disk hangs."""
+    """How the recorder informs people.
 
-    say: Callable[[str], None]
+    Called in its writer thread, or in the machine's where the disk hangs.
+    """
+
+    info: Callable[[str], None]
     warn: Callable[[str], None]
-    status: Callable[[Status], None]
+    status: Callable[[RecordingStatus], None]
 
 
 class TrialBags:
-    """One bag for each trial that runs. Used by the writer thread alone; raises nothing on a disk error.
+    """One bag for each trial that runs.
 
-    After an error everything is dropped and counted, until a retry (after half a second, later after five, and at the
-    start of every trial) finds that the disk takes a file again.
+    Used by the writer thread alone; raises nothing on a disk error.
+
+    After an error everything is dropped and counted, until a retry (after half a second, later
+    after five, and at the start of every trial) finds that the disk takes a file again.
     """
 
-    def __init__(self, folder: str, topics: Topics, reporter: Reporter, losses: Losses, watch: DiskWatch) -> None:
+    def __init__(self, folder: str, topics: RecorderTopics, reporter: Reporter, losses: LossCounter,
+                 watch: DiskWatch) -> None:
         self._folder = folder
         self._topics = topics
         self._reporter = reporter
@@ -42,12 +54,12 @@ class TrialBags:
         self._watch = watch
         self._budget = SyncBudget()
         self._bags: Dict[str, TrialBag] = {}
-        self._kept: Dict[Any, MessageItem] = {}
+        self._kept: Dict[KeptKey, MessageItem] = {}
         self._error = ''
         self._retry_at = 0.0
         self._retry_s = FIRST_RETRY_S
 
-    def write(self, item: Any) -> None:
+    def write(self, item: QueueItem) -> None:
         """Write an item of the recorder's queue into the bag or the bags that it belongs to."""
         if isinstance(item, EventItem):
             self._write_event(item.event, item.when)
@@ -62,7 +74,7 @@ class TrialBags:
             elif isinstance(item, SnapshotItem):
                 self._guard(bag, bag.add_message, item.topic, item.message, item.when, True)
 
-    def _write_event(self, event: Event, when: When) -> None:
+    def _write_event(self, event: Event, when: Moment) -> None:
         bag = self._bags.get(event.trial_id) or self._open(event, when)
         if bag is None:
             self._losses.add_events(event.trial_id, 1)
@@ -75,8 +87,9 @@ class TrialBags:
         if event.kind == EventKind.TRIAL_END and event.trial_id in self._bags:
             self._close(bag, when)
 
-    def _open(self, event: Event, when: When) -> Optional[TrialBag]:
-        if self._error and time.monotonic() < self._retry_at and event.kind != EventKind.TRIAL_START:
+    def _open(self, event: Event, when: Moment) -> Optional[TrialBag]:
+        if self._error and time.monotonic(
+        ) < self._retry_at and event.kind != EventKind.TRIAL_START:
             return None
         try:
             bag = TrialBag(self._folder, event.trial_id, when, self._watch, self._budget)
@@ -92,18 +105,18 @@ class TrialBags:
             self._report(bag, RecorderState.RECORDING)
         return self._bags.get(event.trial_id)
 
-    def _close(self, bag: TrialBag, when: When) -> None:
+    def _close(self, bag: TrialBag, when: Moment) -> None:
         self._guard(bag, self._add_status, bag, RecorderState.IDLE, when)
         self._guard(bag, bag.close)
         if self._bags.pop(bag.trial_id, None) is not None and not self._bags:
             self._report(bag, RecorderState.IDLE)
 
-    def _add_status(self, bag: TrialBag, state: RecorderState, when: When) -> None:
+    def _add_status(self, bag: TrialBag, state: RecorderState, when: Moment) -> None:
         message = status_message(self._status(bag, state))
         message.header.stamp.secs, message.header.stamp.nsecs = when.ros or (0, 0)
         bag.add_message(self._topics.status, message, when, latching=True)
 
-    def _guard(self, bag: TrialBag, work: Callable[..., None], *args: Any) -> None:
+    def _guard(self, bag: TrialBag, work: Callable[..., None], *args: object) -> None:
         """Do what may meet a disk error, unless the bag has met one already."""
         if self._bags.get(bag.trial_id) is not bag:
             return
@@ -120,12 +133,14 @@ class TrialBags:
         if self._error:
             return
         self._error = '{}: {}'.format(self._folder, err.strerror or err)
-        self._reporter.warn('Trials are not recorded any more, events are dropped and counted; {}'.format(self._error))
+        self._reporter.warn(
+            'Trials are not recorded any more, events are dropped and counted; {}'.format(
+                self._error))
         self._report(bag, RecorderState.DROPPING)
 
     def _works_again(self, bag: TrialBag) -> None:
         self._error = ''
-        self._reporter.say('Trials are recorded again, into {}; {} events were lost so far'.format(
+        self._reporter.info('Trials are recorded again, into {}; {} events were lost so far'.format(
             bag.path, self._losses.events))
         self._report(bag, RecorderState.RECORDING)
         self.recover()
@@ -133,15 +148,19 @@ class TrialBags:
     def _report(self, bag: Optional[TrialBag], state: RecorderState) -> None:
         self._reporter.status(self._status(bag, state))
 
-    def _status(self, bag: Optional[TrialBag], state: RecorderState) -> Status:
+    def _status(self, bag: Optional[TrialBag], state: RecorderState) -> RecordingStatus:
         losses = self._losses
         if bag is None:
-            return Status(state, events_lost_in_total=losses.events, messages_dropped=losses.messages, text=self._error)
-        return Status(state, bag.path, bag.trial_id, bag.events_written, losses.of_trial(bag.trial_id), losses.events,
-                      losses.messages, self._error)
+            return RecordingStatus(state, events_lost_in_total=losses.events,
+                          messages_dropped=losses.messages, text=self._error)
+        return RecordingStatus(state, bag.path, bag.trial_id, bag.events_written,
+                      losses.of_trial(bag.trial_id), losses.events, losses.messages, self._error)
 
     def _keep(self, item: MessageItem) -> None:
-        """Remember what later bags need to be understood: latched messages, and the structure of each container."""
+        """Remember messages that later bags need to be understood.
+
+        Those are latched messages, and the structure of each container.
+        """
         key = kept_key(item)
         if key is not None and (key in self._kept or len(self._kept) < KEPT_FOR_NEXT_BAG):
             self._kept[key] = item
@@ -150,9 +169,10 @@ class TrialBags:
         """Mend the bags of recorders that died in this folder, and our own that met an error."""
         try:
             with self._watch:
-                return recover_folder(self._folder, self._reporter.say, self._reporter.warn)
+                return recover_folder(self._folder, self._reporter.info, self._reporter.warn)
         except OSError as err:
-            self._reporter.warn('{} cannot be searched for bags to mend: {}'.format(self._folder, err))
+            self._reporter.warn('{} cannot be searched for bags to mend: {}'.format(
+                self._folder, err))
             return []
 
     def wait_s(self) -> Optional[float]:
@@ -169,11 +189,11 @@ class TrialBags:
     def close(self) -> None:
         """Close the bags of trials that have not ended, as well as the disk lets it."""
         for bag in list(self._bags.values()):
-            now = When(None, time.time(), time.monotonic())
+            now = Moment(None, time.time(), time.monotonic())
             self._close(bag, now)
 
 
-def kept_key(item: MessageItem) -> Any:
+def kept_key(item: MessageItem) -> Optional[KeptKey]:
     """Under what a message is remembered for later bags; None: it is not."""
     if item.message_type.name == 'smach_msgs/SmachContainerStructure':
         return item.topic, item.callerid, container_path(item.data)
@@ -187,7 +207,8 @@ def container_path(structure: bytes) -> bytes:
     return structure[frame_id_end + 4:frame_id_end + 4 + size]
 
 
-def status_message(status: Status) -> Any:
+def status_message(status: RecordingStatus) -> RecorderStatus:
     """Translate to a RecorderStatus message, without a stamp."""
-    from smach_oracle.msg import RecorderStatus
-    return RecorderStatus(state=int(status.state), **{name: getattr(status, name) for name in Status._fields[1:]})
+    return RecorderStatus(state=int(status.state),
+                          **{name: getattr(status, name)
+                             for name in RecordingStatus._fields[1:]})

@@ -1,0 +1,1 @@
+"""Questions on ROS: the ExpertQuery server and client, and what they need to know."""

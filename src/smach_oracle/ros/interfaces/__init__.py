@@ -1,0 +1,1 @@
+"""Shared-autonomy interfaces that are started on demand."""

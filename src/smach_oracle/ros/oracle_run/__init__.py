@@ -1,0 +1,1 @@
+"""Unmodified scripts under an oracle."""

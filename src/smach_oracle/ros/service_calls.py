@@ -1,0 +1,63 @@
+"""Calls of services that end in time, whatever the server does."""
+import threading
+import time
+from typing import Optional
+
+import genpy
+import rospy
+
+from smach_oracle.oracle.errors import OracleError
+
+CALL_LIMIT_S = 5.0
+
+
+class ServerGoneError(OracleError):
+    """A server could not be reached, or does not answer; the text names it and the reason."""
+
+
+class ServiceCall(threading.Thread):
+    """One call, made in a thread of its own.
+
+    rospy sets no time limit, and a server that is frozen or cut off never answers.
+    """
+
+    def __init__(self, name: str, kind: type, request: object) -> None:
+        super().__init__(name='call {}'.format(name), daemon=True)
+        self.since_s = time.monotonic()
+        self._service = (name, kind)
+        self._request = request
+        self._response: Optional[genpy.Message] = None
+        self._error: Optional[Exception] = None
+        self.start()
+
+    def run(self) -> None:
+        """Make the call."""
+        try:
+            self._response = rospy.ServiceProxy(*self._service)(self._request)
+        except Exception as err:  # raised again by `result`, in the caller's thread
+            self._error = err
+
+    def result(self, limit_s: float) -> genpy.Message:
+        """The response; an error that the call has raised is raised again.
+
+        :raises ServerGoneError: where the server cannot be reached or does not answer in time.
+        """
+        self.join(limit_s)
+        name = self._service[0]
+        if self.is_alive():
+            raise ServerGoneError('{} does not answer'.format(name))
+        if isinstance(self._error, (rospy.ServiceException, rospy.ROSException, OSError)):
+            raise ServerGoneError('{} cannot be reached: {}'.format(name,
+                                                                    self._error)) from self._error
+        if self._error is not None:
+            raise self._error
+        return self._response
+
+
+def call_service(name: str, kind: type, request: object,
+                 limit_s: float = CALL_LIMIT_S) -> genpy.Message:
+    """Call a service, waiting no longer than `limit_s`.
+
+    :raises ServerGoneError: if there is no such service now, or no answer in time.
+    """
+    return ServiceCall(name, kind, request).result(limit_s)
