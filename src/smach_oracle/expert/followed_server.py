@@ -1,28 +1,29 @@
 """One ExpertQuery server as a front end sees it: its open list, and calls to its services."""
 import math
-import threading
 import time
-from typing import Any, Callable, List, NamedTuple, Optional
+from typing import Callable, List, NamedTuple, Optional
 
+import genpy
 import rospy
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, OpenQueries, OpenQuery
-from smach_oracle.srv import (AnswerQuery, AnswerQueryRequest, AnswerQueryResponse, ClaimQuery, ClaimQueryRequest,
-                              ClaimQueryResponse)
+from smach_oracle.ros.connections import live_connections
+from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
+from smach_oracle.srv import (
+    AnswerQuery,
+    AnswerQueryRequest,
+    AnswerQueryResponse,
+    ClaimQuery,
+    ClaimQueryRequest,
+    ClaimQueryResponse,
+)
 
-from ..oracle.errors import OracleError
-
-
-CALL_LIMIT_S = 5.0
 RELEASE_LIMIT_S = 1.0  # nobody need wait for it: a claim that is not given back runs out
-_HANGING_S = 15.0  # after a call without an answer others fail at once for this long, then one tries again
+# after a call without an answer others fail at once for this long, then one tries again
+_HANGING_S = 15.0
 
 
-class ServerGoneError(OracleError):
-    """A server could not be reached, or does not answer; the text names it and says why."""
-
-
-class Listed(NamedTuple):
+class ListedQuestion(NamedTuple):
     """An open question as last heard of; times are this process's monotonic clock's, in seconds."""
 
     server: str
@@ -38,70 +39,31 @@ class Listed(NamedTuple):
         return '{} {}'.format(self.server, self.goal.query_id)
 
 
-class _ServiceCall(threading.Thread):
-    """One call, made aside: rospy sets no time limit, and a server that is frozen or cut off never answers."""
-
-    def __init__(self, name: str, kind: type, request: object) -> None:
-        super().__init__(name='call {}'.format(name), daemon=True)
-        self.since_s = time.monotonic()
-        self._service = (name, kind)
-        self._request = request
-        self._response: Any = None
-        self._error: Optional[Exception] = None
-        self.start()
-
-    def run(self) -> None:
-        """Make the call."""
-        try:
-            self._response = rospy.ServiceProxy(*self._service)(self._request)
-        except Exception as err:  # raised again by `result`, in the caller's thread
-            self._error = err
-
-    def result(self, limit_s: float) -> Any:
-        """The response, or what the call has raised; ServerGoneError where it could not be had."""
-        self.join(limit_s)
-        name = self._service[0]
-        if self.is_alive():
-            raise ServerGoneError('{} does not answer'.format(name))
-        if isinstance(self._error, (rospy.ServiceException, rospy.ROSException, OSError)):
-            raise ServerGoneError('{} cannot be reached: {}'.format(name, self._error)) from self._error
-        if self._error is not None:
-            raise self._error
-        return self._response
-
-
-def call_service(name: str, kind: type, request: object, limit_s: float = CALL_LIMIT_S) -> Any:
-    """Call a service, waiting no longer than `limit_s`.
-
-    :raises ServerGoneError: if there is no such service now, or no answer in time.
-    """
-    return _ServiceCall(name, kind, request).result(limit_s)
-
-
 class FollowedServer:
     """Follows the open list of one server and calls its services.
 
-    Services are looked up at every call: a server that was restarted, or that has registered again with a new master,
-    is found.
+    Services are looked up at every call: a server that was restarted, or that has registered again
+    with a new master, is found.
     """
 
     def __init__(self, name: str, on_change: Callable[[], None]) -> None:
-        """`name` is resolved, e.g. /robot/expert_query; `on_change` is called in a ROS thread at every list."""
+        """
+        :param name: resolved, e.g. /robot/expert_query.
+        :param on_change: called in a ROS thread at every list.
+        """
         self.name = name
         self._on_change = on_change
-        self._questions: List[Listed] = []
+        self._questions: List[ListedQuestion] = []
         self._unheard_since_s: Optional[float] = None
-        self._unanswered: Optional[_ServiceCall] = None
+        self._unanswered: Optional[ServiceCall] = None
         self._subscriber = self._subscribe()
 
     @property
     def connected(self) -> bool:
         """Whether the server's process is there."""
-        topic = self._subscriber.impl
-        return topic is not None and any(getattr(connection, 'socket', None) is not None
-                                         for connection in topic.connections)
+        return bool(live_connections(self._subscriber))
 
-    def questions(self) -> List[Listed]:
+    def questions(self) -> List[ListedQuestion]:
         """The open questions, oldest first; none while the server is gone."""
         return list(self._questions) if self.connected else []
 
@@ -112,18 +74,22 @@ class FollowedServer:
         :raises ServerGoneError: if there is no such service now, or no answer within 5 s.
         """
         limit_s = RELEASE_LIMIT_S if action == ClaimQueryRequest.RELEASE else CALL_LIMIT_S
-        return self._call('claim', ClaimQuery, ClaimQueryRequest(action, query_id, expert, lease_s), limit_s)
+        return self._call('claim', ClaimQuery, ClaimQueryRequest(action, query_id, expert, lease_s),
+                          limit_s)
 
     def answer(self, query_id: str, decision: ExpertDecision) -> AnswerQueryResponse:
         """Call the answer service; asking the same twice does no harm.
 
         :raises ServerGoneError: if there is no such service now, or no answer within 5 s.
         """
-        return self._call('answer', AnswerQuery, AnswerQueryRequest(query_id, decision), CALL_LIMIT_S)
+        return self._call('answer', AnswerQuery, AnswerQueryRequest(query_id, decision),
+                          CALL_LIMIT_S)
 
     def refresh(self, advertised: bool, patience_s: float = 3.0) -> None:
-        """Subscribe anew where the master knows the list and we do not hear it: we were registered with an earlier
-        master, or its address has changed."""
+        """Subscribe anew where the master knows the list and we do not hear it.
+
+        We were registered with an earlier master, or its address has changed.
+        """
         if self.connected or not advertised:
             self._unheard_since_s = None
             return
@@ -140,19 +106,21 @@ class FollowedServer:
         self._subscriber.unregister()
 
     def _subscribe(self) -> rospy.Subscriber:
-        return rospy.Subscriber(self.name + '/open', OpenQueries, self._on_list, queue_size=2, tcp_nodelay=True)
+        return rospy.Subscriber(self.name + '/open', OpenQueries, self._on_list, queue_size=2,
+                                tcp_nodelay=True)
 
     def _on_list(self, message: OpenQueries) -> None:
         now_s = time.monotonic()
         self._questions = [_listed(self.name, entry, now_s) for entry in message.queries]
         self._on_change()
 
-    def _call(self, service: str, kind: type, request: object, limit_s: float) -> Any:
+    def _call(self, service: str, kind: type, request: object, limit_s: float) -> genpy.Message:
         name = '{}/{}'.format(self.name, service)
         hanging = self._unanswered
-        if hanging is not None and hanging.is_alive() and time.monotonic() - hanging.since_s < _HANGING_S:
+        if hanging is not None and hanging.is_alive(
+        ) and time.monotonic() - hanging.since_s < _HANGING_S:
             raise ServerGoneError('{} does not answer'.format(name))
-        call = _ServiceCall(name, kind, request)
+        call = ServiceCall(name, kind, request)
         try:
             return call.result(limit_s)
         finally:
@@ -160,6 +128,7 @@ class FollowedServer:
                 self._unanswered = call
 
 
-def _listed(server: str, entry: OpenQuery, now_s: float) -> Listed:
+def _listed(server: str, entry: OpenQuery, now_s: float) -> ListedQuestion:
     deadline_s = now_s + entry.remaining if entry.remaining >= 0 else math.inf
-    return Listed(server, entry.query, entry.status, entry.claimed_by, now_s - entry.age, deadline_s)
+    return ListedQuestion(server, entry.query, entry.status, entry.claimed_by, now_s - entry.age,
+                  deadline_s)

@@ -1,6 +1,4 @@
-"""What every front end for experts needs of ROS: the open questions of one or many servers, claims that stay alive
-while a person thinks, and answers.
-"""
+"""The ROS part of every front end for experts: open questions, claims and answers."""
 import threading
 import time
 from typing import Dict, List, Optional, Sequence
@@ -9,25 +7,31 @@ import rosgraph
 import rospy
 
 from smach_oracle.msg import ExpertDecision, OpenQueries, OpenQuery
+from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
 
-from .followed_server import FollowedServer, Listed, ServerGoneError
+from .claims import LEASE_S, Claim, ClaimKeeper
+from .followed_server import FollowedServer, ListedQuestion
 
-LEASE_S = 15.0
 _DISCOVERY_PERIOD_S = 2.0
 _FORGET_S = 600.0  # after which a server that was found, and is gone, is followed no longer
-_FAREWELL_S = 1.0  # for giving back claims at the end; a server or master that hangs does not hold it up
+# for giving back claims at the end; a server or master that hangs does not hold it up
+_FAREWELL_S = 1.0
 
 
 class FrontEnd:
     """Open questions, claims and answers for one expert; may be used from any thread.
 
-    Without names of servers it follows every topic of type smach_oracle/OpenQueries that the master knows, now or
-    later.
+    Without names of servers it follows every topic of type smach_oracle/OpenQueries that the master
+    knows, now or later.
     """
 
     def __init__(self, expert: str, servers: Sequence[str] = (), lease_s: float = LEASE_S) -> None:
-        """`expert`: the name under which to claim and answer. `servers`: names such as /robot/expert_query."""
+        """Follow servers from now on.
+
+        :param expert: the name under which to claim and answer.
+        :param servers: names such as /robot/expert_query.
+        """
         self.expert = expert
         self._discover = not servers
         self._lease_s = lease_s
@@ -35,14 +39,11 @@ class FrontEnd:
         self._version = 0
         self._servers: Dict[str, FollowedServer] = {}
         self._gone_since_s: Dict[str, float] = {}
-        self._held: Dict[str, Listed] = {}
         self._stopped = threading.Event()
         for name in servers:
             self._follow(rospy.resolve_name(name))
-        self._threads = [threading.Thread(target=target, daemon=True, name=target.__name__)
-                         for target in (self._keep_connected, self._keep_claims)]
-        for thread in self._threads:
-            thread.start()
+        self._claims = ClaimKeeper(self, lease_s)
+        threading.Thread(target=self._keep_connected, daemon=True, name='keep connected').start()
 
     @property
     def servers(self) -> List[str]:
@@ -54,42 +55,47 @@ class FrontEnd:
         followed = self._servers.get(server)
         return followed is not None and followed.connected
 
-    def questions(self) -> List[Listed]:
+    def questions(self) -> List[ListedQuestion]:
         """Open questions of all servers, oldest first."""
         found = [listed for server in list(self._servers.values()) for listed in server.questions()]
         return sorted(found, key=lambda listed: (listed.asked_s, listed.key))
 
-    def find(self, key: str) -> Optional[Listed]:
+    def find(self, key: str) -> Optional[ListedQuestion]:
         """One open question by its key, None where it is open no longer."""
         return next((listed for listed in self.questions() if listed.key == key), None)
 
     def wait_for_change(self, version: int, timeout_s: float) -> int:
-        """Block until any list has come since `version` (from an earlier call; begin with 0), or the time is over."""
+        """Block until a list has come since `version`, or the time is over.
+
+        :param version: returned by an earlier call; begin with 0.
+        """
         with self._changed:
-            self._changed.wait_for(lambda: self._version != version or self._stopped.is_set(), timeout_s)
+            self._changed.wait_for(lambda: self._version != version or self._stopped.is_set(),
+                                   timeout_s)
             return self._version
 
-    def claim(self, listed: Listed, take_over: bool = False) -> ClaimQueryResponse:
+    def claim(self, listed: ListedQuestion, take_over: bool = False) -> ClaimQueryResponse:
         """Claim a question, and keep the claim alive until it is answered, released or lost.
 
         :raises ServerGoneError: if its server cannot be reached.
         """
         action = ClaimQueryRequest.TAKE_OVER if take_over else ClaimQueryRequest.CLAIM
-        response = self.server(listed).claim(listed.goal.query_id, self.expert, action, self._lease_s)
+        response = self.server(listed).claim(listed.goal.query_id, self.expert, action,
+                                             self._lease_s)
         if response.ok:
-            self._held[listed.key] = listed
+            self._claims.keep(listed, self.expert)
         return response
 
-    def release(self, listed: Listed) -> None:
+    def release(self, listed: ListedQuestion) -> None:
         """Give a claim back; a server that cannot be reached lets it run out."""
-        if self._held.pop(listed.key, None) is None:
+        if not self._claims.drop(Claim(listed.key, self.expert)):
             return
         try:
             self.server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RELEASE)
         except ServerGoneError as err:
             rospy.logdebug('A claim was not given back: %s', err)
 
-    def answer(self, listed: Listed, decision: ExpertDecision) -> AnswerQueryResponse:
+    def answer(self, listed: ListedQuestion, decision: ExpertDecision) -> AnswerQueryResponse:
         """Settle a question under this expert's name; a refused answer leaves a claim as it is.
 
         :raises ServerGoneError: if its server cannot be reached; the same answer may be sent again.
@@ -97,25 +103,26 @@ class FrontEnd:
         decision.by = self.expert
         response = self.server(listed).answer(listed.goal.query_id, decision)
         if response.ok:
-            self._held.pop(listed.key, None)
+            self._claims.drop(Claim(listed.key, self.expert))
         return response
 
     def stop(self) -> None:
-        """Give all claims back and follow nothing any more; what cannot be done within a second is left."""
+        """Give all claims back and follow nothing any more, within a second."""
         self._stopped.set()
+        self._claims.stop()
         farewell = threading.Thread(target=self._take_leave, daemon=True, name='farewell')
         farewell.start()
         farewell.join(_FAREWELL_S)
         self._notify()
 
     def _take_leave(self) -> None:
-        for listed in list(self._held.values()):
+        for listed in self._claims.held.values():
             self.release(listed)
         for server in list(self._servers.values()):
             server.stop()
 
-    def server(self, listed: Listed) -> FollowedServer:
-        """The server of a question, for front ends that serve several experts and keep their claims themselves.
+    def server(self, listed: ListedQuestion) -> FollowedServer:
+        """The server of a question, for front ends that serve several experts.
 
         :raises ServerGoneError: where it has been gone for so long that it is followed no longer.
         """
@@ -142,7 +149,10 @@ class FrontEnd:
                 return
 
     def _look_for_servers(self, published: Sequence[Sequence[str]]) -> None:
-        lists = {topic for topic, kind in published if kind == OpenQueries._type and topic.endswith('/open')}
+        lists = {
+            topic
+            for topic, kind in published if kind == OpenQueries._type and topic.endswith('/open')
+        }
         if self._discover:
             for topic in sorted(lists):
                 name = topic[:-len('/open')]
@@ -161,29 +171,17 @@ class FrontEnd:
             del self._servers[name], self._gone_since_s[name]
             server.stop()
 
-    def _keep_claims(self) -> None:
-        while not self._stopped.wait(self._lease_s / 3.0) and not rospy.is_shutdown():
-            for listed in list(self._held.values()):
-                self._renew(listed)
 
-    def _renew(self, listed: Listed) -> None:
-        """Renew a claim; forget it where it is lost, keep trying where the server only cannot be reached."""
-        try:
-            response = self.server(listed).claim(listed.goal.query_id, self.expert, ClaimQueryRequest.RENEW,
-                                                  self._lease_s)
-        except ServerGoneError as err:
-            rospy.logdebug('A claim was not renewed: %s', err)
-            return
-        if not response.ok:
-            self._held.pop(listed.key, None)
+def wait_for_question(front_end: FrontEnd, timeout_s: float) -> Optional[ListedQuestion]:
+    """Wait for a question that nobody works on (PENDING).
 
-
-def wait_for_question(front_end: FrontEnd, timeout_s: float) -> Optional[Listed]:
-    """The oldest question that nobody works on (PENDING), waiting for one for some time; None where none came."""
+    :returns: the oldest one, None where none came in time.
+    """
     until_s = time.monotonic() + timeout_s
     version = 0
     while not rospy.is_shutdown():
-        pending = next((each for each in front_end.questions() if each.status == OpenQuery.PENDING), None)
+        pending = next((each for each in front_end.questions() if each.status == OpenQuery.PENDING),
+                       None)
         left_s = until_s - time.monotonic()
         if pending is not None or left_s <= 0.0:
             return pending

@@ -1,22 +1,22 @@
-"""What interfaces that robots have started print."""
+"""What the interfaces that robots have started print."""
 import threading
 from collections import OrderedDict
-from typing import Any, Callable, Collection, Dict, Optional
+from typing import Callable, Collection, Optional
 
 from smach_oracle.msg import InterfaceOutput
 
 from .robot_topics import MOST_ROBOTS, RobotTopics
 
-_STATUS = {InterfaceOutput.STARTING: 'starting', InterfaceOutput.RUNNING: 'running', InterfaceOutput.FAILED: 'failed',
-           InterfaceOutput.STOPPED: 'stopped'}
-SHOWN_LINES = 60
+TOPIC = '/interface_output'  # behind the robot's name
 
 
 class InterfaceOutputs:
-    """Follows `<robot>/interface_output` of robots; holds the newest of each."""
+    """Follows `<robot>/interface_output` of robots and holds the newest message of each."""
 
-    def __init__(self) -> None:
-        self._topics = RobotTopics('/interface_output', InterfaceOutput, self.taker, queue_size=2)
+    def __init__(self, query_id: str = '') -> None:
+        """`query_id`: of the only question whose interface is followed; '' follows all."""
+        self._query_id = query_id
+        self._topics = RobotTopics(TOPIC, InterfaceOutput, self.taker, queue_size=5)
         self._lock = threading.Lock()
         self._newest: 'OrderedDict[str, InterfaceOutput]' = OrderedDict()  # by robot
 
@@ -24,22 +24,25 @@ class InterfaceOutputs:
         """Listen to these robots, too."""
         self._topics.follow(robots)
 
-    def view(self, query_id: str) -> Optional[Dict[str, Any]]:
-        """What was printed for a question; None where nothing was started for it."""
+    def newest(self, query_id: str) -> Optional[InterfaceOutput]:
+        """The newest message about a question; None where nothing was started for it."""
         with self._lock:
-            newest = list(self._newest.values())
-        for message in newest:
-            if message.query_id == query_id:
-                return {'status': _STATUS.get(message.status, ''), 'text': message.text[:500],
-                        'lines': list(message.lines[-SHOWN_LINES:])}
-        return None
+            return next((each for each in self._newest.values() if each.query_id == query_id), None)
+
+    def stop(self) -> None:
+        """Listen to no robot any longer."""
+        self._topics.stop()
 
     def taker(self, robot: str) -> Callable[[InterfaceOutput], None]:
-        """What takes in a robot's messages."""
+        """The function that takes a robot's messages."""
         def take(message: InterfaceOutput) -> None:
-            with self._lock:
-                self._newest[robot] = message
-                self._newest.move_to_end(robot)
-                while len(self._newest) > MOST_ROBOTS:
-                    self._newest.popitem(last=False)
+            if self._query_id in ('', message.query_id):
+                self._keep(robot, message)
         return take
+
+    def _keep(self, robot: str, message: InterfaceOutput) -> None:
+        with self._lock:
+            self._newest[robot] = message
+            self._newest.move_to_end(robot)
+            while len(self._newest) > MOST_ROBOTS:
+                self._newest.popitem(last=False)

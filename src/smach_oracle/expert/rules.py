@@ -2,20 +2,25 @@
 
     rules = Rules.parse({
         'default': {'kind': 'give_up'},
-        'PICK': [{'kind': 'goto', 'state': 'DETECT'},                      # the first question of a trial
+        'PICK': [{'kind': 'goto', 'state': 'DETECT'},                      # the first question of a
+        trial
                  {'kind': 'interface', 'interface': 'assist'}],            # every later one
-        'KITCHEN/OPEN_FRIDGE': {'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'angle': 1.2}, 'delay_s': 2},
+        'KITCHEN/OPEN_FRIDGE': {'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'angle':
+        1.2}, 'delay_s': 2},
     })
 
-A key is the label of the failed state, alone or behind its container path, which is the more specific one; `default`
-is for all others. The same questions in the same order get the same answers.
+A key is the label of the failed state, alone or behind its container path, which is the more
+specific one; `default` is for all others. The same questions in the same order get the same
+answers.
 """
 import math
 import threading
 from typing import Any, Dict, Mapping, NamedTuple, Optional, Tuple
 
-from ..oracle.errors import ConfigError
-from ..oracle.question import Answer, AnswerKind, Expert, InterfaceOffer, Progress, Question
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 DEFAULT = 'default'
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
@@ -40,7 +45,8 @@ class Rule(NamedTuple):
 
         :raises KeyError: for a rule that ignores.
         """
-        return Answer(KINDS[self.kind], self.state, self.outcome, self.interface, self.outputs, by, self.why)
+        return Answer(KINDS[self.kind], self.state, self.outcome, self.interface, self.outputs, by,
+                      self.why)
 
 
 class Rules:
@@ -54,16 +60,17 @@ class Rules:
     def parse(cls, settings: Mapping[str, Any]) -> 'Rules':
         """Rules from a dictionary as YAML gives it.
 
-        :raises ConfigError: naming the key, the value and what is allowed.
+        :raises SettingsError: naming the key, the value and what is allowed.
         """
         if not isinstance(settings, Mapping):
-            raise ConfigError('rules', settings, 'a mapping from failed states to rules')
+            raise SettingsError('rules', settings, 'a mapping from failed states to rules')
         return cls({state: _parse_rules(state, value) for state, value in settings.items()})
 
     def next(self, robot: str, trial_id: str, container_path: str, state: str) -> Rule:
         """The rule for one more question; each call counts."""
         path = '{}/{}'.format(container_path, state)
-        rules = next((self._by_state[key] for key in (path, state, DEFAULT) if key in self._by_state), ())
+        rules = next(
+            (self._by_state[key] for key in (path, state, DEFAULT) if key in self._by_state), ())
         trial, count = self._asked.get((robot, path), (trial_id, 0))
         if trial != trial_id:
             count = 0
@@ -74,19 +81,29 @@ class Rules:
 class RuleExpert(Expert):
     """An expert in the same process, without ROS, that goes by rules."""
 
-    def __init__(self, rules: Rules, by: str = 'scripted', interfaces: Optional[Mapping[str, Any]] = None) -> None:
-        """`interfaces`: by name, functions that take the question and return a SUPERSEDE answer or None."""
+    def __init__(self, rules: Rules, by: str = 'scripted',
+                 interfaces: Optional[Mapping[str, Any]] = None) -> None:
+        """
+        :param interfaces: by name, functions that take the question and return a SUPERSEDE answer
+            or None.
+        """
         self._rules = rules
         self._by = by
         self._interfaces = dict(interfaces or {})
 
-    def ask(self, question: Question, cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
-        """The rule's answer after its delay; None by the deadline where the rule ignores or comes too late."""
-        rule = self._rules.next('', question.trial_id, question.container_path, question.failed_state)
+    def ask(self, question: Question, cancelled: threading.Event,
+            progress: Progress) -> Optional[Answer]:
+        """The rule's answer after its delay.
+
+        None by the deadline where the rule ignores or comes too late.
+        """
+        rule = self._rules.next('', question.trial_id, question.container_path,
+                                question.failed_state)
         ignores = rule.kind == IGNORE
         limit_s = question.deadline_s or math.inf
         wait_s = min(math.inf if ignores else rule.delay_s, limit_s)
-        if cancelled.wait(None if wait_s == math.inf else wait_s) or ignores or rule.delay_s > limit_s:
+        if cancelled.wait(None if wait_s ==
+                          math.inf else wait_s) or ignores or rule.delay_s > limit_s:
             return None
         return rule.answer(self._by)
 
@@ -95,53 +112,54 @@ class RuleExpert(Expert):
         """Call the function of that name; None where there is none."""
         progress('interface_start', offer.name, '')
         run = self._interfaces.get(offer.name)
-        answer: Optional[Answer] = run(question) if run is not None and not cancelled.is_set() else None
+        answer: Optional[Answer] = run(
+            question) if run is not None and not cancelled.is_set() else None
         progress('interface_end', offer.name, answer.outcome if answer is not None else '')
         return answer
 
 
-def _parse_rules(state: str, value: Any) -> Tuple[Rule, ...]:
+def _parse_rules(state: str, value: object) -> Tuple[Rule, ...]:
     if not isinstance(state, str) or not state:
-        raise ConfigError('rules', state, 'labels of states as keys, or "default"')
+        raise SettingsError('rules', state, 'labels of states as keys, or "default"')
     if not isinstance(value, (list, tuple)):
         return (_parse_rule(state, value),)
     if not value:
-        raise ConfigError(state, value, 'a rule, or a list of one rule or more')
-    return tuple(_parse_rule('{}[{}]'.format(state, index), item) for index, item in enumerate(value))
+        raise SettingsError(state, value, 'a rule, or a list of one rule or more')
+    return tuple(
+        _parse_rule('{}[{}]'.format(state, index), item) for index, item in enumerate(value))
 
 
-def _parse_rule(key: str, value: Any) -> Rule:
+def _parse_rule(key: str, value: object) -> Rule:
     if not isinstance(value, Mapping):
-        raise ConfigError(key, value, 'a mapping with a kind')
+        raise SettingsError(key, value, 'a mapping with a kind')
     unknown = sorted(str(field) for field in value if field not in _FIELDS)
     if unknown:
-        raise ConfigError('{}.{}'.format(key, unknown[0]), value, 'the keys {}'.format(', '.join(_FIELDS)))
+        raise SettingsError('{}.{}'.format(key, unknown[0]), value,
+                          'the keys {}'.format(', '.join(_FIELDS)))
     kind = value.get('kind')
     if kind != IGNORE and kind not in KINDS:
-        raise ConfigError(key + '.kind', kind, ', '.join(sorted(KINDS)) + ' or ' + IGNORE)
+        raise SettingsError(key + '.kind', kind, ', '.join(sorted(KINDS)) + ' or ' + IGNORE)
     named_by = _NAMED_BY.get(kind)
     if named_by is not None and not value.get(named_by):
-        raise ConfigError('{}.{}'.format(key, named_by), value.get(named_by), 'a name; {} needs one'.format(kind))
-    return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'), _text(key, value, 'interface'),
-                _outputs(key, value), _text(key, value, 'why'), _delay_s(key, value))
+        raise SettingsError('{}.{}'.format(key, named_by), value.get(named_by),
+                          'a name; {} needs one'.format(kind))
+    return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'),
+                _text(key, value, 'interface'), _outputs(key, value), _text(key, value, 'why'),
+                _delay_s(key, value))
 
 
 def _text(key: str, value: Mapping[str, Any], field: str) -> str:
-    text = value.get(field, '')
-    if not isinstance(text, str):
-        raise ConfigError('{}.{}'.format(key, field), text, 'a string')
-    return text
+    return checks.text('{}.{}'.format(key, field), value.get(field, ''))
 
 
 def _outputs(key: str, value: Mapping[str, Any]) -> Optional[Mapping[str, Any]]:
     outputs = value.get('outputs') or None
-    if outputs is not None and not (isinstance(outputs, Mapping) and all(isinstance(name, str) for name in outputs)):
-        raise ConfigError(key + '.outputs', outputs, 'a mapping from userdata keys to plain data')
+    if outputs is not None and not (isinstance(outputs, Mapping)
+                                    and all(isinstance(name, str) for name in outputs)):
+        raise SettingsError(key + '.outputs', outputs, 'a mapping from userdata keys to plain data')
     return outputs
 
 
 def _delay_s(key: str, value: Mapping[str, Any]) -> float:
-    delay_s = value.get('delay_s', 0.0)
-    if isinstance(delay_s, bool) or not isinstance(delay_s, (int, float)) or not 0 <= delay_s < math.inf:
-        raise ConfigError(key + '.delay_s', delay_s, 'seconds from 0')
-    return float(delay_s)
+    check = checks.number(0, math.inf, 'seconds from 0')
+    return float(check(key + '.delay_s', value.get('delay_s', 0.0)))

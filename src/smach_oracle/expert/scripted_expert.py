@@ -7,14 +7,16 @@ import rospy
 import yaml
 
 from smach_oracle.msg import OpenQuery
+from smach_oracle.oracle.errors import OracleError, SettingsError
+from smach_oracle.oracle.settings import checks
+from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.expert.question_messages import to_decision
+from smach_oracle.ros.master_watch import start_master_watch
+from smach_oracle.ros.parameters import name_of
+from smach_oracle.ros.service_calls import ServerGoneError
 
-from ..oracle.errors import ConfigError, OracleError
-from ..oracle.paths import path_of
-from ..ros.command_line import parameters_only
-from ..ros.master_watch import start_master_watch
-from ..ros.parameters import name_of
-from ..ros.question_messages import to_decision
-from .followed_server import Listed, ServerGoneError
+from .followed_server import ListedQuestion
 from .front_end import FrontEnd
 from .rules import IGNORE, Rule, Rules
 
@@ -23,16 +25,18 @@ _IDLE_S = 0.5
 _RETRY_S = 0.2
 
 
-class _Work(NamedTuple):
+class _PlannedAnswer(NamedTuple):
     """A question that will be answered."""
 
-    listed: Listed
+    listed: ListedQuestion
     rule: Rule
     due_s: float  # monotonic; infinity for a question left to others
 
 
 class ScriptedExpert:
-    """Answers every question of a front end by rules, in a thread of its own; questions wait side by side.
+    """Answers every question of a front end by rules, in a thread of its own.
+
+    Questions wait side by side.
 
     A question that another expert has claimed is left alone until it is free again.
     """
@@ -40,7 +44,7 @@ class ScriptedExpert:
     def __init__(self, front_end: FrontEnd, rules: Rules) -> None:
         self._front_end = front_end
         self._rules = rules
-        self._work: Dict[str, _Work] = {}
+        self._planned: Dict[str, _PlannedAnswer] = {}
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name='scripted expert', daemon=True)
         self._thread.start()
@@ -57,96 +61,100 @@ class ScriptedExpert:
             version = self._front_end.wait_for_change(version, self._pause_s())
             self._take_in({listed.key: listed for listed in self._front_end.questions()})
             now_s = time.monotonic()
-            for key, work in list(self._work.items()):
-                if work.due_s <= now_s:
-                    self._answer(key, work)
+            for key, planned in list(self._planned.items()):
+                if planned.due_s <= now_s:
+                    self._answer(key, planned)
 
     def _pause_s(self) -> float:
-        due_s = min((work.due_s for work in self._work.values()), default=float('inf'))
+        due_s = min((planned.due_s for planned in self._planned.values()), default=float('inf'))
         return max(0.0, min(_IDLE_S, due_s - time.monotonic()))
 
-    def _take_in(self, questions: Mapping[str, Listed]) -> None:
-        for key in set(self._work) - set(questions):
-            del self._work[key]
+    def _take_in(self, questions: Mapping[str, ListedQuestion]) -> None:
+        for key in set(self._planned) - set(questions):
+            del self._planned[key]
         for key, listed in questions.items():
             free = listed.status == OpenQuery.PENDING or listed.holder == self._front_end.expert
-            if key not in self._work and free and listed.status != OpenQuery.INTERFACE_RUNNING:
+            if key not in self._planned and free and listed.status != OpenQuery.INTERFACE_RUNNING:
                 self._begin(key, listed)
 
-    def _begin(self, key: str, listed: Listed) -> None:
+    def _begin(self, key: str, listed: ListedQuestion) -> None:
         goal = listed.goal
         rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path, goal.failed_state)
         due_s = float('inf') if rule.kind == IGNORE else time.monotonic() + rule.delay_s
-        self._work[key] = _Work(listed, rule, due_s)
+        self._planned[key] = _PlannedAnswer(listed, rule, due_s)
         if rule.delay_s > 0 and rule.kind != IGNORE:
             try:
                 self._front_end.claim(listed)
             except ServerGoneError as err:
                 rospy.logwarn('%s', err)
 
-    def _answer(self, key: str, work: _Work) -> None:
+    def _answer(self, key: str, planned: _PlannedAnswer) -> None:
         try:
-            decision = to_decision(work.rule.answer(self._front_end.expert))
-            response = self._front_end.answer(work.listed, decision)
+            decision = to_decision(planned.rule.answer(self._front_end.expert))
+            response = self._front_end.answer(planned.listed, decision)
         except ServerGoneError as err:
             rospy.logwarn('%s', err)
-            self._work[key] = work._replace(due_s=time.monotonic() + _RETRY_S)
+            self._planned[key] = planned._replace(due_s=time.monotonic() + _RETRY_S)
             return
         except OracleError as err:
-            rospy.logerr('The rule for %s cannot be sent: %s', work.listed.goal.failed_state, err)
-            self._leave(key, work)
+            rospy.logerr('The rule for %s cannot be sent: %s', planned.listed.goal.failed_state,
+                         err)
+            self._leave(key, planned)
             return
         if not response.ok:
-            rospy.logwarn('Answer for %s refused: %s', work.listed.goal.failed_state, response.message)
-        self._leave(key, work)
+            rospy.logwarn('Answer for %s refused: %s', planned.listed.goal.failed_state,
+                          response.message)
+        self._leave(key, planned)
 
-    def _leave(self, key: str, work: _Work) -> None:
+    def _leave(self, key: str, planned: _PlannedAnswer) -> None:
         """Done with it: answered, or to be left to others."""
-        self._front_end.release(work.listed)
-        self._work[key] = work._replace(due_s=float('inf'))
+        self._front_end.release(planned.listed)
+        self._planned[key] = planned._replace(due_s=float('inf'))
 
 
 def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     """Rules from a dictionary, else from a YAML file.
 
-    :raises ConfigError: naming what is wrong with them, or with the file.
+    :raises SettingsError: naming what is wrong with them, or with the file.
     """
     if rules:
         return Rules.parse(rules)
-    if not isinstance(path, str):
-        raise ConfigError('~rules_file', path, 'the name of a YAML file of rules')
-    if not path:
-        raise ConfigError('~rules', rules, 'rules in the parameter ~rules, or a YAML file in ~rules_file')
+    if not checks.text('~rules_file', path):
+        raise SettingsError('~rules', rules,
+                          'rules in the parameter ~rules, or a YAML file in ~rules_file')
     try:
         with open(path_of(path), encoding='utf-8') as file:
             content = yaml.safe_load(file)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as err:
-        raise ConfigError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err
+        raise SettingsError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err
     return Rules.parse(content)
 
 
-def servers_of(value: Any) -> List[str]:
+def servers_of(value: object) -> List[str]:
     """Names of servers from a text, separated by spaces, or a list; none for all that there are.
 
-    :raises ConfigError: for anything else.
+    :raises SettingsError: for anything else.
     """
-    names = value.split() if isinstance(value, str) else value
-    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise ConfigError('~servers', value, 'names separated by spaces, a list of names, or ' + ALL_SERVERS)
+    names = list(checks.words('~servers', value.split() if isinstance(value, str) else value))
     return [] if names == [ALL_SERVERS] else names
 
 
 def main() -> None:
-    """Entry point of the node `scripted_expert`; parameters ~rules or ~rules_file, ~servers, ~expert."""
-    parameters_only('Node: an expert who answers by rules. Parameters: ~rules or ~rules_file, ~servers, ~expert; '
-                    'see doc/expert.md.')
+    """Entry point of the node `scripted_expert`.
+
+    Parameters: ~rules or ~rules_file, ~servers, ~expert.
+    """
+    parameters_only(
+        'Node: an expert who answers by rules. Parameters: ~rules or ~rules_file, ~servers, '
+        '~expert; '
+        'see doc/expert.md.')
     rospy.init_node('scripted_expert')
     start_master_watch()
     try:
         rules = load_rules(rospy.get_param('~rules', None), rospy.get_param('~rules_file', ''))
         servers = servers_of(rospy.get_param('~servers', ALL_SERVERS))
         name = name_of('~expert', rospy.get_name().strip('/'))
-    except ConfigError as err:
+    except SettingsError as err:
         rospy.logfatal('scripted_expert: %s', err)
         raise SystemExit(2) from err
     expert = ScriptedExpert(FrontEnd(name, servers), rules)

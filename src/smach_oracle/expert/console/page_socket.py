@@ -1,30 +1,31 @@
-"""The socket of one page: sections go out as they change, the newest version only; commands come in."""
+"""The socket of one page: sections go out as they change, commands come in."""
 import asyncio
 import itertools
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Callable, Optional, Set
+from typing import Callable, Optional, Set, Union
 
 import tornado.iostream
 import tornado.web
 import tornado.websocket
 
-from . import sessions
-from .access import Bucket, may
-from .audit import Person
-from .commands import BadCommand, Command, needed_role, parse
-from .desk import Desk, Reply
-from .hand_commands import HAND_COMMANDS
-from .hands import Hands
-from .handlers import Gate, Limits, guard
-from .sections import Sections
-from .trial_log import TrialLog
+from .answering.question_commands import QuestionCommands
+from .answering.teleoperation import Teleoperation
+from .commands.commands import Command, CommandError, CommandReply, needed_role, parse
+from .commands.driving import DRIVING_COMMANDS
+from .trials.trial_log import TrialLog
+from .web import sessions
+from .web.access import RateLimit, SocketRateLimits, may
+from .web.audit import Person
+from .web.handlers import access_of, set_security_headers
+from .web.sections import PageSections
 
 MOST_SOCKETS = 64
 MOST_OF_A_SESSION = 16  # tabs of one browser
 HELLO_LIMIT_S = 10.0
-LONGEST_UNSEEN_S = 60.0  # how old its session is, is looked at again: clocks are set, machines sleep
+# between checks of the age of its session: clocks are set, machines sleep
+LONGEST_UNSEEN_S = 60.0
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
@@ -34,43 +35,48 @@ SIGNED_OUT = 4001
 TOO_OLD = 4002  # the page asks for the token by itself, and keeps what the person was typing
 
 
-class Office:
-    """What all sockets share."""
+class OpenPages:
+    """What the sockets of all pages share."""
 
-    def __init__(self, sections: Sections, log: TrialLog, desk: Desk, hands: Hands) -> None:
+    def __init__(self, sections: PageSections, log: TrialLog, question_commands: QuestionCommands,
+                 teleoperation: Teleoperation) -> None:
         self.sections = sections
         self.log = log
-        self.desk = desk
-        self.hands = hands
-        self.open: Set['Socket'] = set()
-        self.sockets: Set['Socket'] = set()  # those that have said hello
+        self.question_commands = question_commands
+        self.teleoperation = teleoperation
+        self.open: Set['PageSocket'] = set()
+        self.sockets: Set['PageSocket'] = set()  # those that have said hello
         self.numbers = itertools.count(1)
         self.workers = ThreadPoolExecutor(8, 'command')
 
-    def close(self, session: sessions.Session) -> None:
-        """Close the pages of a session that has ended; what they hold is let go, a hand that they drive stands."""
+    def close(self, session: sessions.BrowserSession) -> None:
+        """Close the pages of a session that has ended.
+
+        Their claims are released, and an arm that they drive stops.
+        """
         for socket in list(self.open):
             if socket.session is not None and socket.session.id == session.id:
                 socket.close(SIGNED_OUT, 'signed out')
 
     def push(self) -> None:
-        """Let every page have what is new."""
+        """Send every page what is new."""
         for socket in list(self.sockets):
             socket.push()
 
 
-class Socket(tornado.websocket.WebSocketHandler):
+class PageSocket(tornado.websocket.WebSocketHandler):
     """One open page."""
 
-    def initialize(self, gate: Gate, office: Office) -> None:
+    def initialize(self, pages: OpenPages) -> None:
         """Called by Tornado."""
-        self._gate = gate
-        self._office = office
+        self._access = access_of(self)
+        self._pages = pages
         self._person: Optional[Person] = None
-        self.session: Optional[sessions.Session] = None
+        self.session: Optional[sessions.BrowserSession] = None
         self._name = ''
-        self._number = next(office.numbers)
-        self._limits = Limits(Bucket(10.0, 40.0), Bucket(70.0, 70.0), Bucket(0.5, 20.0))
+        self._number = next(pages.numbers)
+        self._limits = SocketRateLimits(RateLimit(10.0, 40.0), RateLimit(70.0, 70.0),
+                                        RateLimit(0.5, 20.0))
         self._sent_version = 0
         self._watched = ''
         self._watched_from = 0
@@ -79,19 +85,19 @@ class Socket(tornado.websocket.WebSocketHandler):
 
     def set_default_headers(self) -> None:
         """On every answer."""
-        guard(self)
+        set_security_headers(self)
 
-    def write_error(self, status_code: int, **_: Any) -> None:
-        """The status alone."""
+    def write_error(self, status_code: int, **_: object) -> None:
+        """Answer with the status alone."""
         self.finish('{} {}\n'.format(status_code, self._reason))
 
     def prepare(self) -> None:
-        """The gate, and who it is, before the handshake."""
-        status = self._gate.refusal(self)
-        if not status and not self._gate.from_own_page(self, must_say=True):
+        """Check host, rate, origin and session before the handshake."""
+        status = self._access.refusal(self)
+        if not status and not self._access.from_own_page(self, must_say=True):
             status = 403
-        self.session = self._gate.session(self)
-        if not status and self._gate.identity(self.session) is None:
+        self.session = self._access.session(self)
+        if not status and self._access.identity(self.session) is None:
             status = 401
         if not status and not self._has_room():
             status = 503
@@ -100,17 +106,20 @@ class Socket(tornado.websocket.WebSocketHandler):
 
     def _has_room(self) -> bool:
         session = self.session
-        own = [each for each in self._office.open if session and each.session and each.session.id == session.id]
-        return len(self._office.open) < MOST_SOCKETS and len(own) < MOST_OF_A_SESSION
+        own = [
+            each for each in self._pages.open
+            if session and each.session and each.session.id == session.id
+        ]
+        return len(self._pages.open) < MOST_SOCKETS and len(own) < MOST_OF_A_SESSION
 
     def check_origin(self, origin: str) -> bool:
         """Checked in `prepare` already."""
-        return self._gate.from_own_page(self, must_say=True)
+        return self._access.from_own_page(self, must_say=True)
 
     def open(self, *_: str, **__: str) -> None:
-        """Nothing is told before the page has said hello."""
+        """Begin; nothing is sent before the page has said hello."""
         self.set_nodelay(True)
-        self._office.open.add(self)
+        self._pages.open.add(self)
         asyncio.get_running_loop().call_later(HELLO_LIMIT_S, self._demand_hello)
         self._look_at_age()
 
@@ -119,9 +128,9 @@ class Socket(tornado.websocket.WebSocketHandler):
             self.close(FORGED, 'no hello')
 
     def _look_at_age(self) -> None:
-        if self._gone or self.session is None or self._gate.settings.tokens is None:
+        if self._gone or self.session is None or self._access.settings.tokens is None:
             return
-        if self._gate.identity(self.session) is None:
+        if self._access.identity(self.session) is None:
             self.close(TOO_OLD, 'sign in again')
             return
         pause_s = min(self.session.left_s, LONGEST_UNSEEN_S)
@@ -129,13 +138,13 @@ class Socket(tornado.websocket.WebSocketHandler):
 
     def on_close(self) -> None:
         """Claims run out unless the page comes back."""
-        self._office.open.discard(self)
-        self._office.sockets.discard(self)
-        self._office.desk.leave(self._number)
-        self._office.hands.leave(self._number)
+        self._pages.open.discard(self)
+        self._pages.sockets.discard(self)
+        self._pages.question_commands.leave(self._number)
+        self._pages.teleoperation.leave(self._number)
 
-    async def on_message(self, message: Any) -> None:
-        """One command; none of a page that has been told to go, and takes its time."""
+    async def on_message(self, message: Union[str, bytes]) -> None:
+        """Carry out one command; ignore those of a page that is being closed."""
         if self._gone:
             return
         if not self._bucket(message).take():
@@ -144,9 +153,9 @@ class Socket(tornado.websocket.WebSocketHandler):
             return
         try:
             command = parse(message)
-        except BadCommand as err:
-            self._note(None, Reply(False, str(err)))
-            self._reply(err.number, Reply(False, str(err)))
+        except CommandError as err:
+            self._note(None, CommandReply(False, str(err)))
+            self._reply(err.number, CommandReply(False, str(err)))
             return
         reply = await self._carry_out(command)
         if command.name != 'drive' or not reply.ok:
@@ -156,82 +165,97 @@ class Socket(tornado.websocket.WebSocketHandler):
     def _gone(self) -> bool:
         return self.ws_connection is None or self.ws_connection.is_closing()
 
-    def _bucket(self, message: Any) -> Bucket:
-        driving = isinstance(message, str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
-        return self._limits.driving if driving and self._office.hands.drives(self._number) else self._limits.commands
+    def _bucket(self, message: Union[str, bytes]) -> RateLimit:
+        driving = isinstance(message,
+                             str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
+        return self._limits.driving if driving and self._pages.teleoperation.drives(
+            self._number) else self._limits.commands
 
-    async def _carry_out(self, command: Command) -> Reply:
+    async def _carry_out(self, command: Command) -> CommandReply:
         if command.name == 'hello':
             return self._hello(command)
         if self._person is None:
-            return Reply(False, 'say hello first')
+            return CommandReply(False, 'say hello first')
         if not may(self._person.role, needed_role(command.name)):
-            return self._note(command, Reply(False, 'a {} may not {}'.format(
-                self._person.role, command.name.replace('_', ' '))))
+            return self._note(command, CommandReply(False, '{}s may not {} (sign in as {})'.format(
+                self._person.role, command.name.replace('_', ' '), needed_role(command.name))))
         if command.name == 'watch':
             self._watched, self._watched_from = command.arguments['trial'], 0
-            return self._note(command, Reply(True))
+            return self._note(command, CommandReply(True))
         if command.name == 'drive':
-            return self._office.hands.drive(command, self._number)
+            return self._pages.teleoperation.drive(command, self._number)
         if self._at_work >= MOST_AT_WORK:
-            return self._note(command, Reply(False, 'too many commands at a time'))
+            return self._note(command, CommandReply(False, 'too many commands at a time'))
         return await self._work(self._person, command)
 
-    async def _work(self, person: Person, command: Command) -> Reply:
+    async def _work(self, person: Person, command: Command) -> CommandReply:
         self._at_work += 1
         try:
             loop = asyncio.get_running_loop()
-            carry_out = (self._office.hands if command.name in HAND_COMMANDS else self._office.desk).carry_out
-            return await loop.run_in_executor(self._office.workers, carry_out, command, person, self._number)
+            carry_out = (self._pages.teleoperation.carry_out if command.name in DRIVING_COMMANDS
+                         else self._pages.question_commands.carry_out)
+            return await loop.run_in_executor(self._pages.workers, carry_out, command, person,
+                                              self._number)
         finally:
             self._at_work -= 1
             if self._gone:  # while the robot was asked
-                self._office.desk.leave(self._number)
-                self._office.hands.leave(self._number)
+                self._pages.question_commands.leave(self._number)
+                self._pages.teleoperation.leave(self._number)
 
-    def _hello(self, command: Command) -> Reply:
-        session, identity = self.session, self._gate.identity(self.session)
+    def _hello(self, command: Command) -> CommandReply:
+        session, identity = self.session, self._access.identity(self.session)
         if session is None or identity is None or not sessions.same(
-                command.arguments['xsrf'], sessions.xsrf_token(session, self._gate.secret)):
-            self._note(None, Reply(False, 'forged'))
+                command.arguments['xsrf'], sessions.xsrf_token(session, self._access.secret)):
+            self._note(None, CommandReply(False, 'forged'))
             self.close(FORGED, 'forged')
-            return Reply(False, 'forged')
+            return CommandReply(False, 'forged')
         name = identity.name or command.arguments['expert'] or 'operator'
         self._person = Person(self.request.remote_ip or '', session.short, identity.role, name)
-        self._office.sockets.add(self)
-        self._note(command, Reply(True))
-        return Reply(True, name)
+        self._pages.sockets.add(self)
+        self._note(command, CommandReply(True))
+        return CommandReply(True, name)
 
-    def _note(self, command: Optional[Command], reply: Reply) -> Reply:
-        """Tell the audit of what the desk has not seen."""
+    def _note(self, command: Optional[Command], reply: CommandReply) -> CommandReply:
+        """Record in the audit a command that went no further than this socket."""
         session = self.session.short if self.session else ''
         person = self._person or Person(self.request.remote_ip or '', session, '', '')
-        arguments = {name: value for name, value in command.arguments.items() if name != 'xsrf'} if command else {}
-        self._gate.audit.tell(person, command.name if command else 'unknown', reply.ok, reply.message, arguments)
+        arguments = {name: value
+                     for name, value in command.arguments.items()
+                     if name != 'xsrf'} if command else {}
+        self._access.audit.record(person, command.name if command else 'unknown', reply.ok,
+                              reply.message, arguments)
         return reply
 
-    def _reply(self, number: int, reply: Reply) -> None:
-        told = {'re': number, 'ok': reply.ok, 'message': reply.message}
-        self._send(json.dumps(told if reply.data is None else dict(told, data=reply.data), allow_nan=False))
+    def _reply(self, number: int, reply: CommandReply) -> None:
+        answer = {'re': number, 'ok': reply.ok, 'message': reply.message}
+        self._send(
+            json.dumps(answer if reply.data is None else dict(answer, data=reply.data),
+                       allow_nan=False))
 
     def push(self) -> None:
-        """Send what has changed, unless the last batch is still on its way: a slow link never builds up lag."""
+        """Send what has changed, unless the last batch is still on its way.
+
+        A slow link thus never builds up lag.
+        """
         if self._writing or self._person is None:
             return
-        version, changed = self._office.sections.since(self._sent_version)
-        events = self._office.log.events(self._watched, self._watched_from) if self._watched else None
+        version, changed = self._pages.sections.since(self._sent_version)
+        events = self._pages.log.events(self._watched,
+                                         self._watched_from) if self._watched else None
         new = events.events[:MOST_EVENTS_AT_ONCE] if events else []
         if not changed and not new:
             return
         parts = ['"now":{:.3f}'.format(time.time())]
         if changed:
             if not self._sent_version:
-                parts.append('"all":true')  # of an earlier connection the page may know some that are gone
+                # of an earlier connection the page may know sections that are gone
+                parts.append('"all":true')
             parts.append('"sections":{%s}' % ','.join('{}:{}'.format(json.dumps(name), text)
                                                       for name, text in changed))
         if new:
-            parts.append('"events":{}'.format(json.dumps(
-                {'trial': self._watched, 'from': self._watched_from, 'events': new}, allow_nan=False)))
+            parts.append('"events":{}'.format(
+                json.dumps({'trial': self._watched, 'from': self._watched_from, 'events': new},
+                           allow_nan=False)))
         self._sent_version = version
         self._watched_from += len(new)
         self._writing = True

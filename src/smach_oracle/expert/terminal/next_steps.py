@@ -5,11 +5,12 @@ from typing import Iterator
 
 from smach_oracle.msg import OracleEvent
 
-from .listening import RobotListener
+from ..robot_topics import RobotTopic
 
-_TOLD = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP, OracleEvent.INTERFACE_START,
-         OracleEvent.WARNING, OracleEvent.STATE_START, OracleEvent.TRIAL_END)
-_LAST = (OracleEvent.STATE_START, OracleEvent.TRIAL_END, OracleEvent.INTERFACE_START)
+_SHOWN_KINDS = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
+                OracleEvent.INTERFACE_START, OracleEvent.WARNING, OracleEvent.STATE_START,
+                OracleEvent.TRIAL_END)
+_LAST_KINDS = (OracleEvent.STATE_START, OracleEvent.TRIAL_END, OracleEvent.INTERFACE_START)
 
 
 class NextSteps:
@@ -19,7 +20,7 @@ class NextSteps:
         """`robot`: the node's name; its events are on <robot>/oracle/events."""
         self._trial_id = trial_id
         self._events: 'queue.Queue[OracleEvent]' = queue.Queue(1000)
-        self._listener = RobotListener(robot, '/oracle/events', OracleEvent, self._take)
+        self._listener = RobotTopic(robot, '/oracle/events', OracleEvent, self._take)
 
     def follow(self, timeout_s: float = 3.0) -> Iterator[OracleEvent]:
         """The events from the answer to the next state that runs, at most for the time given."""
@@ -30,7 +31,7 @@ class NextSteps:
             except queue.Empty:
                 return
             yield event
-            if event.kind in _LAST:
+            if event.kind in _LAST_KINDS:
                 return
 
     def forget(self) -> None:
@@ -43,5 +44,6 @@ class NextSteps:
         self._listener.stop()
 
     def _take(self, event: OracleEvent) -> None:
-        if event.trial_id == self._trial_id and event.kind in _TOLD and not self._events.full():
+        ours = event.trial_id == self._trial_id and event.kind in _SHOWN_KINDS
+        if ours and not self._events.full():
             self._events.put(event)

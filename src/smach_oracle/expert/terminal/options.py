@@ -2,12 +2,11 @@
 from typing import List, NamedTuple
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal
+from smach_oracle.oracle.asking.question import names
+from smach_oracle.oracle.errors import AnswerError
 
-from ..oracle.errors import AnswerError
-from ..oracle.question import names
 
-
-class Option(NamedTuple):
+class AnswerOption(NamedTuple):
     """One possible answer."""
 
     key: str  # 1, 2, ...: go to; s1, ...: supersede; g, g1, ...: give up; i1, ...: interface
@@ -18,31 +17,43 @@ class Option(NamedTuple):
 
     def decision(self) -> ExpertDecision:
         """A decision without outputs or reason."""
-        field = {ExpertDecision.GOTO: 'state', ExpertDecision.INTERFACE: 'interface'}.get(self.kind, 'outcome')
+        field = {ExpertDecision.GOTO: 'state',
+                 ExpertDecision.INTERFACE: 'interface'}.get(self.kind, 'outcome')
         return ExpertDecision(kind=self.kind, **{field: self.name})
 
 
-def options(goal: ExpertQueryGoal) -> List[Option]:
+def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
     """All possible answers, in the order in which they are shown."""
-    found = [Option(str(number), 'goto ' + choice.state, ExpertDecision.GOTO, choice.state, choice.blocked)
-             for number, choice in enumerate(goal.choices, 1)]
+    found = [
+        AnswerOption(str(number), 'goto ' + choice.state, ExpertDecision.GOTO, choice.state,
+               choice.blocked) for number, choice in enumerate(goal.choices, 1)
+    ]
     states = {choice.state for choice in goal.choices}
     # first those with which the machine goes on: s1 is then seldom the failure itself
     outcomes = sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)
-    found += [Option('s{}'.format(number), 'supersede ' + choice.outcome, ExpertDecision.SUPERSEDE, choice.outcome)
-              for number, choice in enumerate(outcomes, 1)]
-    found.append(Option('g', 'give_up', ExpertDecision.GIVE_UP, ''))
-    found += [Option('g{}'.format(number), 'give_up ' + outcome, ExpertDecision.GIVE_UP, outcome)
-              for number, outcome in enumerate(goal.give_up_outcomes, 1)]
-    found += [Option('i{}'.format(number), 'interface ' + offer.name, ExpertDecision.INTERFACE, offer.name)
-              for number, offer in enumerate(goal.interfaces, 1)]
+    found += [
+        AnswerOption('s{}'.format(number), 'supersede ' + choice.outcome, ExpertDecision.SUPERSEDE,
+               choice.outcome) for number, choice in enumerate(outcomes, 1)
+    ]
+    found.append(AnswerOption('g', 'give_up', ExpertDecision.GIVE_UP, ''))
+    found += [
+        AnswerOption('g{}'.format(number), 'give_up ' + outcome, ExpertDecision.GIVE_UP, outcome)
+        for number, outcome in enumerate(goal.give_up_outcomes, 1)
+    ]
+    found += [
+        AnswerOption('i{}'.format(number), 'interface ' + offer.name, ExpertDecision.INTERFACE,
+               offer.name) for number, offer in enumerate(goal.interfaces, 1)
+    ]
     return found
 
 
-def choose(text: str, available: List[Option]) -> Option:
-    """The option that was typed: its key, its words, a name that only one has, or `s`, `i` where there is one of them.
+def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
+    """The option that was typed.
 
-    :raises AnswerError: where there is none, several, or it is blocked; the text says what is allowed.
+    By its key, its words, a name that only one has, or `s`, `i` where there is one of them.
+
+    :raises AnswerError: where there is none, several, or it is blocked; the text says what is
+        allowed.
     """
     typed = ' '.join(text.split())
     matching = _matching(typed, available)
@@ -53,11 +64,12 @@ def choose(text: str, available: List[Option]) -> Option:
         raise AnswerError('{!r} could mean {}'.format(
             typed, names(['{} ({})'.format(option.words, option.key) for option in matching])))
     if matching[0].blocked:
-        raise AnswerError('{} cannot be entered now: {}'.format(matching[0].name, matching[0].blocked))
+        raise AnswerError('{} cannot be entered now: {}'.format(matching[0].name,
+                                                                matching[0].blocked))
     return matching[0]
 
 
-def _matching(typed: str, available: List[Option]) -> List[Option]:
+def _matching(typed: str, available: List[AnswerOption]) -> List[AnswerOption]:
     for fits in (lambda option: option.key == typed.lower(), lambda option: option.words == typed,
                  lambda option: typed != '' and option.name == typed,
                  lambda option: typed.lower() in ('s', 'i') and option.key[0] == typed.lower()):

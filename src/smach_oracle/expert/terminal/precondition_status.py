@@ -1,11 +1,12 @@
-"""How the preconditions of a question's choices stand now, as its robot tells it, in words."""
+"""The precondition status of a question's choices, as its robot publishes it, in words."""
 import time
 from typing import List, Optional, Tuple
 
 from smach_oracle.msg import PreconditionCheck, PreconditionChecks
 
-from .listening import RobotListener
-from .text import clean, duration
+from ..robot_topics import RobotTopic
+from ..wording import clean
+from .text import duration
 
 _WORDS = {PreconditionCheck.HOLDS: ('✓', 'holds', 'green'),
           PreconditionCheck.DOES_NOT_HOLD: ('✗', 'does not hold', 'bold red')}
@@ -13,15 +14,16 @@ _UNKNOWN = ('?', 'unknown', 'yellow')
 Line = Tuple[str, str]  # text, style
 
 
-class StandingPreconditions:
+class PreconditionStatusListener:
     """Listens for as long as the question is looked at: the robot looks while somebody listens."""
 
     def __init__(self, robot: str, query_id: str) -> None:
-        """`robot`: the node's name; it tells on <robot>/oracle/preconditions."""
+        """`robot`: the node's name; it publishes <robot>/oracle/preconditions."""
         self._query_id = query_id
         self._newest: Optional[PreconditionChecks] = None
         self._heard_s = 0.0
-        self._listener = RobotListener(robot, '/oracle/preconditions', PreconditionChecks, self.take)
+        self._listener = RobotTopic(robot, '/oracle/preconditions', PreconditionChecks,
+                                       self.take)
 
     def take(self, message: PreconditionChecks) -> None:
         """The robot has looked."""
@@ -29,7 +31,7 @@ class StandingPreconditions:
             self._heard_s, self._newest = time.monotonic(), message
 
     def lines(self) -> List[Line]:
-        """One for each precondition; none where the robot tells nothing, or there are none."""
+        """One for each precondition; none where the robot publishes nothing, or there are none."""
         newest, since_s = self._newest, time.monotonic() - self._heard_s
         return [_line(check, since_s) for check in newest.checks] if newest is not None else []
 
@@ -42,4 +44,5 @@ def _line(check: PreconditionCheck, since_s: float) -> Line:
     sign, word, style = _WORDS.get(check.result, _UNKNOWN)
     age = ' ({} ago)'.format(duration(check.age + since_s)) if check.age >= 0 else ''
     why = ': ' + clean(check.text) if check.text and check.result != PreconditionCheck.HOLDS else ''
-    return '  {} {} of {} {}{}{}'.format(sign, clean(check.name), clean(check.state), word, age, why), style
+    return '  {} {} of {} {}{}{}'.format(sign, clean(check.name), clean(check.state), word, age,
+                                         why), style

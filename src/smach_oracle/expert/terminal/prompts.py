@@ -1,4 +1,7 @@
-"""Lines typed by an expert, while the world goes on: a prompt that ends when what it asks about is over."""
+"""Prompts for lines that an expert types.
+
+A prompt ends when the thing that it asks about is over.
+"""
 import asyncio
 import json
 from typing import Callable, List, Optional, Sequence, Tuple
@@ -11,37 +14,39 @@ from prompt_toolkit.output import Output
 from prompt_toolkit.styles import Style
 from prompt_toolkit.validation import ValidationError, Validator
 
-from .text import clean
+from ..wording import clean
 
 Choice = Tuple[str, str]  # what is typed, what it means
+Reason = Callable[[], Optional[str]]  # None as long as there is no reason
 _LOOK_PERIOD_S = 0.2
 _STYLE = Style.from_dict({'bottom-toolbar': 'noreverse bg:#303030 #e0e0e0', 'prompt': 'bold'})
 
 
-class Leave(Exception):
+class LeaveQuestion(Exception):
     """The expert is done with this question."""
 
 
-class Quit(Exception):
+class QuitTerminal(Exception):
     """The expert is done for today."""
 
 
-class Interrupted(Exception):
-    """The prompt ended because what it asked about is over; the text says why."""
+class PromptInterrupted(Exception):
+    """The prompt ended because what it asked about is over; the text gives the reason."""
 
 
 class Prompts:
-    """Asks for lines; `toolbar` says what is shown below them, `look` why to stop asking."""
+    """Asks for lines: `toolbar` gives the text below them, `why_to_stop` a reason to end."""
 
-    def __init__(self, terminal_input: Optional[Input] = None, terminal_output: Optional[Output] = None) -> None:
+    def __init__(self, terminal_input: Optional[Input] = None,
+                 terminal_output: Optional[Output] = None) -> None:
         self._input = terminal_input
         self._output = terminal_output
 
-    def ask(self, message: str, toolbar: Callable[[], str], look: Callable[[], Optional[str]],
+    def ask(self, message: str, toolbar: Callable[[], str], why_to_stop: Reason,
             choices: Sequence[Choice] = (), validator: Optional[Validator] = None) -> str:
         """One line, stripped.
 
-        :raises Interrupted: as soon as `look` gives a reason.
+        :raises PromptInterrupted: as soon as `why_to_stop` gives a reason.
         :raises KeyboardInterrupt: on Ctrl-C.
         :raises EOFError: on Ctrl-D.
         """
@@ -49,21 +54,22 @@ class Prompts:
         session: 'PromptSession[str]' = PromptSession(
             input=self._input, output=self._output, style=_STYLE, refresh_interval=0.5)
         return session.prompt(
-            [('class:prompt', message)], bottom_toolbar=lambda: [('class:bottom-toolbar', ' ' + clean(toolbar()))],
+            [('class:prompt', message)],
+            bottom_toolbar=lambda: [('class:bottom-toolbar', ' ' + clean(toolbar()))],
             completer=_Choices(choices), complete_while_typing=bool(choices), validator=validator,
             validate_while_typing=False, reserve_space_for_menu=6 if choices else 0,
-            pre_run=lambda: _watch(session, look)).strip()
+            pre_run=lambda: _watch(session, why_to_stop)).strip()
 
 
-def _watch(session: 'PromptSession[str]', look: Callable[[], Optional[str]]) -> None:
-    """End the prompt as soon as `look`, which may take its time, gives a reason."""
+def _watch(session: 'PromptSession[str]', why_to_stop: Reason) -> None:
+    """End the prompt as soon as `why_to_stop`, which may take its time, gives a reason."""
     app = session.app
 
     async def watch() -> None:
         while True:
-            reason = await asyncio.get_running_loop().run_in_executor(None, look)
+            reason = await asyncio.get_running_loop().run_in_executor(None, why_to_stop)
             if reason is not None:
-                app.exit(exception=Interrupted(reason))
+                app.exit(exception=PromptInterrupted(reason))
                 return
             await asyncio.sleep(_LOOK_PERIOD_S)
 
@@ -82,7 +88,8 @@ class JsonValidator(Validator):
             json.loads(text, parse_constant=_refuse)
         except ValueError as err:
             position = getattr(err, 'pos', len(text))
-            raise ValidationError(position, 'not JSON: {}; strings need "quotes"'.format(err)) from err
+            raise ValidationError(position,
+                                  'not JSON: {}; strings need "quotes"'.format(err)) from err
 
 
 class _Choices(Completer):
@@ -91,11 +98,15 @@ class _Choices(Completer):
     def __init__(self, choices: Sequence[Choice]) -> None:
         self._choices: List[Choice] = list(choices)
 
-    def get_completions(self, document: Document, complete_event: CompleteEvent) -> List[Completion]:
-        """All choices whose key or whose meaning begins with what was typed, or has a word that does."""
+    def get_completions(self, document: Document,
+                        complete_event: CompleteEvent) -> List[Completion]:
+        """All choices that fit: by the beginning of the key, or of a word of the meaning."""
         typed = document.text_before_cursor.lstrip().lower()
-        return [Completion(key, -len(document.text_before_cursor), display=clean(key), display_meta=clean(meaning))
-                for key, meaning in self._choices if _fits(typed, key, meaning)]
+        return [
+            Completion(key, -len(document.text_before_cursor), display=clean(key),
+                       display_meta=clean(meaning)) for key, meaning in self._choices
+            if _fits(typed, key, meaning)
+        ]
 
 
 def _fits(typed: str, key: str, meaning: str) -> bool:

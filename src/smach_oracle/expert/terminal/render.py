@@ -1,4 +1,4 @@
-"""Questions as rich renderables. Pure: what goes in is the message, what comes out can be rendered to any width.
+"""Questions as rich renderables, from their messages. Pure.
 
 Everything that a robot has sent goes through `clean` into Text objects, never through markup.
 """
@@ -11,11 +11,18 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from smach_oracle.msg import ExpertQueryGoal, OpenQuery, OracleEvent, StateChoice, UserdataItem, VisitedState
+from smach_oracle.msg import (
+    ExpertQueryGoal,
+    OpenQuery,
+    StateChoice,
+    UserdataItem,
+    VisitedState,
+)
 
-from .followed_server import Listed
-from .options import Option, options
-from .text import CLASS_NAMES, clean, duration, rate_bar, rate_colour
+from ..followed_server import ListedQuestion
+from ..wording import clean, failure_words
+from .options import AnswerOption, options
+from .text import CLASS_NAMES, duration, rate_bar, rate_colour
 
 _VISITS = {VisitedState.SUCCESS: ('✓', '#2e9e3f'), VisitedState.FAILURE: ('✗', '#cc3333'),
            VisitedState.SUPERSEDED: ('☞', '#3b7dd8'), VisitedState.PREEMPTED: ('⏹', 'dim')}
@@ -41,7 +48,7 @@ def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
     return Group(*parts)
 
 
-def overview(listed: Sequence[Listed], now_s: float) -> Table:
+def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
     """The open questions of all servers, numbered from 1."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=True)
     table.add_column('', style='bold cyan', no_wrap=True)
@@ -67,53 +74,33 @@ def history(visits: Sequence[VisitedState]) -> Text:
     return text
 
 
-def what_failed(goal: ExpertQueryGoal) -> str:
-    """How the state failed, in words."""
-    outcome = clean(goal.outcome)
-    return {
-        OracleEvent.FAILING_OUTCOME: 'ended with the failing outcome {}'.format(outcome),
-        OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(outcome, clean(goal.container_path)),
-        OracleEvent.EXCEPTION: 'raised an exception',
-        OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is no outcome of it'.format(outcome or 'nothing'),
-        OracleEvent.TIME_LIMIT: 'ran over its time limit',
-    }.get(goal.failure_kind, 'failed')
-
-
-def what_happened(event: OracleEvent) -> str:
-    """An event after an answer, in words; '' for kinds that say nothing new."""
-    state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
-    return {
-        OracleEvent.JUMP: 'The machine goes to {}.'.format(target),
-        OracleEvent.SUPERSEDE: '{} counts as having ended with {}.'.format(state, outcome),
-        OracleEvent.GIVE_UP: '{} gives up{}.'.format(clean(event.path), ' with ' + outcome if outcome else ''),
-        OracleEvent.INTERFACE_START: 'Interface {} begins.'.format(target),
-        OracleEvent.INTERFACE_END: 'Interface {} ended{}.'.format(target, ' with ' + outcome if outcome else ''),
-        OracleEvent.STATE_START: '{} runs.'.format(state),
-        OracleEvent.WARNING: 'The robot warns: {}'.format(clean(event.text)),
-        OracleEvent.TRIAL_END: 'The trial ended{}.'.format(' with ' + outcome if outcome else ''),
-    }.get(event.kind, '')
-
-
 def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
-    lines: List[RenderableType] = [Text.assemble((clean(goal.failed_state), 'bold'), ' ' + what_failed(goal))]
+    lines: List[RenderableType] = [
+        Text.assemble((clean(goal.failed_state), 'bold'), ' ' + failure_words(goal))
+    ]
     if goal.text:
         lines.append(Text(_last_lines(goal.text), 'italic'))
-    facts = Text.assemble('failure rate ', rate_bar(goal.rate), ' ',
-                          (CLASS_NAMES.get(goal.failure_class, '?'), 'bold ' + rate_colour(goal.rate)))
+    facts = Text.assemble(
+        'failure rate ', rate_bar(goal.rate), ' ',
+        (CLASS_NAMES.get(goal.failure_class, '?'), 'bold ' + rate_colour(goal.rate)))
     if goal.continuous:
         facts.append(' · continuous', 'bold')
-    facts.append(' · {} {} so far'.format(goal.recoveries, 'recovery' if goal.recoveries == 1 else 'recoveries'))
+    facts.append(' · {} {} so far'.format(goal.recoveries,
+                                          'recovery' if goal.recoveries == 1 else 'recoveries'))
     lines += [facts, Text('asked because ' + clean(goal.reason))]
     if goal.tried:
         lines.append(Text('tried: ' + ', '.join(clean(step) for step in goal.tried)))
     if goal.deadline > 0:
-        lines.append(Text('unanswered: {}'.format(clean(goal.fallback) or 'the fallback happens'), 'dim'))
-    title = Text.assemble((clean(goal.robot), 'bold'), ' asks about ', (clean(goal.container_path), 'bold'))
-    return Panel(Group(*lines), title=title, title_align='left', border_style=rate_colour(goal.rate), padding=(0, 1),
+        lines.append(
+            Text('unanswered: {}'.format(clean(goal.fallback) or 'the fallback happens'), 'dim'))
+    title = Text.assemble((clean(goal.robot), 'bold'), ' asks about ',
+                          (clean(goal.container_path), 'bold'))
+    return Panel(Group(*lines), title=title, title_align='left',
+                 border_style=rate_colour(goal.rate), padding=(0, 1),
                  subtitle=Text('asked {} ago'.format(duration(age_s))), subtitle_align='right')
 
 
-def _states(goal: ExpertQueryGoal, found: Iterable[Option]) -> Table:
+def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     keys = {option.name: option.key for option in found if option.words.startswith('goto ')}
     table = _table('', 'state', 'success', 'class', 'visits', 'on arrival')
     for choice in goal.choices:
@@ -139,32 +126,36 @@ def _arrival(choice: StateChoice) -> Text:
     return Text('\n').join(parts)
 
 
-def _supersede(goal: ExpertQueryGoal, found: Iterable[Option]) -> RenderableType:
+def _supersede(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> RenderableType:
     table = _table('', 'outcome', 'leads to')
     targets = {choice.outcome: choice.target for choice in goal.supersede_outcomes}
     for option in found:
         if option.words.startswith('supersede '):
-            table.add_row(option.key, Text(clean(option.name), 'bold'), Text('→ ' + clean(targets[option.name])))
+            table.add_row(option.key, Text(clean(option.name), 'bold'),
+                          Text('→ ' + clean(targets[option.name])))
     if not goal.output_keys:
         return table
     return Group(table, Text('with output userdata: ' + _list(goal.output_keys), 'dim'))
 
 
-def _give_up(goal: ExpertQueryGoal, found: Iterable[Option]) -> Table:
+def _give_up(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     table = _table('', 'outcome', header=False)
     for option in found:
         if option.words.split()[0] == 'give_up':
-            table.add_row(option.key, Text(clean(option.name), 'bold') if option.name
-                          else Text('end as the failure would have ended {}'.format(clean(goal.container_path))))
+            table.add_row(
+                option.key,
+                Text(clean(option.name), 'bold') if option.name else Text(
+                    'end as the failure would have ended {}'.format(clean(goal.container_path))))
     return table
 
 
-def _interfaces(goal: ExpertQueryGoal, found: Iterable[Option]) -> Table:
+def _interfaces(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     table = _table('', 'name', 'description', header=False)
     described = {offer.name: offer.description for offer in goal.interfaces}
     for option in found:
         if option.words.startswith('interface '):
-            table.add_row(option.key, Text(clean(option.name), 'bold'), Text(clean(described[option.name])))
+            table.add_row(option.key, Text(clean(option.name), 'bold'),
+                          Text(clean(described[option.name])))
     return table
 
 
@@ -181,25 +172,29 @@ def _value(item: UserdataItem) -> Text:
         return Text(text if len(text) <= 200 else text[:199] + '…')
     if item.encoding == UserdataItem.UNSENT:
         return Text('({}, not sent)'.format(clean(item.type)), 'dim')
-    return Text('({}{})'.format(clean(item.type), '[]' if item.encoding == UserdataItem.ROS_MESSAGES else ''), 'dim')
+    return Text(
+        '({}{})'.format(clean(item.type),
+                        '[]' if item.encoding == UserdataItem.ROS_MESSAGES else ''), 'dim')
 
 
 def _place(goal: ExpertQueryGoal) -> Text:
-    return Text.assemble((clean(goal.container_path) + '/', 'dim'), (clean(goal.failed_state), 'bold'))
+    return Text.assemble((clean(goal.container_path) + '/', 'dim'),
+                         (clean(goal.failed_state), 'bold'))
 
 
-def _who(each: Listed) -> str:
+def _who(each: ListedQuestion) -> str:
     if each.status == OpenQuery.INTERFACE_RUNNING:
         return 'interface ' + clean(each.goal.interface)
     return clean(each.holder)
 
 
 def _table(*titles: str, header: bool = True) -> Table:
-    table = Table(box=None, pad_edge=False, show_header=header, header_style='dim', padding=(0, 2, 0, 0))
+    table = Table(box=None, pad_edge=False, show_header=header, header_style='dim',
+                  padding=(0, 2, 0, 0))
     for index, title in enumerate(titles):
         key = index == 0 and not title
-        table.add_column(title, style='bold cyan' if key else '', no_wrap=key, min_width=2 if key else None,
-                         overflow='fold')
+        table.add_column(title, style='bold cyan' if key else '', no_wrap=key,
+                         min_width=2 if key else None, overflow='fold')
     return table
 
 
@@ -212,6 +207,6 @@ def _list(items: Iterable[str]) -> str:
 
 
 def _last_lines(text: str) -> str:
-    """The end of a long text: of a traceback that is the part that says something."""
+    """The end of a long text, which is the useful part of a traceback."""
     lines = clean(text.strip(), lines=True).split('\n')
     return '\n'.join(lines if len(lines) <= _SHOWN_LINES else ['…'] + lines[-_SHOWN_LINES:])

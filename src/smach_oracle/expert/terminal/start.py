@@ -12,17 +12,22 @@ from rich.text import Text
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(prog='expert_terminal', description='Answers the questions of robots.')
-    parser.add_argument('--server', action='append', default=[], metavar='NAME',
-                        help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
-                             '(default: all that the master knows)')
+    parser = argparse.ArgumentParser(prog='expert_terminal',
+                                     description='Answers the questions of robots.')
+    parser.add_argument(
+        '--server', action='append', default=[], metavar='NAME',
+        help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
+        '(default: all that the master knows)')
     parser.add_argument('--name', default='{}@{}'.format(_user(), socket.gethostname()),
                         help='your name, as robots and other experts see it (default: %(default)s)')
     return parser.parse_args(arguments)
 
 
 def _user() -> str:
-    """The user's name; a number that nobody has given one to, as in a container, is an operator's."""
+    """The user's name, or 'operator'.
+
+    A number may have no name, as in a container.
+    """
     try:
         return getpass.getuser()
     except (KeyError, OSError):  # Python 3.13 raises the second
@@ -32,6 +37,8 @@ def _user() -> str:
 def wait_for_master(console: Console) -> None:
     """rospy would wait without a word."""
     if not rosgraph.is_master_online():
-        console.print(Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()), 'yellow'))
+        console.print(
+            Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()),
+                 'yellow'))
     while not rosgraph.is_master_online():
         time.sleep(0.5)

@@ -10,25 +10,28 @@ from rich.console import Console
 from rich.text import Text
 
 from smach_oracle.msg import ExpertDecision, OpenQuery
+from smach_oracle.oracle.errors import AnswerError
+from smach_oracle.ros.master_watch import start_master_watch
+from smach_oracle.ros.service_calls import ServerGoneError
+from smach_oracle.ros.userdata_codec import encode
 
-from ..oracle.errors import AnswerError
-from ..ros.master_watch import start_master_watch
-from ..ros.userdata_codec import encode
+from ..followed_server import ListedQuestion
+from ..front_end import FrontEnd, wait_for_question
+from ..wording import clean, next_step_words
 from . import render
-from .followed_server import Listed, ServerGoneError
-from .front_end import FrontEnd, wait_for_question
-from .interface_talk import InterfaceTalk
+from .interface_dialog import InterfaceDialog
 from .next_steps import NextSteps
-from .options import Option, choose, options
-from .prompts import Choice, Interrupted, JsonValidator, Leave, Prompts, Quit
+from .options import AnswerOption, choose, options
+from .precondition_status import PreconditionStatusListener
+from .prompts import Choice, JsonValidator, LeaveQuestion, PromptInterrupted, Prompts, QuitTerminal
 from .running_interface import RunningInterface
-from .standing import StandingPreconditions
-from .terminal_start import parse, wait_for_master
-from .text import clean, duration
+from .start import parse, wait_for_master
+from .text import duration
 
-_COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'), ('t', 'take it over from who holds it'),
-                           ('p', 'show how the preconditions stand now'), ('r', 'show the question again'),
-                           ('q', 'quit')]
+_COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'),
+                           ('t', 'take it over from who holds it'),
+                           ('p', 'show how the preconditions stand now'),
+                           ('r', 'show the question again'), ('q', 'quit')]
 _FIRST_LIST_S = 1.0
 _RETURN_S = 20.0  # how long a server may take to come back, and its robots to ask it again
 
@@ -38,17 +41,19 @@ class Terminal:
 
     def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
                  next_steps: Callable[[str, str], NextSteps] = NextSteps,
-                 interface: Callable[[Listed, str], RunningInterface] = RunningInterface,
-                 standing: Callable[[str, str], StandingPreconditions] = StandingPreconditions) -> None:
+                 interface: Callable[[ListedQuestion, str], RunningInterface] = RunningInterface,
+                 preconditions: Callable[[str, str],
+                                         PreconditionStatusListener] = PreconditionStatusListener
+                 ) -> None:
         self._next_steps = next_steps
         self._interface = interface
-        self._standing = standing
-        self._stands: Optional[StandingPreconditions] = None
+        self._listen_to_preconditions = preconditions
+        self._preconditions: Optional[PreconditionStatusListener] = None
         self._front_end = front_end
         self._console = console
         self._prompts = prompts
-        self._left: Set[str] = set()  # questions that the expert has left to others
-        self._mine = False
+        self._left_to_others: Set[str] = set()  # questions that the expert has left to others
+        self._claimed = False
         self._missing_since_s = math.inf
 
     def run(self) -> None:
@@ -57,16 +62,19 @@ class Terminal:
             wait_for_question(self._front_end, _FIRST_LIST_S)  # the first lists are on their way
             while not rospy.is_shutdown():
                 self._work_on(self._pick())
-        except (Quit, KeyboardInterrupt, EOFError):
+        except (QuitTerminal, KeyboardInterrupt, EOFError):
             self._say('Claims are given back. Good-bye.', 'dim')
         finally:
             self._front_end.stop()
 
-    def _pick(self) -> Listed:
+    def _pick(self) -> ListedQuestion:
         """The question to work on: the only new one, else the one whose number is typed."""
         while True:
             waiting = self._waiting()
-            fresh = [each for each in waiting if each.key not in self._left and each.status == OpenQuery.PENDING]
+            fresh = [
+                each for each in waiting
+                if each.key not in self._left_to_others and each.status == OpenQuery.PENDING
+            ]
             if len(waiting) == 1 and fresh:
                 return fresh[0]
             try:
@@ -74,7 +82,7 @@ class Terminal:
                     self._wait_for_questions()
                     continue
                 picked = self._pick_from(waiting)
-            except Interrupted:
+            except PromptInterrupted:
                 continue  # the list has changed: show it anew
             if picked is not None:
                 return picked
@@ -82,10 +90,11 @@ class Terminal:
     def _wait_for_questions(self) -> None:
         self._say('No open questions; waiting. (q quits)', 'dim')
         while True:
-            line = self._prompts.ask('', self._servers_line, lambda: 'a question' if self._waiting() else None)
+            line = self._prompts.ask('', self._servers_line, lambda: 'a question'
+                                     if self._waiting() else None)
             _quit_on(line)
 
-    def _pick_from(self, waiting: Sequence[Listed]) -> Optional[Listed]:
+    def _pick_from(self, waiting: Sequence[ListedQuestion]) -> Optional[ListedQuestion]:
         self._console.print(render.overview(waiting, time.monotonic()))
         keys = [each.key for each in waiting]
         line = self._prompts.ask(
@@ -96,52 +105,60 @@ class Terminal:
         _quit_on(line)
         if line.isdigit() and 1 <= int(line) <= len(waiting):
             return waiting[int(line) - 1]
-        self._say('{!r} is none of 1 to {}, q'.format(line, len(waiting)), 'red')
+        self._say('{!r} is not one of 1 to {}, q'.format(line, len(waiting)), 'red')
         return None
 
-    def _waiting(self) -> List[Listed]:
-        return [each for each in self._front_end.questions() if each.status != OpenQuery.INTERFACE_RUNNING]
+    def _waiting(self) -> List[ListedQuestion]:
+        return [
+            each for each in self._front_end.questions()
+            if each.status != OpenQuery.INTERFACE_RUNNING
+        ]
 
-    def _work_on(self, listed: Listed) -> None:
+    def _work_on(self, listed: ListedQuestion) -> None:
         """Claim, show and answer one question."""
         self._missing_since_s = math.inf
         steps = self._next_steps(listed.goal.robot, listed.goal.trial_id)
-        self._stands = self._standing(listed.goal.robot, listed.goal.query_id)
+        self._preconditions = self._listen_to_preconditions(listed.goal.robot,
+                                                            listed.goal.query_id)
         try:
             self._claim_first(listed)
             self._console.rule(style='dim')
             self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
             while not self._answered(listed, steps):
                 pass
-        except Leave:
-            self._left.add(listed.key)
-        except Interrupted as reason:
+        except LeaveQuestion:
+            self._left_to_others.add(listed.key)
+        except PromptInterrupted as reason:
             self._say('\n{}'.format(reason), 'bold yellow')
         finally:
             self._front_end.release(listed)
             steps.stop()
-            self._stands.stop()
+            self._preconditions.stop()
 
-    def _claim_first(self, listed: Listed) -> None:
-        """Claim it, if that can be done now: otherwise it is claimed while the expert reads (`_look`)."""
+    def _claim_first(self, listed: ListedQuestion) -> None:
+        """Claim it, if that can be done now.
+
+        Otherwise it is claimed while the expert reads (`_why_to_stop`).
+        """
         try:
             self._claim(listed)
         except ServerGoneError as err:
-            self._mine = False
+            self._claimed = False
             self._say(str(err), 'red')
 
-    def _claim(self, listed: Listed, take_over: bool = False) -> None:
+    def _claim(self, listed: ListedQuestion, take_over: bool = False) -> None:
         response = self._front_end.claim(listed, take_over)
-        self._mine = response.ok
+        self._claimed = response.ok
         if not response.ok and not response.holder:
-            raise Interrupted(response.message)
+            raise PromptInterrupted(response.message)
         if not response.ok:
             self._say('{}; t takes it over.'.format(response.message), 'yellow')
 
-    def _answered(self, listed: Listed, steps: NextSteps) -> bool:
-        """Ask for one line and do what it says; whether the question is settled by it."""
+    def _answered(self, listed: ListedQuestion, steps: NextSteps) -> bool:
+        """Ask for one line and act on it; whether that has settled the question."""
         available = options(listed.goal)
-        line = self._ask(listed, '\nanswer: ', [(option.key, option.words) for option in available] + _COMMANDS)
+        line = self._ask(listed, '\nanswer: ',
+                         [(option.key, option.words) for option in available] + _COMMANDS)
         try:
             if self._command(listed, line):
                 return False
@@ -151,21 +168,23 @@ class Terminal:
             self._say(str(err), 'red')
         return False
 
-    def _command(self, listed: Listed, line: str) -> bool:
+    def _command(self, listed: ListedQuestion, line: str) -> bool:
         """Do what is no answer; whether it was that."""
         _quit_on(line)
         if line == 'l':
-            raise Leave
+            raise LeaveQuestion
         if line == 't':
             self._claim(listed, take_over=True)
-        elif line == 'p' and self._stands is not None:
-            for text, style in self._stands.lines() or [('  The robot tells nothing of them.', 'dim')]:
+        elif line == 'p' and self._preconditions is not None:
+            for text, style in self._preconditions.lines() or [
+                ('  The robot does not publish their status.', 'dim')
+            ]:
                 self._say(text, style)
         elif line == 'r':
             self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
         return line in ('', 't', 'p', 'r')
 
-    def _decide(self, listed: Listed, option: Option) -> Optional[ExpertDecision]:
+    def _decide(self, listed: ListedQuestion, option: AnswerOption) -> Optional[ExpertDecision]:
         """The decision with its outputs and reason; None where Ctrl-C went back."""
         self._say('→ {}'.format(option.words), 'bold')
         try:
@@ -174,57 +193,61 @@ class Terminal:
             self._say('Not sent.', 'dim')
             return None
 
-    def _complete(self, listed: Listed, option: Option) -> ExpertDecision:
+    def _complete(self, listed: ListedQuestion, option: AnswerOption) -> ExpertDecision:
         decision = option.decision()
         if option.kind == ExpertDecision.SUPERSEDE:
             for key in listed.goal.output_keys:
-                text = self._ask(listed, '  {} as JSON (empty: not set): '.format(clean(key)), [], JsonValidator())
+                text = self._ask(listed, '  {} as JSON (empty: not set): '.format(clean(key)), [],
+                                 JsonValidator())
                 if text:
                     decision.outputs.append(encode(key, json.loads(text)))
         decision.why = self._ask(listed, '  reason (optional): ', [])
         return decision
 
-    def _send(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+    def _send(self, listed: ListedQuestion, decision: ExpertDecision, steps: NextSteps) -> bool:
         if decision.kind == ExpertDecision.INTERFACE:
             return self._send_interface(listed, decision, steps)
         return self._settle(listed, decision, steps)
 
-    def _send_interface(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+    def _send_interface(self, listed: ListedQuestion, decision: ExpertDecision,
+                        steps: NextSteps) -> bool:
         interface = self._interface(listed, decision.interface)
         try:
             settled = self._settle(listed, decision, steps)
             if settled:
-                InterfaceTalk(interface, self._prompts, self._say, self._front_end.find).run(listed)
-                self._tell_next(listed, steps)
+                InterfaceDialog(interface, self._prompts, self._say,
+                                self._front_end.find).run(listed)
+                self._show_next_steps(listed, steps)
             return settled
         finally:
             interface.stop()
 
-    def _settle(self, listed: Listed, decision: ExpertDecision, steps: NextSteps) -> bool:
+    def _settle(self, listed: ListedQuestion, decision: ExpertDecision, steps: NextSteps) -> bool:
         steps.forget()
         response = self._front_end.answer(listed, decision)
         if not response.ok:
             self._say('Refused: {}'.format(response.message), 'red')
             return False
         self._say('✓ The robot has your answer.', 'bold green')
-        self._tell_next(listed, steps)
+        self._show_next_steps(listed, steps)
         return True
 
-    def _tell_next(self, listed: Listed, steps: NextSteps) -> None:
+    def _show_next_steps(self, listed: ListedQuestion, steps: NextSteps) -> None:
         silent = True
         for event in steps.follow():
             silent = False
-            self._say('  ' + render.what_happened(event), 'green')
+            self._say('  ' + next_step_words(event), 'green')
         if silent:
-            self._say('  What it does next is not known: no events on {}/oracle/events.'.format(listed.goal.robot),
-                      'dim')
+            self._say(
+                '  What it does next is not known: no events on {}/oracle/events.'.format(
+                    listed.goal.robot), 'dim')
 
-    def _ask(self, listed: Listed, message: str, choices: Sequence[Choice],
+    def _ask(self, listed: ListedQuestion, message: str, choices: Sequence[Choice],
              validator: Optional[JsonValidator] = None) -> str:
-        return self._prompts.ask(message, lambda: self._status_line(listed), lambda: self._look(listed), choices,
-                                 validator)
+        return self._prompts.ask(message, lambda: self._status_line(listed),
+                                 lambda: self._why_to_stop(listed), choices, validator)
 
-    def _look(self, listed: Listed) -> Optional[str]:
+    def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
         """Why to stop working on a question; None as long as it is ours to answer."""
         if not self._front_end.connected(listed.server):
             return self._gone_for_good('{} is gone.'.format(listed.server))
@@ -233,17 +256,20 @@ class Terminal:
             if now is None:
                 return self._why_gone(listed)
             self._missing_since_s = math.inf
-            if self._mine and now.holder not in ('', self._front_end.expert):
-                self._mine = False
+            if self._claimed and now.holder not in ('', self._front_end.expert):
+                self._claimed = False
                 return '{} has taken this question over.'.format(clean(now.holder))
             if not now.holder:  # our claim is gone with a restarted server, or who held it has left
-                self._mine = self._front_end.claim(listed).ok
+                self._claimed = self._front_end.claim(listed).ok
         except ServerGoneError:
             pass
         return None
 
-    def _why_gone(self, listed: Listed) -> Optional[str]:
-        """Who settled it; a server that knows nothing of it was restarted, and is asked again by a living robot."""
+    def _why_gone(self, listed: ListedQuestion) -> Optional[str]:
+        """Who settled it.
+
+        A server that does not know it was restarted, and a living robot asks it again.
+        """
         response = self._front_end.claim(listed)
         if response.ok:
             return None
@@ -256,13 +282,13 @@ class Terminal:
         self._missing_since_s = min(self._missing_since_s, now_s)
         return why if now_s - self._missing_since_s > _RETURN_S else None
 
-    def _status_line(self, listed: Listed) -> str:
+    def _status_line(self, listed: ListedQuestion) -> str:
         now = self._front_end.find(listed.key) or listed
         parts = [self._front_end.expert, 'no time limit' if now.deadline_s == math.inf
                  else '{} left'.format(duration(now.deadline_s - time.monotonic()))]
         if not self._front_end.connected(listed.server):
             parts.append('{} is gone; waiting for it'.format(listed.server))
-        elif not self._mine:
+        elif not self._claimed:
             parts.append('{} works on it'.format(now.holder or 'nobody'))
         others = len(self._waiting()) - 1
         if others > 0:
@@ -273,9 +299,12 @@ class Terminal:
     def _servers_line(self) -> str:
         servers = ['{}{}'.format(name, '' if self._front_end.connected(name) else ' (gone)')
                    for name in self._front_end.servers]
-        running = ['interface {} runs for {}'.format(each.goal.interface, each.goal.failed_state)
-                   for each in self._front_end.questions() if each.status == OpenQuery.INTERFACE_RUNNING]
-        return ' · '.join([self._front_end.expert, ', '.join(servers) or 'no server found yet'] + running)
+        running = [
+            'interface {} runs for {}'.format(each.goal.interface, each.goal.failed_state)
+            for each in self._front_end.questions() if each.status == OpenQuery.INTERFACE_RUNNING
+        ]
+        return ' · '.join([self._front_end.expert, ', '.join(servers) or 'no server found yet'] +
+                          running)
 
     def _say(self, text: str, style: str) -> None:
         self._console.print(Text(clean(text, lines=True), style))
@@ -283,7 +312,7 @@ class Terminal:
 
 def _quit_on(line: str) -> None:
     if line == 'q':
-        raise Quit
+        raise QuitTerminal
 
 
 def main() -> None:
@@ -293,7 +322,8 @@ def main() -> None:
     try:
         wait_for_master(console)
         # a name of its own each; Ctrl-C is ours; the log stays off the screen (its file has it)
-        rospy.init_node('expert_terminal', anonymous=True, disable_signals=True, log_level=rospy.FATAL)
+        rospy.init_node('expert_terminal', anonymous=True, disable_signals=True,
+                        log_level=rospy.FATAL)
     except KeyboardInterrupt:
         return
     start_master_watch()

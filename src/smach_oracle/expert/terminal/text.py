@@ -1,6 +1,5 @@
-"""Text from robots made safe for a terminal, and the colours of failure rates. Pure."""
+"""Failure rates and durations as text for a terminal. Pure."""
 import colorsys
-import unicodedata
 
 from rich.text import Text
 
@@ -8,13 +7,11 @@ CLASS_NAMES = {0: '', 1: 'LOW', 2: 'MODERATE', 3: 'HIGH'}
 _FULL, _EMPTY = '█', '░'
 
 
-def clean(text: str, lines: bool = False) -> str:
-    """Without anything that steers a terminal or turns the reading direction; newlines stay where `lines` is set."""
-    return ''.join(_visible(character, lines) for character in text)
-
-
 def rate_colour(rate: float) -> str:
-    """From green at 0 through yellow to red at 1, as #rrggbb; readable on dark and on light ground."""
+    """Return a colour from green at 0 through yellow to red at 1, as #rrggbb.
+
+    It can be read on dark and on light ground.
+    """
     hue = (1.0 - min(max(rate, 0.0), 1.0)) / 3.0  # a third of the circle: green
     channels = colorsys.hls_to_rgb(hue, 0.42, 0.9)
     return '#' + ''.join('{:02x}'.format(round(255 * channel)) for channel in channels)
@@ -23,7 +20,8 @@ def rate_colour(rate: float) -> str:
 def rate_bar(rate: float, width: int = 10) -> Text:
     """A bar and a percentage in the rate's colour."""
     filled = round(min(max(rate, 0.0), 1.0) * width)
-    return Text('{}{} {:3.0f}%'.format(_FULL * filled, _EMPTY * (width - filled), 100 * rate), rate_colour(rate))
+    return Text('{}{} {:3.0f}%'.format(_FULL * filled, _EMPTY * (width - filled), 100 * rate),
+                rate_colour(rate))
 
 
 def duration(seconds: float) -> str:
@@ -34,11 +32,3 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return '{}:{:02} min'.format(whole // 60, whole % 60)
     return '{}:{:02} h'.format(whole // 3600, whole % 3600 // 60)
-
-
-def _visible(character: str, lines: bool) -> str:
-    if character == '\t' or character in '\n\u2028\u2029' and not lines:
-        return ' '
-    if character == '\n' or unicodedata.category(character)[0] != 'C':
-        return character
-    return '\ufffd'

@@ -1,20 +1,25 @@
-"""Who of the console's pages drives a hand, and whether what a page sends is fresh. Pure; times are monotonic, in s."""
+"""Which page drives a manipulation interface, and whether its commands are fresh. Pure.
+
+Times are monotonic, in s.
+"""
 import math
 from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple
 
-from .audit import Person
+from ...followed_server import ListedQuestion
+from ..web.audit import Person
 
-LATE_S = 0.06  # later than the quickest message of this page: it has waited somewhere on its way
-SILENT_S = 3.0  # a page that holds the wheel says so several times a second
+LATE_S = 0.06  # more delay than the quickest message of this page: the link has held it back
+SILENT_S = 3.0  # a page in control sends several commands a second
 _DRIFT = 1e-3  # s/s by which two clocks may run apart, and more
 
 Vector = Tuple[float, float, float]
 
 
 class Freshness:
-    """Tells messages that come at once from those that a slow link has held back.
+    """Distinguishes messages that arrive at once from those that a slow link has held back.
 
-    The clocks of page and server have nothing in common; the least difference seen stands for a message without delay.
+    The clocks of page and server have nothing in common; the least difference seen stands for a
+    message without delay.
     """
 
     def __init__(self) -> None:
@@ -29,40 +34,41 @@ class Freshness:
         return offset_s - self._least_s <= LATE_S
 
 
-class Drive(NamedTuple):
-    """One session at the wheel."""
+class DrivingSession(NamedTuple):
+    """The time for which one page controls an interface."""
 
     key: str  # of the question
-    browser: int
+    page: int
     person: Person
-    listed: Any  # the question
+    listed: ListedQuestion  # the question
     begun_s: float
 
 
-class Wheel:
-    """Of one hand; held by one page at a time."""
+class DrivingControl:
+    """Control of one interface, held by one page at a time."""
 
     def __init__(self) -> None:
-        self.drive: Optional[Drive] = None
+        self.session: Optional[DrivingSession] = None
         self._freshness = Freshness()
         self._heard_s = -math.inf
         self._counts: Dict[str, int] = {}
         self.held = False
 
-    def take(self, drive: Drive, now_s: float) -> str:
-        """Take it; why not, or ''. A page that has fallen silent has lost it."""
-        if self.drive is not None and self.drive.browser != drive.browser and not self.silent(now_s):
-            return '{} drives; one at a time'.format(self.drive.person.expert)
-        self.drive, self._heard_s, self.held = drive, now_s, False
+    def take(self, session: DrivingSession, now_s: float) -> str:
+        """Take control; returns why not, or ''. A page that has fallen silent has lost it."""
+        if self.session is not None and self.session.page != session.page and not self.silent(
+                now_s):
+            return '{} drives; one at a time'.format(self.session.person.expert)
+        self.session, self._heard_s, self.held = session, now_s, False
         self._freshness, self._counts = Freshness(), {'relayed': 0, 'late': 0}
         return ''
 
     def silent(self, now_s: float) -> bool:
-        """Whether nothing has come from the page that has it."""
+        """Whether the page in control has not sent anything for a while."""
         return now_s - self._heard_s > SILENT_S
 
-    def hear(self, sent_s: float, held: bool, now_s: float) -> bool:
-        """A command of its page; whether it is to be carried out as one that is held."""
+    def accept(self, sent_s: float, held: bool, now_s: float) -> bool:
+        """Take in a command of the page; whether to carry it out as one that is held."""
         self._heard_s = now_s
         fresh = self._freshness.fresh(sent_s, now_s)
         if held:
@@ -71,15 +77,19 @@ class Wheel:
         return self.held
 
     def leave(self, now_s: float) -> Dict[str, Any]:
-        """Nobody has it; what is to be told of the session."""
-        told: Dict[str, Any] = dict(self._counts)
-        if self.drive is not None:
-            told['seconds'] = round(now_s - self.drive.begun_s, 1)
-        self.drive, self.held = None, False
-        return told
+        """End the session; returns its summary for the audit."""
+        summary: Dict[str, Any] = dict(self._counts)
+        if self.session is not None:
+            summary['seconds'] = round(now_s - self.session.begun_s, 1)
+        self.session, self.held = None, False
+        return summary
 
 
 def along(frame: str, vector: Sequence[float], most: float) -> Vector:
-    """Shares of `most` forward, left and up, along the axes of a frame: those of a camera are right, down, forward."""
+    """Shares of `most` along the axes of a frame.
+
+    :param vector: shares forward, left and up, each from -1 to 1.
+    :returns: x, y, z; the axes of a camera are right, down and forward.
+    """
     forward, left, up = (most * each for each in vector)
     return (-left, -up, forward) if frame == 'camera' else (forward, left, up)

@@ -1,4 +1,4 @@
-"""How the preconditions of open questions' choices stand now, as the robots tell it."""
+"""How the preconditions of open questions' choices stand now, as the robots publish it."""
 import threading
 import time
 from collections import OrderedDict
@@ -6,34 +6,39 @@ from typing import Any, Callable, Dict, Iterable, List, Tuple
 
 from smach_oracle.msg import PreconditionCheck, PreconditionChecks
 
-from ..followed_server import Listed
-from .robot_topics import RobotTopics
-from .sections import Sections
+from ...followed_server import ListedQuestion
+from ...robot_topics import RobotTopics
+from ..web.sections import PageSections
 
 SECTION = 'conditions'
 MOST_QUESTIONS = 64
 LONGEST_TEXT = 400
+StatusByState = Dict[str, List[Dict[str, Any]]]
 _HOLDS = {PreconditionCheck.HOLDS: True, PreconditionCheck.DOES_NOT_HOLD: False}
 
 
-class Conditions:
-    """Follows `<robot>/oracle/preconditions` of robots that ask; holds the newest word on each question."""
+class PreconditionStatuses:
+    """Follows `<robot>/oracle/preconditions` of robots that ask; holds the newest by question."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._topics = RobotTopics('/oracle/preconditions', PreconditionChecks, self.taker, queue_size=5)
-        self._newest: 'OrderedDict[Tuple[str, str], Dict[str, List[Dict[str, Any]]]]' = OrderedDict()
+        self._topics = RobotTopics('/oracle/preconditions', PreconditionChecks, self.taker,
+                                   queue_size=5)
+        self._newest: 'OrderedDict[Tuple[str, str], StatusByState]' = OrderedDict()
 
-    def draw(self, sections: Sections, questions: Iterable[Listed]) -> None:
-        """Bring the section up to date; robots whose questions are new are listened to from now on."""
+    def write_sections(self, sections: PageSections, questions: Iterable[ListedQuestion]) -> None:
+        """Bring the section up to date; new robots are listened to from now on."""
         questions = list(questions)
         self._topics.follow([listed.goal.robot for listed in questions])
         with self._lock:
-            found = {listed.key: self._newest.get((listed.goal.robot, listed.goal.query_id)) for listed in questions}
+            found = {
+                listed.key: self._newest.get((listed.goal.robot, listed.goal.query_id))
+                for listed in questions
+            }
         sections.put(SECTION, {key: states for key, states in found.items() if states is not None})
 
     def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
-        """What takes in a robot's messages."""
+        """The callback for a robot's messages."""
         def take(message: PreconditionChecks) -> None:
             view = checks_view(message, time.time())
             with self._lock:
@@ -44,11 +49,17 @@ class Conditions:
         return take
 
 
-def checks_view(message: PreconditionChecks, now: float) -> Dict[str, List[Dict[str, Any]]]:
-    """By state: name, whether it holds (None: unknown), why, and when that was looked at, in s since the epoch."""
-    found: Dict[str, List[Dict[str, Any]]] = {}
+def checks_view(message: PreconditionChecks, now: float) -> StatusByState:
+    """The status of each precondition, by state.
+
+    Its name, whether it holds (None: unknown), why, and when that was checked, in s since the
+    epoch.
+    """
+    found: StatusByState = {}
     for check in message.checks:
         looked = round(now - check.age, 1) if check.age >= 0 else None
-        found.setdefault(check.state, []).append({'name': check.name, 'holds': _HOLDS.get(check.result),
-                                                  'text': check.text[:LONGEST_TEXT], 'looked': looked})
+        found.setdefault(check.state, []).append({
+            'name': check.name, 'holds': _HOLDS.get(check.result),
+            'text': check.text[:LONGEST_TEXT], 'looked': looked
+        })
     return found

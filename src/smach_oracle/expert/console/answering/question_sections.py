@@ -2,16 +2,17 @@
 import time
 from typing import Any, Dict, List, Optional
 
-from ..followed_server import Listed
-from ..front_end import FrontEnd
-from .sections import Sections
-from .trial_log import TrialLog
-from .views import question_view
+from ...followed_server import ListedQuestion
+from ...front_end import FrontEnd
+from ..trials.trial_log import TrialLog
+from ..web.sections import PageSections
+from .question_view import question_view
 
-_JITTER_S = 1.0  # every list tells ages anew; smaller differences are its way's, not the question's
+# each list has ages of its own; smaller differences come from the link, not from the question
+_JITTER_S = 1.0
 
 
-class QuestionBoard:
+class QuestionSections:
     """Draws the queue; one thread calls it."""
 
     def __init__(self, front_end: FrontEnd, log: TrialLog) -> None:
@@ -20,20 +21,26 @@ class QuestionBoard:
         self._epoch_s = time.time() - time.monotonic()
         self._times: Dict[str, Dict[str, Optional[float]]] = {}
 
-    def draw(self, sections: Sections) -> None:
+    def write_sections(self, sections: PageSections) -> None:
         """Bring the section up to date."""
         listed = self._front_end.questions()
-        views = sorted((self._view(each) for each in listed), key=lambda view: (view['asked'], view['key']))
-        self._times = {view['key']: {'asked': view['asked'], 'deadline': view['deadline']} for view in views}
+        views = sorted((self._view(each) for each in listed), key=lambda view:
+                       (view['asked'], view['key']))
+        self._times = {
+            view['key']: {'asked': view['asked'], 'deadline': view['deadline']}
+            for view in views
+        }
         sections.put('questions', views)
         sections.put('servers', self._servers())
 
     def _servers(self) -> List[Dict[str, Any]]:
-        return [{'name': name, 'connected': self._front_end.connected(name)} for name in self._front_end.servers]
+        return [{'name': name, 'connected': self._front_end.connected(name)}
+                for name in self._front_end.servers]
 
-    def _view(self, listed: Listed) -> Dict[str, Any]:
+    def _view(self, listed: ListedQuestion) -> Dict[str, Any]:
         place = (listed.goal.robot, listed.goal.container_path, listed.goal.failed_state)
-        view = question_view(listed, self._epoch_s, lambda target: self._log.score(place, target))
+        view = question_view(listed, self._epoch_s,
+                             lambda target: self._log.recovery_counts(place, target))
         for name, before in self._times.get(listed.key, {}).items():
             now = view[name]
             if before is not None and now is not None and abs(before - now) < _JITTER_S:

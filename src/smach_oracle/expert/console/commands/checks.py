@@ -1,20 +1,28 @@
-"""Checks of single arguments of commands. A check takes what came and gives what is meant, or raises ValueError."""
+"""Checks of single arguments of commands.
+
+A check takes what came and returns what is meant.
+
+:raises ValueError: (each check) for anything else; the text says what is allowed.
+"""
 import math
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
-Check = Callable[[Any], Any]
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
+
+Check = Callable[[object], Any]
 _MOST_OUTPUTS = 64
 _DEEPEST = 32
 
 
-class Spec(NamedTuple):
+class CommandSpec(NamedTuple):
     """A command: the least role that may give it, and its arguments with their checks."""
 
     role: str
     checks: Dict[str, Check]
 
 
-class Output(NamedTuple):
+class TypedOutput(NamedTuple):
     """A value for the userdata, as typed by a person."""
 
     key: str
@@ -23,11 +31,11 @@ class Output(NamedTuple):
 
 
 def text(longest: int, least: int = 0) -> Check:
-    """Text of `least` to `longest` characters, without control characters; what is left out is empty.
+    """Text of `least` to `longest` characters, without control characters.
 
-    :raises ValueError: (the check) for anything else, saying what is allowed.
+    What is left out is the empty text, where that is allowed.
     """
-    def check(value: Any) -> str:
+    def check(value: object) -> str:
         if value is None and not least:
             return ''
         if not isinstance(value, str) or not least <= len(value) <= longest:
@@ -40,24 +48,46 @@ def text(longest: int, least: int = 0) -> Check:
 
 
 def one_of(allowed: Tuple[str, ...]) -> Check:
-    """One of a few words; the check raises ValueError for others, naming those."""
-    def check(value: Any) -> str:
-        if value not in allowed:
-            raise ValueError('{} is not allowed; allowed: {}'.format(shown(value), ', '.join(allowed)))
-        return str(value)
-    return check
+    """One of a few words."""
+    return _argument(checks.choice(allowed))
 
 
-def shown(value: Any) -> str:
-    """What came, for a refusal: never long."""
-    said = repr(value)
-    return said if len(said) <= 60 else said[:60] + '…'
+def number(low: float, high: float, allowed: str = '') -> Check:
+    """A finite number from `low` to `high`; a refusal says `allowed`."""
+    return _argument(
+        checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high)))
 
 
-def outputs(value: Any) -> List[Output]:
-    """Values for the userdata; what is left out is none.
+def whole(low: int, high: int, allowed: str) -> Check:
+    """A whole number from `low` to `high`; a refusal says `allowed`."""
+    return _argument(checks.whole(low, allowed, high))
 
-    :raises ValueError: for what is no list of outputs, too many of them, one twice, or one that is nested too deep.
+
+def _argument(check: checks.Check) -> Check:
+    """A check of settings as one of arguments: of a value that is refused a part is shown."""
+    def checked(value: object) -> Any:
+        try:
+            return check('', value)
+        except SettingsError as err:
+            raise ValueError('{} is not allowed; allowed: {}'.format(shown(value),
+                                                                     err.allowed)) from err
+    return checked
+
+
+flag = _argument(checks.flag)
+
+
+def shown(value: object) -> str:
+    """A value for the text of a refusal: never long."""
+    whole_text = repr(value)
+    return whole_text if len(whole_text) <= 60 else whole_text[:60] + '…'
+
+
+def outputs(value: object) -> List[TypedOutput]:
+    """Values for the userdata; none where they are left out.
+
+    :raises ValueError: for what is no list of outputs, too many of them, one twice, or one that is
+        nested too deep.
     """
     if value is None:
         return []
@@ -69,14 +99,15 @@ def outputs(value: Any) -> List[Output]:
     return found
 
 
-def _output(value: Any) -> Output:
-    if not isinstance(value, dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
+def _output(value: object) -> TypedOutput:
+    if not isinstance(value,
+                      dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
         raise ValueError('an output is {"key": ..., "value": ..., "type": ...}')
     _check_depth(value['value'])
-    return Output(text(200, 1)(value['key']), value['value'], text(200)(value.get('type')))
+    return TypedOutput(text(200, 1)(value['key']), value['value'], text(200)(value.get('type')))
 
 
-def _check_depth(value: Any) -> None:
+def _check_depth(value: object) -> None:
     waiting = [(value, 0)]
     while waiting:
         item, depth = waiting.pop()
@@ -84,7 +115,8 @@ def _check_depth(value: Any) -> None:
             raise ValueError('an output is nested deeper than {}'.format(_DEEPEST))
         if isinstance(item, float) and not math.isfinite(item):
             raise ValueError('an output holds a number that is too large')
-        children = item.values() if isinstance(item, dict) else item if isinstance(item, list) else ()
+        children = item.values() if isinstance(item,
+                                               dict) else item if isinstance(item, list) else ()
         waiting += [(child, depth + 1) for child in children]
 
 

@@ -1,21 +1,23 @@
-"""The graph of one container: what it is made of, how dot is asked to lay it out, and the drawing for the page. Pure.
+"""The graph of one container: states and edges, their layout, the drawing for the page. Pure.
 
-ORACLE is left out of the layout: with one edge from and one to every state it would pull all others to itself. The page
-draws it beside the rest, and its edges as thin curves.
+ORACLE is left out of the layout: with one edge from and one to every state it would pull all others
+to itself. The page draws it beside the rest, and its edges as thin curves.
 """
 import json
-from collections import Counter
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Counter, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 MOST_STATES = 500  # of a container; more are not drawn
 MOST_EDGES = 3000
-MOST_LABELLED = 100  # edges up to which dot keeps room for their labels; beyond, it would take minutes
-_HASTE = ' nslimit=2; nslimit1=2; mclimit=0.3;'  # of a large graph: fewer rounds of making it prettier
-_CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 8.7, 28.0, 118.0, 300.0, 46.0  # of a state's box, in pixels
+# edges up to which dot keeps room for their labels; beyond, it would take minutes
+MOST_LABELLED = 100
+# of a large graph: fewer rounds of making it prettier
+_HASTE = ' nslimit=2; nslimit1=2; mclimit=0.3;'
+# of a state's box, in pixels
+_CHARACTER, _PADDING, _NARROWEST, _WIDEST, _HEIGHT = 8.7, 28.0, 118.0, 300.0, 46.0
 _PIXELS_PER_INCH = 72.0
 
 
-class Edge(NamedTuple):
+class GraphEdge(NamedTuple):
     """One edge, by labels."""
 
     source: str
@@ -23,27 +25,32 @@ class Edge(NamedTuple):
     target: str
 
 
-class Structure(NamedTuple):
+class ContainerGraph(NamedTuple):
     """A container's states and edges."""
 
     path: str
     states: Tuple[str, ...]  # ORACLE not among them
     outcomes: Tuple[str, ...]
-    edges: Tuple[Edge, ...]  # those of ORACLE not among them
+    edges: Tuple[GraphEdge, ...]  # those of ORACLE not among them
     oracle: str  # label of the meta state, '' where there is none
 
 
-class Layout(NamedTuple):
+Point = Tuple[float, float]
+
+
+class GraphLayout(NamedTuple):
     """Where things are, in pixels from the upper left corner."""
 
     width: float
     height: float
     nodes: Dict[str, Tuple[float, float, float, float]]  # id -> centre x, y, width, height
-    edges: Dict[str, Tuple[List[Tuple[float, float]], Optional[Tuple[float, float]]]]  # id -> Bezier points, label
+    # id -> Bezier points, label
+    edges: Dict[str, Tuple[List[Point], Optional[Point]]]
 
 
-def make_structure(path: str, children: Iterable[str], edges: Iterable[Edge], outcomes: Iterable[str]) -> Structure:
-    """From what an introspection server says of a container."""
+def make_structure(path: str, children: Iterable[str], edges: Iterable[GraphEdge],
+                   outcomes: Iterable[str]) -> ContainerGraph:
+    """The graph of a container as its introspection server publishes it."""
     labels = list(dict.fromkeys(children))[:MOST_STATES]
     all_edges = list(dict.fromkeys(edges))[:MOST_EDGES]
     oracle = find_oracle(labels, all_edges)
@@ -51,11 +58,14 @@ def make_structure(path: str, children: Iterable[str], edges: Iterable[Edge], ou
     ends = tuple(dict.fromkeys(outcome for outcome in outcomes if outcome not in labels))
     known = set(states) | set(ends)
     own = tuple(edge for edge in all_edges if edge.source in states and edge.target in known)
-    return Structure(path, states, ends, own, oracle)
+    return ContainerGraph(path, states, ends, own, oracle)
 
 
-def find_oracle(labels: List[str], edges: List[Edge]) -> str:
-    """The meta state: the one whose outcomes are named for where they lead, and that every other state leads to."""
+def find_oracle(labels: List[str], edges: List[GraphEdge]) -> str:
+    """The label of the meta state, '' where there is none.
+
+    Every other state leads to it, and its outcomes are named for where they lead.
+    """
     sources: Dict[str, Set[str]] = {}
     targets: Dict[str, Set[str]] = {}
     for edge in edges:
@@ -69,8 +79,11 @@ def find_oracle(labels: List[str], edges: List[Edge]) -> str:
     return ''
 
 
-def dot_text(structure: Structure) -> str:
-    """The graph for dot. No text of a robot is in it: nodes and edges are numbered, labels are runs of x."""
+def dot_text(structure: ContainerGraph) -> str:
+    """The graph in dot's language.
+
+    No text of a robot is in it: nodes and edges are numbered, labels are runs of x.
+    """
     names = _names(structure)
     large = len(structure.edges) > MOST_LABELLED
     lines = ['digraph {', 'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
@@ -80,10 +93,12 @@ def dot_text(structure: Structure) -> str:
         lines.append('{} [width={:.3f}, height={:.3f}];'.format(
             name, width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH))
     if structure.outcomes:
-        lines.append('{{rank=sink; {}}}'.format('; '.join(names[outcome] for outcome in structure.outcomes)))
+        lines.append('{{rank=sink; {}}}'.format('; '.join(names[outcome]
+                                                          for outcome in structure.outcomes)))
     for number, edge in enumerate(structure.edges):
         label = '' if large else ', label="{}"'.format('x' * min(24, len(edge.outcome) + 5))
-        lines.append('{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number, label))
+        lines.append('{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number,
+                                                   label))
     return '\n'.join(lines + ['}'])
 
 
@@ -92,22 +107,26 @@ def box(label: str) -> Tuple[float, float]:
     return min(_WIDEST, max(_NARROWEST, len(label) * _CHARACTER + _PADDING)), _HEIGHT
 
 
-def read_layout(text: str) -> Layout:
-    """What `dot -Tjson0` says.
+def read_layout(text: str) -> GraphLayout:
+    """The layout that `dot -Tjson0` has written.
 
-    :raises ValueError: where it says something else.
+    :raises ValueError: for any other text.
     """
     try:
         data = json.loads(text)
         left, bottom, right, top = (float(number) for number in data['bb'].split(','))
-        nodes = {each['name']: _node(each, top) for each in data.get('objects', []) if 'nodes' not in each}
+        nodes = {
+            each['name']: _node(each, top)
+            for each in data.get('objects', []) if 'nodes' not in each
+        }
         edges = {each['id']: _edge(each, top) for each in data.get('edges', [])}
     except (KeyError, TypeError, AttributeError) as err:
         raise ValueError('dot has written something unexpected: {!r}'.format(err)) from err
-    return Layout(right - left, top - bottom, nodes, edges)
+    return GraphLayout(right - left, top - bottom, nodes, edges)
 
 
-def drawing(structure: Structure, layout: Optional[Layout], nested: Iterable[str]) -> Dict[str, Any]:
+def drawing(structure: ContainerGraph, layout: Optional[GraphLayout],
+            nested: Iterable[str]) -> Dict[str, Any]:
     """The section of a graph: plain data for the page; positions only where there is a layout.
 
     :param nested: labels of the states that are containers themselves.
@@ -119,51 +138,81 @@ def drawing(structure: Structure, layout: Optional[Layout], nested: Iterable[str
         'size': [layout.width, layout.height] if layout else None,
         'states': [{'label': label, 'nested': label in inner, 'at': _place(layout, names[label])}
                    for label in structure.states],
-        'outcomes': [{'label': label, 'at': _place(layout, names[label])} for label in structure.outcomes],
-        'edges': []}
+        'outcomes': [{'label': label, 'at': _place(layout, names[label])}
+                     for label in structure.outcomes], 'edges': []
+    }
     for number, edge in enumerate(structure.edges):
-        points, label = layout.edges.get('e{}'.format(number), ([], None)) if layout else ([], None)
-        data['edges'].append({'from': edge.source, 'outcome': edge.outcome, 'to': edge.target,
-                              'points': [coordinate for point in points for coordinate in point], 'label': label})
+        points, label = _drawn_edge(layout, 'e{}'.format(number))
+        data['edges'].append({
+            'from': edge.source, 'outcome': edge.outcome, 'to': edge.target,
+            'points': [coordinate for point in points for coordinate in point], 'label': label
+        })
     return data
 
 
-def _names(structure: Structure) -> Dict[str, str]:
-    labels = list(structure.states) + [outcome for outcome in structure.outcomes if outcome not in structure.states]
+def _drawn_edge(layout: Optional[GraphLayout],
+                name: str) -> Tuple[List[Point], Optional[Point]]:
+    """Points and place of the label of an edge; none where it is not laid out."""
+    edge = layout.edges.get(name) if layout else None
+    return edge if edge else ([], None)
+
+
+def _names(structure: ContainerGraph) -> Dict[str, str]:
+    labels = list(structure.states) + [
+        outcome for outcome in structure.outcomes if outcome not in structure.states
+    ]
     return {label: 'n{}'.format(number) for number, label in enumerate(labels)}
 
 
-def _place(layout: Optional[Layout], name: str) -> Optional[List[float]]:
-    return [round(number, 1) for number in layout.nodes[name]] if layout and name in layout.nodes else None
+def _place(layout: Optional[GraphLayout], name: str) -> Optional[List[float]]:
+    return [round(number, 1)
+            for number in layout.nodes[name]] if layout and name in layout.nodes else None
 
 
 def _node(data: Dict[str, Any], top: float) -> Tuple[float, float, float, float]:
     x, y = (float(number) for number in data['pos'].split(','))
-    return x, top - y, float(data['width']) * _PIXELS_PER_INCH, float(data['height']) * _PIXELS_PER_INCH
+    return x, top - y, float(data['width']) * _PIXELS_PER_INCH, float(
+        data['height']) * _PIXELS_PER_INCH
 
 
-def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Tuple[float, float]], Optional[Tuple[float, float]]]:
+def _edge(data: Dict[str, Any],
+          top: float) -> Tuple[List[Point], Optional[Point]]:
     """The spline's points, its arrow's tip at the end."""
-    tip: List[Tuple[float, float]] = []
+    tip: List[Point] = []
     points = []
     for part in data['pos'].split():
         if part.startswith('e,'):
             tip = [_point(part[2:], top)]
         elif not part.startswith('s,'):
             points.append(_point(part, top))
-    return points + tip, _point(data['lp'], top) if 'lp' in data else points[len(points) // 3] if points else None
+    return points + tip, _point(data['lp'], top) if 'lp' in data else points[len(points) //
+                                                                             3] if points else None
 
 
-def _point(text: str, top: float) -> Tuple[float, float]:
+def _point(text: str, top: float) -> Point:
     x, y = (float(number) for number in text.split(','))
     return round(x, 1), round(top - y, 1)
 
 
 def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
-    """Rows of [source, outcome, target, times, share of all that left the source], from times taken."""
+    """Rows of [source, outcome, target, times, share of all that left the source]."""
     rows = list(counts)
-    totals: 'Counter[str]' = Counter()
+    totals: Counter[str] = Counter()
     for source, _, _, times in rows:
         totals[source] += times
     return [[source, outcome, target, times, round(times / totals[source], 4)]
             for source, outcome, target, times in rows if totals[source]]
+
+
+def structure_from_counts(path: str, labels: List[str], counts: List[List[Any]]) -> ContainerGraph:
+    """A container of which only its labels and the transitions taken are known.
+
+    :param counts: rows as of `shares`.
+    """
+    targets = {str(target) for _, _, target, _, _ in counts}
+    oracle: Optional[str] = next((str(source) for source, outcome, target, _, _ in counts
+                                  if outcome == target and source not in labels), None)
+    edges = tuple(GraphEdge(source, outcome, target) for source, outcome, target, _, _ in counts
+                  if source in labels and target != oracle)
+    outcomes = tuple(sorted(targets - set(labels) - {oracle or ''}))
+    return ContainerGraph(path, tuple(labels), outcomes, edges, oracle or '')

@@ -8,7 +8,7 @@ from typing import Callable, Dict, List, Optional
 
 import rospy
 
-from .graph import Layout, read_layout
+from .container_graph import GraphLayout, read_layout
 
 DOT_LIMIT_S = 20.0
 _REMEMBERED = 200
@@ -16,24 +16,32 @@ _REMEMBERED = 200
 Done = Callable[[], None]
 
 
-class Layouter:
-    """Layouts by the text that dot is given: the same graph is laid out once, however many robots have it."""
+class LayoutWorker:
+    """Layouts by the text that dot is given.
+
+    The same graph is laid out once, however many robots have it.
+    """
 
     def __init__(self, command: str = 'dot', limit_s: float = DOT_LIMIT_S) -> None:
         """`command`: found in PATH; without it there are no layouts, and the page shows lists."""
         self._command = shutil.which(command)
         self._limit_s = limit_s
-        self._layouts: 'OrderedDict[str, Optional[Layout]]' = OrderedDict()
+        self._layouts: 'OrderedDict[str, Optional[GraphLayout]]' = OrderedDict()
         self._waiting: 'queue.Queue[str]' = queue.Queue()
         self._asked: Dict[str, List[Done]] = {}  # who waits for it
         self._lock = threading.Lock()
         if self._command is None:
-            rospy.logwarn('Graphviz is not installed (no %s in PATH): state graphs are shown as lists.', command)
+            rospy.logwarn(
+                'Graphviz is not installed (no %s in PATH): state graphs are shown as lists.',
+                command)
         else:
             threading.Thread(target=self._run, name='layout', daemon=True).start()
 
-    def find(self, text: str, done: Done) -> Optional[Layout]:
-        """The layout of a graph, or None where it cannot be had, or not yet: `done` is called when it is there."""
+    def find(self, text: str, done: Done) -> Optional[GraphLayout]:
+        """The layout of a graph; None where it cannot be had, or not yet.
+
+        :param done: called when it is there.
+        """
         with self._lock:
             if text in self._layouts:
                 self._layouts.move_to_end(text)
@@ -46,8 +54,8 @@ class Layouter:
                 self._waiting.put(text)
         return None
 
-    def wait(self, text: str, limit_s: float) -> Optional[Layout]:
-        """The layout of a graph, waiting for it so long at most; None where it cannot be had, or not in time."""
+    def wait(self, text: str, limit_s: float) -> Optional[GraphLayout]:
+        """The layout of a graph, within `limit_s`; None where it cannot be had, or not in time."""
         there = threading.Event()
         found = self.find(text, there.set)
         if found is None and text in self._asked:
@@ -62,15 +70,17 @@ class Layouter:
             with self._lock:
                 self._layouts[text] = layout
                 waiting = self._asked.pop(text)
-                for old in [each for each in self._layouts if each not in self._asked][:-_REMEMBERED]:
+                for old in [each for each in self._layouts
+                            if each not in self._asked][:-_REMEMBERED]:
                     del self._layouts[old]
             for done in waiting:
                 done()
 
-    def _lay_out(self, text: str) -> Optional[Layout]:
+    def _lay_out(self, text: str) -> Optional[GraphLayout]:
         try:
-            result = subprocess.run([str(self._command), '-Tjson0'], input=text.encode(), stdout=subprocess.PIPE,
-                                    stderr=subprocess.PIPE, timeout=self._limit_s, check=True)
+            result = subprocess.run([str(self._command), '-Tjson0'], input=text.encode(),
+                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                    timeout=self._limit_s, check=True)
             return read_layout(result.stdout.decode('utf-8', 'replace'))
         except (OSError, ValueError, subprocess.SubprocessError) as err:
             rospy.logwarn('dot could not lay a state graph out; it is shown as a list: %s', err)

@@ -1,22 +1,30 @@
-"""One robot as its topics tell of it: containers, what is active, what was learned; drawn into sections."""
+"""One robot as its topics show it: containers, active states, learned rates."""
 import threading
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-
 from smach_oracle.msg import OracleEvent, OracleRates
 
-from .graph import Edge, Structure, dot_text, drawing, make_structure, shares
-from .layout import Layouter
-from .sections import Sections
-from .views import number, rates_view
+from ..feeds.views import number, rates_view
+from ..graphs.container_graph import (
+    ContainerGraph,
+    GraphEdge,
+    dot_text,
+    drawing,
+    make_structure,
+    shares,
+    structure_from_counts,
+)
+from ..graphs.layout_worker import LayoutWorker
+from ..web.sections import PageSections
 
 MOST_CONTAINERS = 200
-_LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP, OracleEvent.TRIAL_END)
+_LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
+                  OracleEvent.TRIAL_END)
 
 
-class Robot:
-    """Fed by ROS threads; `draw` is called by one thread."""
+class FollowedRobot:
+    """Fed by ROS threads; one thread calls `write_sections`."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -24,9 +32,10 @@ class Robot:
         self.alive = True
         self._reshaped = True
         self._lock = threading.Lock()
-        self._structures: Dict[str, Structure] = {}
+        self._structures: Dict[str, ContainerGraph] = {}
         self._active: Dict[str, List[str]] = {}
-        self._latest: Dict[str, List[str]] = {}  # path -> [source, target] of the transition made last
+        # path -> [source, target] of the transition made last
+        self._latest: Dict[str, List[str]] = {}
         self._failed: Dict[str, Dict[str, Any]] = {}
         self._rates: Dict[str, Dict[str, Dict[str, Any]]] = {}
         self._counts: Dict[str, List[List[Any]]] = {}
@@ -35,7 +44,10 @@ class Robot:
     def on_structure(self, message: SmachContainerStructure) -> None:
         """A container's graph; most repeat what is known."""
         path = message.path.lstrip('/')
-        edges = [Edge(*each) for each in zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)]
+        edges = [
+            GraphEdge(*each)
+            for each in zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)
+        ]
         structure = make_structure(path, message.children, edges, message.container_outcomes)
         with self._lock:
             room = path in self._structures or len(self._structures) < MOST_CONTAINERS
@@ -52,7 +64,7 @@ class Robot:
                 self.changed = True
 
     def on_rates(self, message: OracleRates) -> None:
-        """What was learned; a message tells of one top machine."""
+        """What was learned; a message covers one top machine."""
         rates = rates_view(message)
         rows: Dict[str, List[Any]] = {}
         for row in message.transitions:
@@ -80,7 +92,7 @@ class Robot:
                 self._failed.pop(message.path, None)
             self.changed = True
 
-    def draw(self, sections: Sections, layouter: Layouter) -> None:
+    def write_sections(self, sections: PageSections, layouts: LayoutWorker) -> None:
         """Write this robot's sections where something has changed."""
         with self._lock:
             if not self.changed:
@@ -88,20 +100,26 @@ class Robot:
             self.changed = False
             reshaped, self._reshaped = self._reshaped, False
             structures = self._all_structures()
-            live = {'trial': self._trial, 'alive': self.alive, 'active': dict(self._active),
-                    'latest': dict(self._latest), 'failed': dict(self._failed), 'rates': dict(self._rates),
-                    'counts': dict(self._counts), 'paths': sorted(structures)}
+            live = {
+                'trial': self._trial, 'alive': self.alive, 'active': dict(self._active),
+                'latest': dict(self._latest), 'failed': dict(self._failed),
+                'rates': dict(self._rates), 'counts': dict(self._counts),
+                'paths': sorted(structures)
+            }
         sections.put('live ' + self.name, live)
         if reshaped:
-            self._draw_graphs(structures, sections, layouter)
+            self._write_graphs(structures, sections, layouts)
 
-    def _draw_graphs(self, structures: Dict[str, Structure], sections: Sections, layouter: Layouter) -> None:
+    def _write_graphs(self, structures: Dict[str, ContainerGraph], sections: PageSections,
+                     layouts: LayoutWorker) -> None:
         for path, structure in structures.items():
-            nested = [label for label in structure.states if '{}/{}'.format(path, label) in structures]
-            layout = layouter.find(dot_text(structure), self._note_layout)
+            nested = [
+                label for label in structure.states if '{}/{}'.format(path, label) in structures
+            ]
+            layout = layouts.find(dot_text(structure), self._note_layout)
             sections.put('graph {} {}'.format(self.name, path), drawing(structure, layout, nested))
 
-    def forget(self, sections: Sections) -> None:
+    def forget(self, sections: PageSections) -> None:
         """Take this robot's sections away."""
         for path in self._all_structures():
             sections.put('graph {} {}'.format(self.name, path), None)
@@ -116,21 +134,10 @@ class Robot:
     def _note_layout(self) -> None:
         self.changed = self._reshaped = True
 
-    def _all_structures(self) -> Dict[str, Structure]:
-        """Those that introspection shows; without it what can be told from rates and transitions taken."""
+    def _all_structures(self) -> Dict[str, ContainerGraph]:
+        """The structures of introspection; of other paths what rates and transitions show."""
         found = dict(self._structures)
         for path, rates in self._rates.items():
             if path not in found:
-                found[path] = guess(path, list(rates), self._counts.get(path, []))
+                found[path] = structure_from_counts(path, list(rates), self._counts.get(path, []))
         return found
-
-
-def guess(path: str, labels: List[str], counts: List[List[Any]]) -> Structure:
-    """A container of which only its labels and the transitions taken are known; `counts`: as `graph.shares`."""
-    targets = {str(target) for _, _, target, _, _ in counts}
-    oracle: Optional[str] = next((str(source) for source, outcome, target, _, _ in counts
-                                  if outcome == target and source not in labels), None)
-    edges = tuple(Edge(source, outcome, target) for source, outcome, target, _, _ in counts
-                  if source in labels and target != oracle)
-    outcomes = tuple(sorted(targets - set(labels) - {oracle or ''}))
-    return Structure(path, tuple(labels), outcomes, edges, oracle or '')

@@ -1,18 +1,20 @@
-"""Camera images as files that a browser can show: JPEG for colour, PNG with false colours for depth.
+"""Camera images as files for the browser: JPEG for colour, PNG with false colours for depth.
 
-Messages only, no node. What a robot sends is decoded here and encoded anew: nothing of it reaches a browser as it came.
+Messages only, no node. What a robot sends is decoded here and encoded anew: nothing of it reaches a
+browser as it came.
 """
 import os
 import struct
-from typing import Any, Dict, NamedTuple, Union
+from typing import Any, Dict, List, NamedTuple, Union
 
-os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2 ** 26))  # before cv2 is there: small files of huge pictures
+# before cv2 is there: small files of huge images
+os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2 ** 26))
 
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
 
-from ...ros.images import ImageError, colour_of, depth_of  # noqa: E402
+from smach_oracle.ros.images import ImageError, colour_of, depth_of  # noqa: E402
 
 WIDTHS = (320, 640, 1280)  # px that a browser may ask for
 MOST_BYTES = 2 ** 26  # of a message
@@ -24,33 +26,39 @@ _BAYER = {'bayer_rggb8': cv2.COLOR_BayerBG2RGB, 'bayer_bggr8': cv2.COLOR_BayerRG
 _DEPTH_HEADER = struct.Struct('<iff')  # compressed_depth_image_transport: format, quantisation
 
 
-class Encoded(NamedTuple):
-    """What goes to the browser."""
+class BrowserFile(NamedTuple):
+    """A file for the browser."""
 
     content_type: str
     body: bytes
     facts: Dict[str, Any]  # plain data beside it
 
 
-def encode_image(message: Union[Image, CompressedImage], width: int) -> Encoded:
-    """A file of at most `width` pixels across; facts: `size` of the original in px, `range` in m of a depth image.
+def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserFile:
+    """A file of at most `width` pixels across.
+
+    Its facts: `size` of the original in px, `range` in m of a depth image.
 
     :raises ImageError: for what is no image, or too large a one.
     """
     if len(message.data) > MOST_BYTES:
-        raise ImageError('the image has {} bytes; allowed: {}'.format(len(message.data), MOST_BYTES))
+        raise ImageError('the image has {} bytes; allowed: {}'.format(len(message.data),
+                                                                      MOST_BYTES))
     if not isinstance(message, Image):
         if 'compressedDepth' in message.format:
             return _depth_file(_unpacked_depth(message), width)
         return _colour_file(_decoded(bytes(message.data), cv2.IMREAD_COLOR)[:, :, ::-1], width)
     if message.height * message.width > MOST_PIXELS:
-        raise ImageError('the image has {} x {} pixels; allowed: {}'.format(message.width, message.height, MOST_PIXELS))
+        raise ImageError('the image has {} x {} pixels; allowed: {}'.format(
+            message.width, message.height, MOST_PIXELS))
     if message.encoding in _DEPTHS:
         return _depth_file(depth_of(message), width)
     if message.encoding in _BAYER:
-        mosaic = colour_of(Image(height=message.height, width=message.width, step=message.step, data=message.data,
-                                 encoding='mono8'))[:, :, 0]
-        return _colour_file(cv2.cvtColor(np.ascontiguousarray(mosaic), _BAYER[message.encoding]), width)
+        mosaic = colour_of(
+            Image(height=message.height, width=message.width, step=message.step, data=message.data,
+                  encoding='mono8'))[:, :, 0]
+        return _colour_file(cv2.cvtColor(np.ascontiguousarray(mosaic), _BAYER[message.encoding]),
+                            width)
     return _colour_file(colour_of(message), width)
 
 
@@ -63,20 +71,24 @@ def false_colours(depth: np.ndarray, near: float, far: float) -> np.ndarray:
     return colours
 
 
-def _colour_file(colour: np.ndarray, width: int) -> Encoded:
+def _colour_file(colour: np.ndarray, width: int) -> BrowserFile:
     height, original = colour.shape[:2]
-    return Encoded('image/jpeg', _file('.jpg', _narrowed(colour, width, cv2.INTER_AREA),
+    return BrowserFile('image/jpeg', _file('.jpg', _narrowed(colour, width, cv2.INTER_AREA),
                                        [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]),
                    {'kind': 'colour', 'size': [original, height]})
 
 
-def _depth_file(depth: np.ndarray, width: int) -> Encoded:
+def _depth_file(depth: np.ndarray, width: int) -> BrowserFile:
     height, original = depth.shape
     small = _narrowed(depth, width, cv2.INTER_NEAREST)
     measured = small[np.isfinite(small)]
-    near, far = (float(each) for each in np.percentile(measured, (2, 98))) if measured.size else (0.0, 0.0)
-    return Encoded('image/png', _file('.png', false_colours(small, near, far), [cv2.IMWRITE_PNG_COMPRESSION, 1]),
-                   {'kind': 'depth', 'size': [original, height], 'range': [round(near, 3), round(far, 3)]})
+    near, far = (float(each)
+                 for each in np.percentile(measured, (2, 98))) if measured.size else (0.0, 0.0)
+    return BrowserFile(
+        'image/png', _file('.png', false_colours(small, near, far),
+                           [cv2.IMWRITE_PNG_COMPRESSION, 1]),
+        {'kind': 'depth', 'size': [original, height], 'range': [round(near, 3),
+                                                                round(far, 3)]})
 
 
 def _narrowed(image: np.ndarray, width: int, how: int) -> np.ndarray:
@@ -86,7 +98,7 @@ def _narrowed(image: np.ndarray, width: int, how: int) -> np.ndarray:
     return cv2.resize(image, (width, max(1, round(height * width / original))), interpolation=how)
 
 
-def _file(suffix: str, colour: np.ndarray, settings: list) -> bytes:
+def _file(suffix: str, colour: np.ndarray, settings: List[int]) -> bytes:
     done, data = cv2.imencode(suffix, np.ascontiguousarray(colour[:, :, ::-1]), settings)
     if not done:
         raise ImageError('the image cannot be encoded')
@@ -104,7 +116,7 @@ def _decoded(data: bytes, how: int) -> np.ndarray:
 
 
 def _unpacked_depth(message: CompressedImage) -> np.ndarray:
-    """(h, w) float32 m of what compressed_depth_image_transport makes."""
+    """(h, w) float32 m of a message of compressed_depth_image_transport."""
     data = bytes(message.data)
     if len(data) <= _DEPTH_HEADER.size:
         raise ImageError('the compressed depth image has {} bytes'.format(len(data)))
@@ -114,6 +126,7 @@ def _unpacked_depth(message: CompressedImage) -> np.ndarray:
         raise ImageError('the compressed depth image holds no 16 bit depth')
     depth = stored.astype(np.float32)
     with np.errstate(divide='ignore', invalid='ignore'):
-        depth = factor / (depth - offset) if message.format.startswith('32FC1') else depth * np.float32(0.001)
+        depth = factor / (depth - offset) if message.format.startswith(
+            '32FC1') else depth * np.float32(0.001)
     depth[(stored == 0) | ~np.isfinite(depth) | (depth <= 0)] = np.nan
     return depth

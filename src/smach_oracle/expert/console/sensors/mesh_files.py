@@ -1,7 +1,8 @@
-"""The mesh files that a robot description names: found on this machine, and read as meshes or not at all.
+"""The mesh files that a robot description names, found on this machine and read as meshes alone.
 
-Names come from the parameter server, never from a browser. `package://NAME/PATH` is looked for within that package;
-an absolute path (with or without file://) is read where it ends as a mesh does and is a plain file of a mesh's size.
+Names come from the parameter server, never from a browser. `package://NAME/PATH` is looked for
+within that package; an absolute path (with or without file://) is read where it ends as a mesh does
+and is a plain file of a mesh's size.
 """
 import os
 import stat
@@ -10,14 +11,14 @@ from urllib.parse import unquote
 
 import rospkg
 
-from ...geometry.meshes import MOST_BYTES, Mesh, MeshError, read_mesh
+from smach_oracle.geometry.meshes import MOST_BYTES, Mesh, MeshError, read_mesh
 
 MOST_BYTES_TOGETHER = 400000000  # of one robot's
 _KINDS = ('stl', 'obj', 'dae')
 
 
 class MeshFiles:
-    """Those of one robot; each is read once."""
+    """The mesh files of one robot; each is read once."""
 
     def __init__(self, packages: Optional[rospkg.RosPack] = None) -> None:
         """`packages`: where to look for them; None: ROS_PACKAGE_PATH."""
@@ -28,7 +29,8 @@ class MeshFiles:
     def mesh(self, name: str) -> Mesh:
         """The mesh of a file name as a URDF has it.
 
-        :raises MeshError: for a name that is not allowed, and where the file is not there or no mesh.
+        :raises MeshError: for a name that is not allowed, and where the file is not there or no
+            mesh.
         """
         path = self._path(name)
         if path not in self._read:
@@ -47,7 +49,8 @@ class MeshFiles:
 
     def _in_package(self, name: str) -> str:
         package, _, path = name.partition('/')
-        if not package or not path or '\0' in path or '..' in name.split('/') or os.path.isabs(path):
+        if not package or not path or '\0' in path or '..' in name.split('/') or os.path.isabs(
+                path):
             raise MeshError('it does not stay within a package')
         if self._packages is None:
             self._packages = rospkg.RosPack()
@@ -62,11 +65,14 @@ class MeshFiles:
             raise MeshError('it ends with .{}; readable: .{}'.format(kind[:20], ', .'.join(_KINDS)))
         try:
             with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), 'rb') as file:
-                told = os.fstat(file.fileno())
-                self._bytes += told.st_size
-                if not stat.S_ISREG(told.st_mode) or told.st_size > MOST_BYTES or self._bytes > MOST_BYTES_TOGETHER:
-                    raise MeshError('it is no plain file of at most {} bytes ({} with the others)'.format(
-                        MOST_BYTES, MOST_BYTES_TOGETHER))
+                status = os.fstat(file.fileno())
+                self._bytes += status.st_size
+                if not stat.S_ISREG(
+                        status.st_mode
+                ) or status.st_size > MOST_BYTES or self._bytes > MOST_BYTES_TOGETHER:
+                    raise MeshError(
+                        'it is no plain file of at most {} bytes ({} with the others)'.format(
+                            MOST_BYTES, MOST_BYTES_TOGETHER))
                 data = file.read(MOST_BYTES + 1)
         except OSError as err:
             raise MeshError(os.strerror(err.errno or 0)) from err

@@ -1,25 +1,26 @@
-"""A robot as a browser draws it: what it looks like, once, and where its links are, again and again. No node."""
+"""How a browser draws a robot: its geometries once, then the poses of its links. No node."""
 import hashlib
 import json
 import struct
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ...geometry.meshes import Mesh, MeshError, reduced
-from ...geometry.robot_shapes import RobotShapes, Shape, read_shapes
-from .images import Encoded
+from smach_oracle.geometry.meshes import Mesh, MeshError, reduced
+from smach_oracle.geometry.robot_shapes import RobotShapes, Shape, read_shapes
+
+from .images import BrowserFile
 from .mesh_files import MeshFiles
 
 MOST_TRIANGLES = 28000  # that a browser draws, over all links
 LEAST_TRIANGLES = 40  # of a mesh that has more
 MOST_ROUND = 300  # shapes of a robot whose cylinders and spheres are drawn round
 MOST_CORNERS = 65536  # of a geometry
-MOST_TOLD = 20  # meshes that are missing
+MOST_NAMED = 20  # meshes that are missing
 _ROUND = 16  # sides of a cylinder
 
 
-class Part(NamedTuple):
+class LinkGeometry(NamedTuple):
     """A geometry at a link."""
 
     link: str
@@ -28,11 +29,11 @@ class Part(NamedTuple):
     colour: Tuple[int, int, int]
 
 
-class RobotModel:
-    """Of one text of a robot description."""
+class RobotAppearance:
+    """The geometries and links of one robot description."""
 
     def __init__(self, urdf: str, files: Optional[MeshFiles] = None) -> None:
-        """Takes as long as its meshes take to read.
+        """Read the meshes, which takes some seconds.
 
         :raises ValueError: for text that is no URDF, or too large a one.
         """
@@ -40,19 +41,23 @@ class RobotModel:
         self.robot: RobotShapes = read_shapes(urdf)
         self.missing: List[str] = []
         self._geometries: List[Mesh] = []
-        self._parts: List[Part] = []
+        self._parts: List[LinkGeometry] = []
         self._add_all(files or MeshFiles())
         drawn = {part.link for part in self._parts}
         self.links = [link for link in self.robot.links if link in drawn]
 
     def places(self, positions: Mapping[str, float]) -> np.ndarray:
-        """(links, 12) float32: rows of the root from each of `links`, as (3, 4)."""
+        """Poses of `links` in the root: (links, 12) float32, each the rows of (3, 4)."""
         poses = self.robot.poses(positions)
         return np.array([poses[link][:3] for link in self.links], '<f4').reshape(-1, 12)
 
-    def encoded(self) -> Encoded:
-        """uint32 length of a text, that text (JSON, filled up to four bytes), then corners and triangles of each
-        geometry: (n, 3) uint16 within `offset` and `offset + scale`, and (m, 3) uint16."""
+    def encoded(self) -> BrowserFile:
+        """The appearance as one file.
+
+        uint32 length of a text, that text (JSON, filled up to four bytes), then corners and
+        triangles of each geometry: (n, 3) uint16 within `offset` and `offset + scale`, and (m, 3)
+        uint16.
+        """
         numbers = {link: index for index, link in enumerate(self.links)}
         blocks, geometries = [], []
         for mesh in self._geometries:
@@ -62,13 +67,19 @@ class RobotModel:
                        mesh.triangles.astype('<u2').tobytes()]
             geometries.append({'corners': len(mesh.corners), 'triangles': len(mesh.triangles),
                                'offset': _plain(low), 'scale': _plain(span)})
-        told = {'name': self.robot.name, 'version': self.version, 'root': self.robot.root, 'links': self.links,
-                'geometries': geometries, 'missing': self.missing[:MOST_TOLD], 'lost': len(self.missing),
-                'parts': [[numbers[part.link], part.geometry, _plain(part.place[:3].ravel()), list(part.colour)]
-                          for part in self._parts]}
-        text = json.dumps(told, allow_nan=False, separators=(',', ':')).encode()
+        header = {
+            'name': self.robot.name, 'version': self.version, 'root': self.robot.root,
+            'links': self.links, 'geometries': geometries, 'missing': self.missing[:MOST_NAMED],
+            'lost': len(self.missing), 'parts': [[
+                numbers[part.link], part.geometry,
+                _plain(part.place[:3].ravel()),
+                list(part.colour)
+            ] for part in self._parts]
+        }
+        text = json.dumps(header, allow_nan=False, separators=(',', ':')).encode()
         text += b' ' * (-len(text) % 4)
-        return Encoded('application/octet-stream', b''.join([struct.pack('<I', len(text)), text] + blocks), {})
+        return BrowserFile('application/octet-stream',
+                       b''.join([struct.pack('<I', len(text)), text] + blocks), {})
 
     def _add_all(self, files: MeshFiles) -> None:
         shapes, meshes = self._found(files)
@@ -79,16 +90,23 @@ class RobotModel:
             name = shape.mesh or round_as.get(shape.kind, shape.kind)
             if name not in known:
                 known[name] = len(self._geometries)
-                self._geometries.append(_fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[name])
+                self._geometries.append(
+                    _fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[name])
             place = shape.origin @ np.diag(list(shape.size) + [1.0])
-            self._parts.append(Part(shape.link, known[name], place, shape.colour))
+            self._parts.append(LinkGeometry(shape.link, known[name], place, shape.colour))
 
     def _found(self, files: MeshFiles) -> Tuple[List[Shape], Dict[str, Mesh]]:
-        """The shapes that can be drawn, and their meshes. Where one is missing, what its link collides with."""
+        """The shapes that can be drawn, and their meshes.
+
+        Where a mesh of a link is missing, its collision shapes are drawn in its place.
+        """
         meshes: Dict[str, Mesh] = {}
         poor = {shape.link for shape in self.robot.shapes if not self._has(shape, files, meshes)}
         shapes = [shape for shape in self.robot.shapes if not shape.mesh or shape.mesh in meshes]
-        shapes += [shape for shape in self.robot.collisions if shape.link in poor and self._has(shape, files, meshes)]
+        shapes += [
+            shape for shape in self.robot.collisions
+            if shape.link in poor and self._has(shape, files, meshes)
+        ]
         return shapes, meshes
 
     def _has(self, shape: Shape, files: MeshFiles, meshes: Dict[str, Mesh]) -> bool:
@@ -97,20 +115,20 @@ class RobotModel:
         try:
             meshes[shape.mesh] = files.mesh(shape.mesh)
         except MeshError as err:
-            told = '{}: {}'.format(shape.mesh[:200], err)
-            if told not in self.missing:
-                self.missing.append(told)
+            problem = '{}: {}'.format(shape.mesh[:200], err)
+            if problem not in self.missing:
+                self.missing.append(problem)
             return False
         return True
 
 
 def version_of(urdf: str) -> str:
-    """Tells one robot description from another."""
+    """A digest that differs between robot descriptions."""
     return hashlib.sha256(urdf.encode('utf-8', 'replace')).hexdigest()[:16]
 
 
 def _share(counts: List[int]) -> int:
-    """How many triangles each mesh may have, so that all of these, with those that have fewer, fit."""
+    """The most triangles that each mesh may have, so that all together stay within the limit."""
     left, waiting = MOST_TRIANGLES, len(counts)
     for count in sorted(counts):
         if count > left // waiting:
@@ -124,28 +142,33 @@ def _fitting(mesh: Mesh, most: int) -> Mesh:
     return found if len(found.corners) <= MOST_CORNERS else reduced(mesh, MOST_CORNERS // 3)
 
 
-def _plain(values: Any) -> List[float]:
+def _plain(values: Iterable[float]) -> List[float]:
     return [round(float(value), 6) for value in values]
 
 
 def _box() -> Mesh:
-    """Of 1 m, as all of these."""
+    """A box of 1 m; the other primitives have that size, too."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return Mesh(corners, np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
+    return Mesh(corners,
+                np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
 
 
 def _turned(profile: List[Tuple[float, float]]) -> Mesh:
     """A profile of (radius, height), turned about z."""
     angles = np.arange(_ROUND) * 2 * np.pi / _ROUND
-    rings = [np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(_ROUND, height)])
-             for radius, height in profile]
-    steps = [(ring * _ROUND + k, ring * _ROUND + (k + 1) % _ROUND) for ring in range(len(profile) - 1)
-             for k in range(_ROUND)]
+    rings = [
+        np.column_stack([radius * np.cos(angles), radius * np.sin(angles),
+                         np.full(_ROUND, height)]) for radius, height in profile
+    ]
+    steps = [(ring * _ROUND + k, ring * _ROUND + (k + 1) % _ROUND)
+             for ring in range(len(profile) - 1) for k in range(_ROUND)]
     return Mesh(np.concatenate(rings), np.array([half for a, b in steps for half in (
         (a, b, b + _ROUND), (a, b + _ROUND, a + _ROUND))]))
 
 
 _PRIMITIVES = {
     'box': _box(), 'cylinder': _turned([(0.0, -0.5), (0.5, -0.5), (0.5, 0.5), (0.0, 0.5)]),
-    'sphere': _turned([(0.5 * np.sin(angle), -0.5 * np.cos(angle)) for angle in np.linspace(0, np.pi, 9)])}
+    'sphere': _turned([(0.5 * np.sin(angle), -0.5 * np.cos(angle))
+                       for angle in np.linspace(0, np.pi, 9)])
+}

@@ -1,4 +1,4 @@
-"""A robot as a sensor: its description, its joint states and its transforms, followed while somebody looks at it."""
+"""A robot as a sensor: its description, joint states and transforms, followed while watched."""
 import json
 import threading
 import time
@@ -9,10 +9,11 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import JointState
 
-from ...geometry.transforms import from_quaternion
-from .images import Encoded
-from .robot_model import RobotModel, version_of
-from .sensors import Sensor
+from smach_oracle.geometry.transforms import from_quaternion
+
+from .images import BrowserFile
+from .robot_appearance import RobotAppearance, version_of
+from .sensor_streams import SensorSample, SensorStream
 
 DESCRIPTION = 'robot_description'
 MOST_ROBOTS = 32
@@ -22,69 +23,77 @@ MOST_JOINTS = 2000
 
 def robots_in(parameters: Sequence[str]) -> List[str]:
     """Of the parameter server's names, those of robot descriptions."""
-    return sorted(name for name in parameters if name.rsplit('/', 1)[-1] == DESCRIPTION)[:MOST_ROBOTS]
+    return sorted(name for name in parameters
+                  if name.rsplit('/', 1)[-1] == DESCRIPTION)[:MOST_ROBOTS]
 
 
-class RobotSensor(Sensor):
-    """Its frames are where the links are; what they look like is in `model`."""
+class RobotStream(SensorStream):
+    """Its samples are the poses of the links; their geometries are in `appearance`."""
 
-    def __init__(self, sensor: int, parameter: str, read: Callable[[str], Any] = rospy.get_param) -> None:
+    def __init__(self, sensor: int, parameter: str, read: Callable[[str],
+                                                                   Any] = rospy.get_param) -> None:
         """`parameter` holds the robot's description; `read` gets it."""
         super().__init__(sensor, parameter, DESCRIPTION)
         self._read = read
         self._read_s = 0.0
         self._namespace = parameter[:-len(DESCRIPTION)]
         self._urdf: Optional[str] = None
-        self._model: Optional[RobotModel] = None
-        self._model_of = ''
-        self._why_no_model = ''
-        self._model_lock = threading.Lock()
+        self._appearance: Optional[RobotAppearance] = None
+        self._appearance_of = ''
+        self._why_no_appearance = ''
+        self._appearance_lock = threading.Lock()
         self._positions: Dict[str, float] = {}
         self._positions_lock = threading.Lock()
-        self._transforms: Optional[_Transforms] = None
+        self._transforms: Optional[_RecentTransforms] = None
 
-    def model(self) -> RobotModel:
-        """What it looks like; takes some seconds for a new one.
+    def appearance(self) -> RobotAppearance:
+        """How to draw the robot; takes some seconds for a new description.
 
         :raises ValueError: where the description cannot be used; the text says why.
         """
-        with self._model_lock:
+        with self._appearance_lock:
             urdf = self._urdf
             if not isinstance(urdf, str):
                 raise ValueError('{} holds no text'.format(self.topic))
-            if version_of(urdf) != self._model_of:
-                self._model, self._why_no_model, self._model_of = None, '', version_of(urdf)
+            if version_of(urdf) != self._appearance_of:
+                self._appearance, self._why_no_appearance = None, ''
+                self._appearance_of = version_of(urdf)
                 try:
-                    self._model = RobotModel(urdf)
+                    self._appearance = RobotAppearance(urdf)
                 except ValueError as err:
-                    self._why_no_model = str(err)
-            if self._model is None:
-                raise ValueError(self._why_no_model)
-            return self._model
+                    self._why_no_appearance = str(err)
+            if self._appearance is None:
+                raise ValueError(self._why_no_appearance)
+            return self._appearance
 
     def place_of(self, frame: str, stamp: rospy.Time) -> Tuple[Optional[np.ndarray], str]:
-        """(3, 4): the robot's root link from a frame at a time; or why not."""
-        model, transforms = self._model, self._transforms
-        if model is None:
-            return None, self._why_no_model or 'The robot is not known yet.'
+        """The pose of a tf frame in the robot's root link at a time.
+
+        :returns: (3, 4) and '', or None and why it is not known.
+        """
+        appearance, transforms = self._appearance, self._transforms
+        if appearance is None:
+            return None, self._why_no_appearance or 'The robot is not known yet.'
         frame = frame.lstrip('/')
         prefix = self._namespace.strip('/') + '/'
         own = frame[len(prefix):] if len(prefix) > 1 and frame.startswith(prefix) else frame
-        root = frame[:len(frame) - len(own)] + model.robot.root
+        root = frame[:len(frame) - len(own)] + appearance.robot.root
         at = transforms.at(root, frame, stamp) if transforms is not None else None
         if at is None:
-            at = model.robot.poses(self._joints()).get(own)
+            at = appearance.robot.poses(self._joints()).get(own)
         if at is None and transforms is not None:
             at = transforms.at(root, frame, rospy.Time(0))
         if at is None:
-            return None, 'No transform from {} to {}.'.format(frame[:100] or '(no frame)', root[:100])
+            return None, 'No transform from {} to {}.'.format(frame[:100] or '(no frame)',
+                                                              root[:100])
         return at[:3], ''
 
     def take(self, message: JointState) -> None:
-        """Several nodes may tell of some of the joints each."""
+        """Take in joint states; several nodes may each publish some of the joints."""
         with self._positions_lock:
             if len(self._positions) + len(message.name) < MOST_JOINTS:
-                self._positions.update((name, value) for name, value in zip(message.name, message.position)
+                self._positions.update((name, value)
+                                       for name, value in zip(message.name, message.position)
                                        if abs(value) < 1e6)  # not NaN
         super().take(message)
 
@@ -92,11 +101,12 @@ class RobotSensor(Sensor):
         with self._positions_lock:
             return dict(self._positions)
 
-    def _begin(self) -> Any:
+    def _begin(self) -> rospy.Subscriber:
         self._read_again()
-        self._transforms = _Transforms()
-        subscriber = rospy.Subscriber(self._namespace + 'joint_states', JointState, self.take, queue_size=20)
-        super().take(JointState())  # so that it is seen though its joints be silent
+        self._transforms = _RecentTransforms()
+        subscriber = rospy.Subscriber(self._namespace + 'joint_states', JointState, self.take,
+                                      queue_size=20)
+        super().take(JointState())  # so that it is drawn though nobody publishes its joints
         return subscriber
 
     def _go_on(self) -> None:
@@ -121,14 +131,17 @@ class RobotSensor(Sensor):
         except (KeyError, rospy.ROSException, OSError) as err:
             rospy.logdebug('%s cannot be read: %s', self.topic, err)
 
-    def _made(self, frame: Any, width: int) -> Tuple[Encoded, str]:
-        model, joints = self.model(), self._joints()
-        return Encoded('application/octet-stream', model.places(joints).tobytes(), {}), json.dumps({
-            'kind': 'robot', 'model': model.version, 'root': model.robot.root, 'joints': len(joints),
-            'sequence': frame.sequence})
+    def _made(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
+        appearance, joints = self.appearance(), self._joints()
+        return BrowserFile('application/octet-stream',
+                           appearance.places(joints).tobytes(), {}), json.dumps({
+                               'kind': 'robot', 'model': appearance.version,
+                               'root': appearance.robot.root, 'joints': len(joints),
+                               'sequence': sample.sequence
+                           })
 
 
-class _Transforms:
+class _RecentTransforms:
     """The transforms of the last seconds."""
 
     def __init__(self) -> None:
@@ -142,7 +155,8 @@ class _Transforms:
         """4x4, or None where it is not known."""
         try:
             found = self._buffer.lookup_transform_core(target, source, stamp).transform
-            return from_quaternion((found.translation.x, found.translation.y, found.translation.z),
-                                   (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w))
+            return from_quaternion(
+                (found.translation.x, found.translation.y, found.translation.z),
+                (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w))
         except (tf2_ros.TransformException, ValueError):
             return None

@@ -1,80 +1,89 @@
-"""The sensors that people may look at: topics found by their types, listened to only while somebody looks.
+"""The sensors that people may watch: topics found by type, subscribed to only while watched.
 
-A browser names a sensor by the number that it was given here; whatever has no number cannot be named.
+A browser names a sensor by the number that it was given here; whatever has no number cannot be
+named.
 """
 import itertools
 import json
 import threading
 import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import rospy
 from sensor_msgs.msg import CompressedImage, Image, JointState, PointCloud2
 
 from .clouds import encode_cloud, encode_joints
-from .images import Encoded, encode_image
+from .images import BrowserFile, encode_image
 
 MOST_SENSORS = 400
 MOST_LISTENED = 16
-IDLE_S = 6.0  # after the last look
-_GONE_AFTER = 3  # looks at the master
-_TYPES: Dict[str, Tuple[str, Any, Callable[[Any, int], Encoded]]] = {
+IDLE_S = 6.0  # after the last request
+_GONE_AFTER = 3  # rounds in which the master did not know it
+SensorMessage = Union[Image, CompressedImage, PointCloud2, JointState]
+_TYPES: Dict[str, Tuple[str, type, Callable[[Any, int], BrowserFile]]] = {
     Image._type: ('image', Image, encode_image),
     CompressedImage._type: ('image', CompressedImage, encode_image),
     PointCloud2._type: ('cloud', PointCloud2, lambda message, _: encode_cloud(message)),
     JointState._type: ('joints', JointState, lambda message, _: encode_joints(message))}
-_DERIVED = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}  # by type, what they show
+# by type, what they show
+_DERIVED = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}
 
 
-class Frame(NamedTuple):
+class SensorSample(NamedTuple):
     """A message as it came."""
 
     sequence: int  # of its sensor, from 1
-    message: Any
+    message: SensorMessage
     came_s: float  # monotonic
 
 
-class Sensor:
-    """One topic. It holds the newest message only."""
+class SensorStream:
+    """One topic, of which the newest message is held."""
 
     def __init__(self, sensor: int, topic: str, kind: str) -> None:
-        """`kind` is one of the types that can be shown, such as sensor_msgs/Image, or that of a derived one."""
+        """`kind`: a type that can be shown, such as sensor_msgs/Image, or a derived one."""
         self.number = sensor
         self.topic = topic
         self.type = kind
         self.kind = _DERIVED[kind] if kind in _DERIVED else _TYPES[kind][0]
         self._asked_s = -IDLE_S
         self._sequence = itertools.count(1)
-        self._frame: Optional[Frame] = None
+        self._sample: Optional[SensorSample] = None
         self._subscriber: Optional[rospy.Subscriber] = None
         self._lock = threading.Lock()
-        self._encoded: Dict[Tuple[int, int], Tuple[Encoded, str]] = {}
+        self._encoded: Dict[Tuple[int, int], Tuple[BrowserFile, str]] = {}
 
     @property
     def listened(self) -> bool:
         """Whether it is subscribed to."""
         return self._subscriber is not None
 
-    def newer(self, than: int) -> Optional[Frame]:
-        """The newest frame, where it is another one than the one that was seen last; keeps listening going."""
+    def newer(self, than: int) -> Optional[SensorSample]:
+        """The newest sample, None where it is number `than`; keeps the subscription alive."""
         self._asked_s = time.monotonic()
-        frame = self._frame
-        return frame if frame is not None and frame.sequence != than else None
+        sample = self._sample
+        return sample if sample is not None and sample.sequence != than else None
 
-    def file_of(self, frame: Frame, width: int) -> Tuple[Encoded, str]:
-        """The frame as a browser gets it, and its facts as JSON; several browsers share the work.
+    def file_of(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
+        """A sample as a browser gets it, and its facts as JSON; several browsers share the work.
 
         :raises ValueError: for a message that cannot be shown; the text says why.
         """
         with self._lock:
-            key = (frame.sequence, width)
+            key = (sample.sequence, width)
             if key not in self._encoded:
-                self._encoded = {known: found for known, found in self._encoded.items() if known[0] == frame.sequence}
-                self._encoded[key] = self._made(frame, width)
+                self._encoded = {
+                    known: found
+                    for known, found in self._encoded.items() if known[0] == sample.sequence
+                }
+                self._encoded[key] = self._made(sample, width)
             return self._encoded[key]
 
     def tend(self, may_listen: bool) -> None:
-        """Begin to listen where somebody looks, stop where nobody does. One thread calls it; a master may hang it."""
+        """Subscribe while somebody watches, unsubscribe when nobody does.
+
+        One thread calls it; a master may hang it.
+        """
         wanted = time.monotonic() - self._asked_s < IDLE_S
         if self._subscriber is None:
             if wanted and may_listen:
@@ -84,61 +93,63 @@ class Sensor:
         else:
             self._end()
 
-    def take(self, message: Any) -> None:
-        """A message has come."""
-        self._frame = Frame(next(self._sequence), message, time.monotonic())
+    def take(self, message: SensorMessage) -> None:
+        """Take in a message."""
+        self._sample = SensorSample(next(self._sequence), message, time.monotonic())
 
     def _begin(self) -> rospy.Subscriber:
-        return rospy.Subscriber(self.topic, _TYPES[self.type][1], self.take, queue_size=1, buff_size=1 << 24)
+        return rospy.Subscriber(self.topic, _TYPES[self.type][1], self.take, queue_size=1,
+                                buff_size=1 << 24)
 
     def _go_on(self) -> None:
-        """It is looked at still."""
+        """Called while it is watched."""
 
     def _end(self) -> None:
         if self._subscriber is not None:
             self._subscriber.unregister()
-        self._subscriber, self._frame, self._encoded = None, None, {}
+        self._subscriber, self._sample, self._encoded = None, None, {}
 
-    def _encoded_of(self, message: Any, width: int) -> Encoded:
+    def _encoded_of(self, message: SensorMessage, width: int) -> BrowserFile:
         return _TYPES[self.type][2](message, width)
 
-    def _made(self, frame: Frame, width: int) -> Tuple[Encoded, str]:
-        encoded = self._encoded_of(frame.message, width)
-        header = frame.message.header
-        facts = dict(encoded.facts, sequence=frame.sequence, frame=header.frame_id[:200],
+    def _made(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
+        encoded = self._encoded_of(sample.message, width)
+        header = sample.message.header
+        facts = dict(encoded.facts, sequence=sample.sequence, frame=header.frame_id[:200],
                      stamp='{}.{:09d}'.format(header.stamp.secs, header.stamp.nsecs))
         if encoded.content_type == 'application/json':
             return encoded._replace(body=json.dumps(facts, allow_nan=False).encode()), ''
         return encoded, json.dumps(facts, allow_nan=False)
 
 
-class Derived(NamedTuple):
-    """Something to look at that is more than a topic."""
+class DerivedStream(NamedTuple):
+    """A stream that is more than a topic."""
 
     topic: str  # its name
     type: str
-    make: Callable[[int], Sensor]  # from its number
+    make: Callable[[int], SensorStream]  # from its number
 
 
-class Sensors:
-    """The closed set."""
+class SensorStreams:
+    """The closed set of sensors."""
 
     def __init__(self) -> None:
-        self._by_number: Dict[int, Sensor] = {}
+        self._by_number: Dict[int, SensorStream] = {}
         self._unseen: Dict[int, int] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
 
-    def find(self, sensor: int) -> Optional[Sensor]:
+    def find(self, sensor: int) -> Optional[SensorStream]:
         """A sensor by its number; None where it has never been given."""
         return self._by_number.get(sensor)
 
-    def on(self, topic: str) -> Optional[Sensor]:
+    def on(self, topic: str) -> Optional[SensorStream]:
         """A sensor by its topic, for the server's own use."""
         return next((each for each in self._all() if each.topic == topic), None)
 
-    def follow(self, published: Sequence[Sequence[str]], derived: Sequence[Derived] = ()) -> None:
-        """Take in what the master knows: topics and their types, and what was derived from them."""
+    def follow(self, published: Sequence[Sequence[str]],
+               derived: Sequence[DerivedStream] = ()) -> None:
+        """Take in the topics and types that the master knows, and the streams derived from them."""
         makers = {(each.topic, each.type): each.make for each in derived}
         seen = {(topic, kind) for topic, kind in published if kind in _TYPES} | set(makers)
         with self._lock:
@@ -150,10 +161,11 @@ class Sensors:
             for topic, kind in sorted(seen - set(known))[:MOST_SENSORS - len(self._by_number)]:
                 number = next(self._numbers)
                 make = makers.get((topic, kind))
-                self._by_number[number] = make(number) if make else Sensor(number, topic, kind)
+                self._by_number[number] = make(number) if make else SensorStream(
+                    number, topic, kind)
 
     def tend(self) -> None:
-        """Begin and stop to listen; to be called often, by one thread."""
+        """Subscribe and unsubscribe as needed; to be called often, by one thread."""
         for sensor in self._all():
             listened = sum(each.listened for each in self._all())
             sensor.tend(listened < MOST_LISTENED)
@@ -163,6 +175,6 @@ class Sensors:
         return [{'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}
                 for each in sorted(self._all(), key=lambda sensor: (sensor.topic, sensor.number))]
 
-    def _all(self) -> List[Sensor]:
+    def _all(self) -> List[SensorStream]:
         with self._lock:
             return list(self._by_number.values())

@@ -1,32 +1,44 @@
-"""The trials that a console has heard of: their events, their counts, and what has helped. Thread-safe, bounded."""
+"""Trials heard of live: their events, their counts, and which recoveries helped.
+
+Thread-safe, bounded.
+"""
 import threading
 from collections import OrderedDict
 from typing import Any, Dict, List, NamedTuple, Tuple
 
-from ...oracle.events import Event, EventKind
-from ...oracle.naming import FailingNames
-from .helped import HelpScores, Score
-from .tally import Tally, table
-from .views import event_view
+from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
+from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.settings.failing_outcomes import FailingNames
+
+from ..feeds.views import event_view
+from .counts_table import counts_table, has_oracle
+from .recovery_statistics import RecoveryCounts, RecoveryStatistics
 
 MOST_TRIALS = 1000
-MOST_DETAILED = 60  # of so many trials the events are kept, of the others the counts; those that run come first
+# of so many trials the events are kept, of the others the counts; those that run come first
+MOST_DETAILED = 60
 MOST_EVENTS = 4000  # of a trial: the first ones
 SHOWN_TRIALS = 300
 _FAILING = FailingNames()
 
 
-class _Trial:
+class _LoggedTrial:
     """One trial."""
 
-    def __init__(self, robot: str, first: Event) -> None:
+    def __init__(self, robot: str) -> None:
         self.robot = robot
-        self.tally = Tally(first)
+        self.robot_gone = False
+        self.counts = TrialCounter()
         self.events: List[Dict[str, Any]] = []
         self.detailed = True  # whether the events are kept
 
+    @property
+    def ended(self) -> bool:
+        """Whether its end was heard."""
+        return self.counts.ending is not TrialEnding.UNFINISHED
 
-class Slice(NamedTuple):
+
+class EventSlice(NamedTuple):
     """Events of a trial from some position on."""
 
     start: int
@@ -38,8 +50,8 @@ class TrialLog:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._trials: 'OrderedDict[str, _Trial]' = OrderedDict()
-        self._helped = HelpScores()
+        self._trials: 'OrderedDict[str, _LoggedTrial]' = OrderedDict()
+        self._recoveries = RecoveryStatistics()
 
     def add(self, robot: str, event: Event) -> None:
         """Take in one event of a robot."""
@@ -47,52 +59,66 @@ class TrialLog:
         with self._lock:
             trial = self._trials.get(event.trial_id)
             if trial is None:
-                trial = self._trials[event.trial_id] = _Trial(robot, event)
+                trial = self._trials[event.trial_id] = _LoggedTrial(robot)
                 self._forget()
-            trial.tally.add(event)
+            trial.counts.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
                 trial.events.append(event_view(event))
-            self._helped.add(robot, event, ended and (not event.outcome or event.outcome in _FAILING
-                                                      or event.outcome.lower() == 'preempted'))
+            self._recoveries.add(
+                robot, event, ended and (not event.outcome or event.outcome in _FAILING
+                                         or event.outcome.lower() == 'preempted'))
 
     def end_missing(self, robot: str) -> None:
         """A robot is gone: what still ran there has ended without a word."""
         with self._lock:
             for trial in self._trials.values():
-                if trial.robot == robot and not trial.tally.ending:
-                    trial.tally.outcome = 'the robot is gone'
+                if trial.robot == robot and not trial.ended:
+                    trial.robot_gone = True
 
     def overview(self) -> Dict[str, Any]:
         """The table of counts and the latest trials, newest first, as plain data."""
         with self._lock:
-            trials = [_row(trial_id, trial) for trial_id, trial in list(self._trials.items())[-SHOWN_TRIALS:]]
-            return {'table': table(trial.tally for trial in self._trials.values()), 'trials': trials[::-1],
-                    'heard': len(self._trials)}
+            trials = [
+                _row(trial_id, trial)
+                for trial_id, trial in list(self._trials.items())[-SHOWN_TRIALS:]
+            ]
+            return {
+                'table': counts_table(trial.counts for trial in self._trials.values()),
+                'trials': trials[::-1], 'heard': len(self._trials)
+            }
 
-    def events(self, trial_id: str, start: int) -> Slice:
+    def events(self, trial_id: str, start: int) -> EventSlice:
         """The events of a trial from a position on; none where it is not known."""
         with self._lock:
             trial = self._trials.get(trial_id)
-            return Slice(start, trial.events[start:] if trial else [])
+            return EventSlice(start, trial.events[start:] if trial else [])
 
-    def score(self, place: Tuple[str, str, str], target: str) -> Score:
-        """How often going to `target` has helped when the state of `place` (robot, path, label) had failed."""
+    def recovery_counts(self, place: Tuple[str, str, str], target: str) -> RecoveryCounts:
+        """How often going to `target` helped after a failure.
+
+        :param place: robot, path and label of the state that failed.
+        """
         with self._lock:
-            return self._helped.score(place, target)
+            return self._recoveries.recovery_counts(place, target)
 
     def _forget(self) -> None:
         while len(self._trials) > MOST_TRIALS:
             self._trials.popitem(last=False)
         detailed = [trial for trial in self._trials.values() if trial.detailed]
         if len(detailed) > MOST_DETAILED:
-            over = next((trial for trial in detailed if trial.tally.ending), detailed[0])
+            over = next((trial for trial in detailed if trial.ended), detailed[0])
             over.detailed = False
             over.events.clear()
 
 
-def _row(trial_id: str, trial: _Trial) -> Dict[str, Any]:
-    tally = trial.tally
-    return {'id': trial_id, 'robot': trial.robot, 'experiment': tally.experiment, 'start': tally.start_s,
-            'end': tally.end_s, 'ending': tally.ending, 'outcome': tally.outcome, 'oracle': tally.recovers,
-            'failures': tally.failures, 'recoveries': tally.recoveries, 'questions': tally.questions,
-            'answered': tally.answered, 'lost': tally.lost, 'detailed': trial.detailed}
+def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
+    counts = trial.counts
+    outcome = 'the robot is gone' if trial.robot_gone and not trial.ended else counts.outcome
+    return {
+        'id': trial_id, 'robot': trial.robot, 'experiment': counts.experiment,
+        'start': counts.start_time, 'end': counts.start_time + counts.duration_s,
+        'ending': counts.ending.value if trial.ended else '', 'outcome': outcome,
+        'oracle': has_oracle(counts), 'failures': counts.failures,
+        'recoveries': counts.recoveries, 'questions': counts.questions,
+        'answered': counts.answered, 'lost': counts.lost_events, 'detailed': trial.detailed
+    }

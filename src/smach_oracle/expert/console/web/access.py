@@ -1,4 +1,4 @@
-"""Who may do what: roles, tokens, the hosts and origins that are answered, limits on rates. No Tornado, no ROS."""
+"""Who may do what: roles, tokens, hosts and origins that are answered, limits on rates. Pure."""
 import hashlib
 import hmac
 import ipaddress
@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Callable, Iterable, List, NamedTuple, Optional
 from urllib.parse import urlsplit
 
-from ...oracle.errors import ConfigError
-from ...oracle.paths import path_of
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.paths import path_of
 
 ROLES = ('viewer', 'operator', 'teleoperator')  # each may do what those before it may
 SHORTEST_TOKEN = 20  # characters
@@ -20,23 +20,26 @@ MOST_KEYS = 1000
 
 
 class Identity(NamedTuple):
-    """Who a browser speaks for."""
+    """Role and name of the person at a browser."""
 
     role: str
     name: str = ''  # '' where the person may choose
 
 
-class _Entry(NamedTuple):
+class _AccessToken(NamedTuple):
     digest: bytes
     identity: Identity
 
 
-class TokenBook:
-    """The tokens of a file: one a line, `ROLE TOKEN [NAME]`; `#` begins a comment. Kept as digests only."""
+class AccessTokens:
+    """The tokens of a file, kept as digests only.
+
+    One a line, `ROLE TOKEN [NAME]`; `#` begins a comment.
+    """
 
     def __init__(self, text: str, where: str) -> None:
-        """:raises ConfigError: naming file and line of what is no such entry."""
-        self._entries: List[_Entry] = []
+        """:raises SettingsError: naming file and line of what is no such entry."""
+        self._entries: List[_AccessToken] = []
         key = hashlib.sha256(b'smach_oracle console cookie')
         for number, line in enumerate(text.splitlines(), 1):
             words = line.split('#')[0].split(None, 2)
@@ -44,8 +47,9 @@ class TokenBook:
                 self._entries.append(_entry(words, '{} line {}'.format(where, number)))
                 key.update(self._entries[-1].digest)
         if not self._entries:
-            raise ConfigError(where, 'no token', 'at least one line: ROLE TOKEN [NAME]')
-        self.cookie_secret = key.hexdigest()  # another set of tokens ends all sessions; a restart ends none
+            raise SettingsError(where, 'no token', 'at least one line: ROLE TOKEN [NAME]')
+        # another set of tokens ends all sessions; a restart ends none
+        self.cookie_secret = key.hexdigest()
 
     def identify(self, token: str) -> Optional[Identity]:
         """Whose token this is; takes the same time for every wrong one."""
@@ -57,10 +61,13 @@ class TokenBook:
         return found
 
 
-def load_tokens(path: str) -> TokenBook:
-    """The token file; made with one fresh token a role, readable by its owner alone, where it is not there.
+def load_tokens(path: str) -> AccessTokens:
+    """The tokens of a file, which is made where it is missing.
 
-    :raises ConfigError: where others may read it, it cannot be read or made, or holds something else.
+    A new file has one fresh token a role, readable by its owner alone.
+
+    :raises SettingsError: where others may read it, it cannot be read or made, or holds something
+        else.
     """
     file = Path(path_of(path))
     try:
@@ -69,18 +76,23 @@ def load_tokens(path: str) -> TokenBook:
         mode = file.stat().st_mode
         text = file.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as err:
-        raise ConfigError('~token_file', path, 'a file that can be read or made ({})'.format(err)) from err
+        raise SettingsError('~token_file', path,
+                          'a file that can be read or made ({})'.format(err)) from err
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise ConfigError('~token_file', path, 'a file that its owner alone may read: chmod 600 {}'.format(path))
-    return TokenBook(text, str(file))
+        raise SettingsError('~token_file', path,
+                          'a file that its owner alone may read: chmod 600 {}'.format(path))
+    return AccessTokens(text, str(file))
 
 
-class Hosts:
-    """The names by which this console may be called. A page elsewhere whose name is made to lead here (DNS rebinding)
-    sends its own name, and is refused."""
+class AllowedHosts:
+    """The names by which this console may be called.
+
+    A page elsewhere whose name is made to lead here (DNS rebinding) sends its own name, and is
+    refused.
+    """
 
     def __init__(self, names: Iterable[str], addresses: bool) -> None:
-        """`addresses`: bare IP addresses are fine, too; no name has to be resolved for them."""
+        """`addresses`: IP addresses are allowed, too; they need no name to be resolved."""
         self._names = {name.lower().rstrip('.') for name in names} | {'localhost'}
         self._addresses = addresses
 
@@ -89,7 +101,8 @@ class Hosts:
         try:
             parts = urlsplit('//' + host)
             name = parts.hostname or ''
-            if parts.netloc != host or '@' in host or (parts.port or 1) < 1:  # the port raises where it is no number
+            # the port raises where it is no number
+            if parts.netloc != host or '@' in host or (parts.port or 1) < 1:
                 return False
         except ValueError:
             return False
@@ -106,10 +119,11 @@ class Hosts:
         return self.allows(host) and origin.lower() == '{}://{}'.format(scheme, host).lower()
 
 
-class Bucket:
+class RateLimit:
     """Lets `burst` events pass at once, and `rate` a second in the long run."""
 
-    def __init__(self, rate: float, burst: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, rate: float, burst: float, clock: Callable[[],
+                                                                  float] = time.monotonic) -> None:
         self._rate = rate
         self._burst = burst
         self._clock = clock
@@ -127,15 +141,15 @@ class Bucket:
         return True
 
 
-class Buckets:
-    """One bucket a client, for as many clients as are remembered, and one for all of them together."""
+class ClientRateLimits:
+    """One limit a client, for as many clients as are remembered, and one for all together."""
 
     def __init__(self, rate: float, burst: float, for_all: float,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """`for_all`: how many times one client's share all clients together may have."""
-        self._make = lambda factor: Bucket(rate * factor, burst * factor, clock)
+        self._make = lambda factor: RateLimit(rate * factor, burst * factor, clock)
         self._all = self._make(for_all)
-        self._by_key: 'OrderedDict[str, Bucket]' = OrderedDict()
+        self._by_key: 'OrderedDict[str, RateLimit]' = OrderedDict()
 
     def take(self, key: str) -> bool:
         """Whether one more of this client may pass now."""
@@ -144,6 +158,14 @@ class Buckets:
             if len(self._by_key) > MOST_KEYS:
                 self._by_key.popitem(last=False)
         return self._by_key[key].take() and self._all.take()
+
+
+class SocketRateLimits(NamedTuple):
+    """The limits of one socket."""
+
+    commands: RateLimit
+    driving: RateLimit  # commands of a page that drives
+    unruly: RateLimit  # how often the others may be exceeded before the socket is closed
 
 
 def may(role: str, needed: str) -> bool:
@@ -161,13 +183,15 @@ def is_loopback(address: str) -> bool:
         return False
 
 
-def _entry(words: List[str], where: str) -> _Entry:
+def _entry(words: List[str], where: str) -> _AccessToken:
     if words[0] not in ROLES:
-        raise ConfigError(where, words[0], ', '.join(ROLES) + ' in front of the token')
+        raise SettingsError(where, words[0], ', '.join(ROLES) + ' in front of the token')
     if len(words) < 2 or len(words[1]) < SHORTEST_TOKEN:
-        raise ConfigError(where, 'a token of {} characters'.format(len(words[1]) if len(words) > 1 else 0),
+        raise SettingsError(where,
+                          'a token of {} characters'.format(len(words[1]) if len(words) > 1 else 0),
                           '{} or more'.format(SHORTEST_TOKEN))
-    return _Entry(_digest(words[1]), Identity(words[0], words[2].strip() if len(words) > 2 else ''))
+    return _AccessToken(_digest(words[1]),
+                        Identity(words[0], words[2].strip() if len(words) > 2 else ''))
 
 
 def _digest(token: str) -> bytes:

@@ -1,22 +1,25 @@
-"""What the pages show, in named sections: each is sent whole, when it has changed, its newest version only. Pure."""
+"""The content of the pages, in named sections. Pure.
+
+A section is sent whole when it has changed, its newest version only.
+"""
 import json
 import threading
 from typing import Any, Dict, List, NamedTuple, Tuple
 
-_MOST_GONE = 2000  # that are remembered, for pages that have not been told yet
+_MOST_GONE = 2000  # that are remembered, for pages that do not know yet
 
 
-class _Section(NamedTuple):
+class _PageSection(NamedTuple):
     version: int
     text: str  # JSON; 'null' for one that is gone
 
 
-class Sections:
+class PageSections:
     """Written by any thread, read by the one that serves the pages."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._sections: Dict[str, _Section] = {}
+        self._sections: Dict[str, _PageSection] = {}
         self._version = 0
 
     @property
@@ -24,7 +27,7 @@ class Sections:
         """Grows with every change."""
         return self._version
 
-    def put(self, name: str, data: Any) -> None:
+    def put(self, name: str, data: object) -> None:
         """Set a section to plain data without NaN; None takes it away."""
         text = json.dumps(data, allow_nan=False, separators=(',', ':'))
         with self._lock:
@@ -32,7 +35,7 @@ class Sections:
             if text == (old.text if old else 'null'):
                 return
             self._version += 1
-            self._sections[name] = _Section(self._version, text)
+            self._sections[name] = _PageSection(self._version, text)
             if text == 'null':
                 self._forget_gone()
 
@@ -42,15 +45,19 @@ class Sections:
         return json.loads(section.text) if section else None
 
     def since(self, version: int) -> Tuple[int, List[Tuple[str, str]]]:
-        """The version now, and name and JSON of every section that has changed since an earlier one (first: 0)."""
+        """The version now, and the sections that have changed since an earlier one (first: 0).
+
+        :returns: each section's name and JSON.
+        """
         with self._lock:
-            changed = [(name, section.text) for name, section in self._sections.items() if section.version > version
-                       and (version or section.text != 'null')]
+            changed = [(name, section.text) for name, section in self._sections.items()
+                       if section.version > version and (version or section.text != 'null')]
             return self._version, changed
 
     def _forget_gone(self) -> None:
-        """Of very many that are gone, such as those of anonymous nodes; with the lock held."""
+        """Forget some of very many that are gone; with the lock held."""
         gone = [name for name, section in self._sections.items() if section.text == 'null']
         if len(gone) > _MOST_GONE:
-            for name in sorted(gone, key=lambda each: self._sections[each].version)[:_MOST_GONE // 2]:
+            for name in sorted(gone,
+                               key=lambda each: self._sections[each].version)[:_MOST_GONE // 2]:
                 del self._sections[name]

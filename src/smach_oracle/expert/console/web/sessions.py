@@ -1,4 +1,4 @@
-"""Sessions of browsers: a signed cookie, and a token against forged requests that follows from it. No Tornado."""
+"""Sessions of browsers: a signed cookie, and a token against forged requests. Pure."""
 import hashlib
 import hmac
 import json
@@ -12,8 +12,8 @@ from .access import ROLES, Identity
 HOURS = 12  # then a session ends
 
 
-class Session(NamedTuple):
-    """What the cookie says."""
+class BrowserSession(NamedTuple):
+    """The content of the cookie."""
 
     id: str
     began_s: float  # since the epoch, as it outlives the server
@@ -31,33 +31,37 @@ class Session(NamedTuple):
         return self.began_s + 3600.0 * HOURS - time.time()
 
 
-def new_session(identity: Optional[Identity] = None) -> Session:
-    """A session with an id of its own; also at signing in, so that nobody is given somebody else's."""
-    return Session(secrets.token_urlsafe(18), time.time(), *(identity or Identity('')))
+def new_session(identity: Optional[Identity] = None) -> BrowserSession:
+    """A session with an id of its own.
+
+    Also at signing in, so that nobody is given somebody else's.
+    """
+    return BrowserSession(secrets.token_urlsafe(18), time.time(), *(identity or Identity('')))
 
 
-def to_text(session: Session) -> str:
+def to_text(session: BrowserSession) -> str:
     """For the cookie, which is signed by others."""
     return json.dumps(list(session))
 
 
-def from_text(text: Optional[bytes]) -> Optional[Session]:
-    """What `to_text` has written; None for anything else."""
+def from_text(text: Optional[bytes]) -> Optional[BrowserSession]:
+    """The session that `to_text` has written; None for any other text."""
     try:
         values = json.loads(text or b'null')
     except ValueError:
         return None
     if not isinstance(values, list) or [type(value) for value in values] != [str, float, str, str]:
         return None
-    session = Session(*values)
+    session = BrowserSession(*values)
     return session if math.isfinite(session.began_s) and session.role in ROLES + ('',) else None
 
 
-def xsrf_token(session: Session, secret: str) -> str:
-    """What a page of ours knows and a page elsewhere does not."""
+def xsrf_token(session: BrowserSession, secret: str) -> str:
+    """The token that a page of ours knows and a page elsewhere does not."""
     return hmac.new(secret.encode(), b'xsrf ' + session.id.encode(), hashlib.sha256).hexdigest()
 
 
 def same(one: str, other: str) -> bool:
     """Compare in constant time."""
-    return hmac.compare_digest(one.encode('utf-8', 'backslashreplace'), other.encode('utf-8', 'backslashreplace'))
+    return hmac.compare_digest(one.encode('utf-8', 'backslashreplace'),
+                               other.encode('utf-8', 'backslashreplace'))

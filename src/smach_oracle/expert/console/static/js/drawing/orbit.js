@@ -1,62 +1,123 @@
-// Looking at something from all sides: one finger or the left button turns, two or the right one move, the wheel or a
-// pinch zooms; arrow keys turn, + and - zoom.
+// @ts-check
+// Looking at something from all sides: one finger or the left button turns, two or the right one
+// move, the wheel or a pinch zooms; arrow keys turn, + and - zoom.
+import { vector } from './transforms.js';
+
+/** @typedef {import('./types').Looks} Looks */
+/** @typedef {import('./types').Vector} Vector */
+/** @typedef {import('./types').View} View */
 
 const FOCAL = 1.1; // of the height
 const FURTHEST = 200; // m
 const CLOSEST = 0.05;
+const STEEPEST = 1.55; // rad
+const TURN = 0.008; // rad for 1 px
+/** @type {{ [key: string]: [number, number] | undefined }} */
+const STEPS = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
 
 export class Orbit {
-  // `changed()` is called when there is something new to see.
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {() => void} changed there is something new to see
+   */
   constructor(canvas, changed) {
-    Object.assign(this, { canvas, changed, centre: [0, 0, 0], distance: 3, azimuth: -0.5, elevation: 0.45, optical: false });
+    this.canvas = canvas;
+    this.changed = changed;
+    /** @type {Vector} */
+    this.centre = [0, 0, 0];
+    this.distance = 3;
+    this.azimuth = -0.5;
+    this.elevation = 0.45;
+    this.optical = false;
+    /** @type {Map<number, PointerEvent>} */
     this.pointers = new Map();
-    for (const [name, handler] of [['pointerdown', 'down'], ['pointermove', 'move'], ['pointerup', 'up'], ['pointercancel', 'up'], ['wheel', 'wheel'], ['keydown', 'key']]) {
-      canvas.addEventListener(name, (event) => this[handler](event), { passive: false });
-    }
+    const active = { passive: false };
+    canvas.addEventListener('pointerdown', (event) => this.down(event), active);
+    canvas.addEventListener('pointermove', (event) => this.move(event), active);
+    canvas.addEventListener('pointerup', (event) => this.up(event), active);
+    canvas.addEventListener('pointercancel', (event) => this.up(event), active);
+    canvas.addEventListener('wheel', (event) => this.wheel(event), active);
+    canvas.addEventListener('keydown', (event) => this.key(event), active);
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   }
 
-  // `optical`: the frame has z ahead and y down, as cameras do; others have z up.
-  look(centre, distance, { azimuth = -0.5, elevation = 0.45, optical = false } = {}) {
-    Object.assign(this, { centre, distance: Math.min(FURTHEST, Math.max(CLOSEST, distance)), azimuth, elevation, optical });
+  /**
+   * @param {Vector} centre
+   * @param {number} distance m
+   * @param {Looks} looks
+   */
+  look(centre, distance, { azimuth = -0.5, elevation = 0.45, optical = false }) {
+    this.centre = centre;
+    this.distance = bounded(CLOSEST, distance, FURTHEST);
+    this.azimuth = azimuth;
+    this.elevation = elevation;
+    this.optical = optical;
     this.changed();
   }
 
-  // Rows: right, down and ahead on the screen, in the frame of what is seen.
+  /**
+   * Right, down and ahead on the screen, in the frame of what is seen.
+   * @returns {[Vector, Vector, Vector]}
+   */
   axes() {
-    const [ca, sa, ce, se] = [Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation)];
-    const level = [[sa, -ca, 0], [ca * -se, sa * -se, -ce], [ca * ce, sa * ce, -se]];
-    return this.optical ? level.map(([x, y, z]) => [-y, -z, x]) : level;
+    const [ca, sa] = [Math.cos(this.azimuth), Math.sin(this.azimuth)];
+    const [ce, se] = [Math.cos(this.elevation), Math.sin(this.elevation)];
+    /**
+     * @param {Vector} axis
+     * @returns {Vector}
+     */
+    const own = ([x, y, z]) => (this.optical ? [-y, -z, x] : [x, y, z]);
+    return [own([sa, -ca, 0]), own([ca * -se, sa * -se, -ce]), own([ca * ce, sa * ce, -se])];
   }
 
+  /**
+   * @param {number} width px
+   * @param {number} height px
+   * @returns {View}
+   */
   view(width, height) {
     const [right, down, ahead] = this.axes();
-    return { right, down, ahead, centre: this.centre, distance: this.distance, focal: FOCAL * Math.min(height, 1.3 * width), width, height };
+    const focal = FOCAL * Math.min(height, 1.3 * width);
+    const { centre, distance } = this;
+    return { right, down, ahead, centre, distance, focal, width, height };
   }
 
+  /**
+   * @param {number} dx px
+   * @param {number} dy px
+   */
   turn(dx, dy) {
-    this.azimuth -= dx * 0.008;
-    this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation + dy * 0.008));
+    this.azimuth -= dx * TURN;
+    this.elevation = bounded(-STEEPEST, this.elevation + dy * TURN, STEEPEST);
     this.changed();
   }
 
+  /**
+   * @param {number} dx px
+   * @param {number} dy px
+   */
   shift(dx, dy) {
     const [right, down] = this.axes();
-    const step = this.distance / this.view(this.canvas.clientWidth, this.canvas.clientHeight).focal;
-    this.centre = this.centre.map((each, axis) => each - step * (dx * right[axis] + dy * down[axis]));
+    const { clientWidth, clientHeight } = this.canvas;
+    const step = this.distance / this.view(clientWidth, clientHeight).focal;
+    const { centre } = this;
+    this.centre = vector((axis) => centre[axis] - step * (dx * right[axis] + dy * down[axis]));
     this.changed();
   }
 
+  /** @param {number} factor of the distance */
   zoom(factor) {
-    this.distance = Math.min(FURTHEST, Math.max(CLOSEST, this.distance * factor));
+    this.distance = bounded(CLOSEST, this.distance * factor, FURTHEST);
     this.changed();
   }
 
+  /** @param {PointerEvent} event */
   down(event) {
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, event);
   }
 
+  /** @param {PointerEvent} event */
   move(event) {
     const before = this.pointers.get(event.pointerId);
     if (!before) return;
@@ -64,13 +125,13 @@ export class Orbit {
     const other = [...this.pointers.values()].find((each) => each.pointerId !== event.pointerId);
     this.pointers.set(event.pointerId, event);
     if (other) {
-      const span = (each) => Math.hypot(each.clientX - other.clientX, each.clientY - other.clientY) || 1;
-      this.zoom(span(before) / span(event));
+      this.zoom(span(before, other) / span(event, other));
       this.shift(dx / 2, dy / 2);
     } else if (event.buttons & 6 || event.shiftKey) this.shift(dx, dy);
     else this.turn(dx, dy);
   }
 
+  /** @param {PointerEvent} event */
   up(event) {
     this.pointers.delete(event.pointerId);
     this.changed();
@@ -78,17 +139,35 @@ export class Orbit {
 
   get moving() { return this.pointers.size > 0; }
 
+  /** @param {WheelEvent} event */
   wheel(event) {
     event.preventDefault();
     this.zoom(Math.exp(event.deltaY * 0.0012));
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
-    const step = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] }[event.key];
+    const step = STEPS[event.key];
     if (!step && !'+-'.includes(event.key)) return;
     event.preventDefault();
     event.stopPropagation();
     if (step) this.turn(...step);
     else this.zoom(event.key === '+' ? 0.85 : 1.18);
   }
+}
+
+/**
+ * @param {number} least
+ * @param {number} value
+ * @param {number} most
+ */
+function bounded(least, value, most) { return Math.min(most, Math.max(least, value)); }
+
+/**
+ * px between two fingers.
+ * @param {PointerEvent} one
+ * @param {PointerEvent} other
+ */
+function span(one, other) {
+  return Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY) || 1;
 }

@@ -1,20 +1,37 @@
+// @ts-check
 // A scene in 3D to be turned round: layers on a canvas.
-import { h, setText } from './dom.js';
+import { h, setText } from '../page/dom.js';
 import { Orbit } from './orbit.js';
 import { Raster } from './raster.js';
+import { boxAround, diagonalOf, middleOf } from './transforms.js';
 
-const QUICK_MS = 30; // a picture that is drawn so quickly is drawn with twice the pixels, to be smooth
+/** @typedef {import('./types').Box} Box */
+/** @typedef {import('./types').Colour} Colour */
+/** @typedef {import('./types').Layer} Layer */
+/** @typedef {import('./types').Looks} Looks */
+
+const QUICK_MS = 30; // a scene drawn so quickly is drawn with twice the pixels, to be smooth
 const SLOW_MS = 110;
 
 export class SceneView {
+  /**
+   * @param {string} label
+   * @param {() => void} onHome the usual view is wanted
+   */
   constructor(label, onHome) {
-    this.canvas = h('canvas', { class: 'cloud', tabindex: 0, role: 'img', 'aria-label': label + '; drag to turn, arrow keys too' });
+    this.canvas = h('canvas', { class: 'cloud', tabindex: 0, role: 'img',
+      'aria-label': label + '; drag to turn, arrow keys too' });
     this.note = h('p', { class: 'view-note', role: 'status' });
-    this.buttons = h('div', { class: 'view-buttons' }, h('button', { class: 'tool view-home', onclick: onHome }, 'Reset view'));
+    this.buttons = h('div', { class: 'view-buttons' },
+      h('button', { class: 'tool view-home', onclick: onHome }, 'Reset view'));
     this.root = h('div', { class: 'screen scene' }, this.canvas, this.note, this.buttons);
+    /** @type {Layer[]} */
     this.layers = [];
     this.raster = new Raster();
-    this.fine = 1;
+    this.fine = 1; // px of the canvas for one px of the page
+    this.slow = false;
+    this.scheduled = 0;
+    this.tookMs = NaN;
     this.orbit = new Orbit(this.canvas, () => this.schedule());
     this.resized = new ResizeObserver(() => this.schedule());
     this.resized.observe(this.canvas);
@@ -23,65 +40,86 @@ export class SceneView {
 
   stop() { this.resized.disconnect(); }
 
+  /** @param {string} text */
   say(text) {
     setText(this.note, text);
     this.note.hidden = !text;
   }
 
+  /** @param {(Layer | null | undefined | false)[]} layers */
   show(layers) {
-    this.layers = layers.filter(Boolean);
+    this.layers = /** @type {Layer[]} */ (layers.filter(Boolean));
     this.schedule();
   }
 
-  // Look at all of the layers given, from a usual side; `reach`: distance in units of their size.
-  frame(layers, { reach = 1.1, ...looks } = {}) {
-    const boxes = layers.filter(Boolean).map((layer) => layer.bounds()).filter(Boolean);
-    if (!boxes.length) return;
-    const [low, high] = [0, 1].map((end) => [0, 1, 2].map((axis) => Math[end ? 'max' : 'min'](...boxes.map((box) => box[end][axis]))));
-    const size = Math.hypot(...high.map((each, axis) => each - low[axis]));
-    this.orbit.look(low.map((each, axis) => (each + high[axis]) / 2), Math.max(0.3, reach * size), looks);
+  /**
+   * Look at all of some boxes from a usual side.
+   * @param {(Box | null)[]} boxes
+   * @param {Looks & { reach?: number }} looks reach: distance in units of their size
+   */
+  frame(boxes, { reach = 1.1, ...looks }) {
+    const corners = boxes.flatMap((box) => box || []);
+    if (!corners.length) return;
+    const whole = boxAround(corners);
+    this.orbit.look(middleOf(whole), Math.max(0.3, reach * diagonalOf(whole)), looks);
   }
 
   schedule() {
     if (this.scheduled) return;
-    this.scheduled = requestAnimationFrame(() => { this.scheduled = 0; this.draw(); });
+    this.scheduled = requestAnimationFrame(() => {
+      this.scheduled = 0;
+      this.draw();
+    });
   }
 
   draw() {
     const fine = this.orbit.moving ? 1 : this.fine;
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((each) => Math.round(each * fine));
-    if (!width || !height) return;
+    const { canvas } = this;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight]
+      .map((each) => Math.round(each * fine));
+    const context = canvas.getContext('2d');
+    if (!width || !height || !context) return;
     const begun = performance.now();
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    const context = this.canvas.getContext('2d');
+    if (canvas.width !== width) canvas.width = width;
+    if (canvas.height !== height) canvas.height = height;
     const image = context.createImageData(width, height);
     const view = this.orbit.view(width, height);
-    const paper = { ratio: fine, ground: groundOf(this.canvas) };
+    const paper = { ratio: fine, ground: groundOf(canvas) };
     this.raster.begin(image);
     for (const layer of this.layers) layer.draw(this.raster, view, paper);
     context.putImageData(image, 0, 0);
-    this.tell();
+    this.note3d();
     if (fine === this.fine) this.measure(performance.now() - begun);
   }
 
-  // What is on the screen, for whoever wants to know.
-  tell() {
-    const sum = (what) => this.layers.reduce((total, layer) => total + (layer[what] || 0), 0);
-    Object.assign(this.canvas.dataset, { triangles: sum('triangles'), points: this.layers.reduce((total, layer) => total + (layer.points ? layer.points.length / 3 : 0), 0) });
+  /** Write beside the canvas what is on it, for tests. */
+  note3d() {
+    const { layers } = this;
+    const triangles = layers.reduce((sum, layer) => sum + (layer.triangles || 0), 0);
+    const points = layers.reduce((sum, { points: each }) => sum + (each ? each.length / 3 : 0), 0);
+    Object.assign(this.canvas.dataset, { triangles, points });
   }
 
+  /** @param {number} ms that the last drawing took */
   measure(ms) {
-    this.took = this.took === undefined ? ms : 0.7 * this.took + 0.3 * ms;
-    if (this.fine === 1 && this.took < QUICK_MS && !this.slow) {
+    this.tookMs = Number.isNaN(this.tookMs) ? ms : 0.7 * this.tookMs + 0.3 * ms;
+    if (this.fine === 1 && this.tookMs < QUICK_MS && !this.slow) {
       this.fine = 2;
       this.schedule();
-    } else if (this.fine === 2 && this.took > SLOW_MS) {
-      [this.fine, this.slow] = [1, true]; // and it stays so: pictures that change their grain are worse
+    } else if (this.fine === 2 && this.tookMs > SLOW_MS) {
+      this.fine = 1;
+      this.slow = true; // and it stays so: scenes that change their grain are worse
     }
   }
 }
 
+/**
+ * The colour behind a canvas.
+ * @param {HTMLCanvasElement} canvas
+ * @returns {Colour}
+ */
 function groundOf(canvas) {
-  const told = getComputedStyle(canvas).backgroundColor.match(/[\d.]+/g) || [];
-  return told.length >= 3 ? told.slice(0, 3).map(Number) : [11, 13, 18];
+  const levels = getComputedStyle(canvas).backgroundColor.match(/[\d.]+/g) || [];
+  if (levels.length < 3) return [11, 13, 18];
+  return [Number(levels[0]), Number(levels[1]), Number(levels[2])];
 }

@@ -1,35 +1,38 @@
+// @ts-check
 // What calls a person who looks elsewhere: the title, a sound, a notification.
 import { h } from './dom.js';
+import { remember, remembered } from './preferences.js';
+
+/** @typedef {import('../server').Question} Question */
 
 const TITLE = 'Operator console';
-
-function remembered(name, otherwise) {
-  try { return localStorage.getItem(name) ?? otherwise; } catch (err) { return otherwise; }
-}
-
-export function remember(name, value) {
-  try { localStorage.setItem(name, value); } catch (err) { /* private windows may refuse; it is a comfort only */ }
-}
-
-export { remembered };
+const TONES = [{ pitch: 660, start: 0 }, { pitch: 880, start: 0.16 }]; // Hz, s
+const CAN_NOTIFY = 'Notification' in window;
 
 export class Alerts {
   constructor() {
     this.sound = remembered('sound', 'on') === 'on';
+    /** @type {Set<string>} */
     this.known = new Set();
     this.first = true;
-    const wake = () => this.context();
+    /** @type {AudioContext | null} */
+    this.audio = null;
+    const wake = () => this.wakeAudio();
     window.addEventListener('pointerdown', wake, { once: true });
     window.addEventListener('keydown', wake, { once: true });
   }
 
-  context() {
-    if (!this.audio && window.AudioContext) this.audio = new AudioContext();
+  /** Browsers allow sound only once somebody has pressed something. */
+  wakeAudio() {
+    if (!this.audio && 'AudioContext' in window) this.audio = new AudioContext();
     if (this.audio && this.audio.state === 'suspended') this.audio.resume();
     return this.audio;
   }
 
-  // `questions`: the open list; those that nobody works on count.
+  /**
+   * Call for those that nobody works on.
+   * @param {Question[]} questions that are open
+   */
   look(questions) {
     const pending = questions.filter((each) => each.status === 'pending');
     document.title = pending.length ? '(' + pending.length + ') ' + TITLE : TITLE;
@@ -43,47 +46,56 @@ export class Alerts {
   }
 
   ring() {
-    const audio = this.audio;
+    const { audio } = this;
     if (!audio || audio.state !== 'running') return;
-    [[660, 0], [880, 0.16]].forEach(([pitch, start]) => {
+    for (const { pitch, start } of TONES) {
+      const begin = audio.currentTime + start;
       const tone = audio.createOscillator();
       const volume = audio.createGain();
       tone.frequency.value = pitch;
-      volume.gain.setValueAtTime(0.0001, audio.currentTime + start);
-      volume.gain.exponentialRampToValueAtTime(0.15, audio.currentTime + start + 0.02);
-      volume.gain.exponentialRampToValueAtTime(0.0001, audio.currentTime + start + 0.3);
+      volume.gain.setValueAtTime(0.0001, begin);
+      volume.gain.exponentialRampToValueAtTime(0.15, begin + 0.02);
+      volume.gain.exponentialRampToValueAtTime(0.0001, begin + 0.3);
       tone.connect(volume).connect(audio.destination);
-      tone.start(audio.currentTime + start);
-      tone.stop(audio.currentTime + start + 0.32);
-    });
+      tone.start(begin);
+      tone.stop(begin + 0.32);
+    }
   }
 
-  notify(question) {
-    if (!document.hidden || !window.Notification || Notification.permission !== 'granted') return;
+  /** @param {Question} question */
+  notify({ state, robot, key }) {
+    if (!document.hidden || !CAN_NOTIFY || Notification.permission !== 'granted') return;
     try {
-      const shown = new Notification(question.state + ' failed', { body: question.robot + ' asks', tag: question.key });
+      const shown = new Notification(state + ' failed', { body: robot + ' asks', tag: key });
       shown.onclick = () => { window.focus(); shown.close(); };
     } catch (err) { /* some phones know the class, and allow it to service workers alone */ }
   }
 
-  // The buttons of the top bar.
+  /** The buttons of the top bar. */
   buttons() {
-    const sound = h('button', { class: 'icon-button', onclick: () => {
-      this.sound = !this.sound;
-      remember('sound', this.sound ? 'on' : 'off');
-      show();
-      if (this.sound && this.context()) this.ring();
-    } });
-    const show = () => {
-      sound.textContent = this.sound ? 'Sound on' : 'Sound off';
-      sound.setAttribute('aria-pressed', this.sound);
-    };
-    show();
-    if (!window.Notification || Notification.permission !== 'default') return [sound];
+    /** @type {HTMLButtonElement} */
+    const sound = h('button', { class: 'icon-button', onclick: () => this.toggleSound(sound) });
+    this.showSound(sound);
+    if (!CAN_NOTIFY || Notification.permission !== 'default') return [sound];
+    /** @type {HTMLButtonElement} */
     const ask = h('button', { class: 'icon-button wide-only', onclick: async () => {
       await Notification.requestPermission();
       ask.remove();
     } }, 'Notify me');
     return [sound, ask];
+  }
+
+  /** @param {HTMLButtonElement} button */
+  toggleSound(button) {
+    this.sound = !this.sound;
+    remember('sound', this.sound ? 'on' : 'off');
+    this.showSound(button);
+    if (this.sound && this.wakeAudio()) this.ring();
+  }
+
+  /** @param {HTMLButtonElement} button */
+  showSound(button) {
+    button.textContent = this.sound ? 'Sound on' : 'Sound off';
+    button.setAttribute('aria-pressed', String(this.sound));
   }
 }

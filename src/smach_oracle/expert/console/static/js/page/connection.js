@@ -1,60 +1,65 @@
-// The connection: it comes back by itself; sections are kept while it is away.
+// @ts-check
+// The connection to the server: it comes back by itself.
 
+/** @typedef {import('../server').Batch} Batch */
+/** @typedef {import('../server').Commands} Commands */
+/** @typedef {import('../server').Reply} Reply */
+/** @typedef {import('../server').Session} Session */
+/** @typedef {import('./store.js').Store} Store */
+/** @typedef {'connecting' | 'signed-out' | 'connected' | 'lost'} State */
+
+const SHORTEST_PAUSE_S = 0.3;
 const LONGEST_PAUSE_S = 4;
 const REQUEST_LIMIT_S = 20;
+const SESSION_LIMIT_MS = 8000;
 const SIGNED_OUT = 4001; // as the server closes the sockets of a session that has ended
 
-export class Lost extends Error {}
+/** There is no connection, or it went before the reply came. */
+export class ConnectionLost extends Error {}
 
-export class Store {
-  constructor() {
-    this.sections = new Map();
-    this.listeners = [];
-    this.eventListeners = [];
-    this.offset = 0;
-  }
-
-  get(name) { return this.sections.get(name); }
-
-  // The server's clock, in seconds.
-  now() { return Date.now() / 1000 + this.offset; }
-
-  onChange(listener) { this.listeners.push(listener); }
-
-  onEvents(listener) { this.eventListeners.push(listener); }
-
-  take(message) {
-    this.offset = message.now - Date.now() / 1000;
-    const names = Object.keys(message.sections || {});
-    if (message.all) names.push(...[...this.sections.keys()].filter((name) => !(name in message.sections))); // gone meanwhile
-    for (const name of names) {
-      if (message.sections[name] === null || message.sections[name] === undefined) this.sections.delete(name);
-      else this.sections.set(name, message.sections[name]);
-    }
-    if (names.length) this.listeners.forEach((listener) => listener(names));
-    if (message.events) this.eventListeners.forEach((listener) => listener(message.events));
-  }
+/**
+ * For `catch`: nothing where the connection was lost, which the page shows anyway.
+ * @param {unknown} err
+ */
+export function unlessLost(err) {
+  if (!(err instanceof ConnectionLost)) throw err;
 }
 
-// `onState` is told: connecting, signed-out, connected, lost; with what the server says of the session. `onEnd`: that the
-// person has signed out on another page of this browser.
-export class Link {
+export class Connection {
+  /**
+   * @param {Store} store
+   * @param {(state: State) => void} onState
+   * @param {() => void} onEnd the person has signed out on another page of this browser
+   */
   constructor(store, onState, onEnd) {
     this.store = store;
     this.onState = onState;
     this.onEnd = onEnd;
+    /** @type {Map<number, { resolve: (reply: Reply) => void, reject: (err: Error) => void }>} */
     this.waiting = new Map();
-    this.number = 0;
-    this.pause = 0.3;
+    this.number = 0; // of the last command
+    this.pause = SHORTEST_PAUSE_S;
+    this.timer = 0;
     this.generation = 0;
+    /** @type {Session | null} */
     this.session = null;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.wantedExpert = ''; // the name that the person has chosen
+    this.expert = ''; // the one under which the server knows this page
     this.connected = false;
     this.signedOut = false;
-    // signed out: another page of this browser may have signed in meanwhile
-    const hurry = () => { if (!this.connected && !document.hidden && (this.timer || this.signedOut)) this.connect(); };
+    this.leaving = false;
+    const hurry = () => this.hurry();
     window.addEventListener('online', hurry);
     window.addEventListener('focus', hurry);
     document.addEventListener('visibilitychange', hurry);
+  }
+
+  /** Signed out: another page of this browser may have signed in meanwhile. */
+  hurry() {
+    const waits = Boolean(this.timer) || this.signedOut;
+    if (!this.connected && !document.hidden && waits) this.connect();
   }
 
   async connect() {
@@ -62,66 +67,84 @@ export class Link {
     this.timer = 0;
     const generation = ++this.generation;
     if (this.socket) this.socket.close();
-    this.onState('connecting', this.session);
+    this.onState('connecting');
     try {
       const session = await this.whoAmI();
       if (generation !== this.generation) return;
       this.session = session;
     } catch (err) {
-      if (generation === this.generation) this.again();
+      if (generation === this.generation) this.retryLater();
       return;
     }
     this.signedOut = !this.session.signed_in;
-    if (this.signedOut) this.onState('signed-out', this.session);
-    else this.open(generation);
+    if (this.signedOut) this.onState('signed-out');
+    else this.open(generation, this.session);
   }
 
+  /** @returns {Promise<Session>} */
   async whoAmI() {
-    const answer = await fetch('session', { cache: 'no-store', signal: AbortSignal.timeout(8000) });
-    if (!answer.ok) throw new Lost();
+    const limit = new AbortController();
+    const timer = setTimeout(() => limit.abort(), SESSION_LIMIT_MS);
+    const answer = await fetch('session', { cache: 'no-store', signal: limit.signal });
+    clearTimeout(timer);
+    if (!answer.ok) throw new ConnectionLost();
     return answer.json();
   }
 
-  open(generation) {
+  /**
+   * @param {number} generation
+   * @param {Session} session
+   */
+  open(generation, session) {
     const address = new URL('socket', location.href);
     address.protocol = address.protocol.replace('http', 'ws');
     const socket = this.socket = new WebSocket(address);
-    socket.onmessage = (event) => this.take(JSON.parse(event.data));
+    socket.onmessage = (event) => this.receive(JSON.parse(event.data));
     socket.onclose = (event) => {
       if (event.code === SIGNED_OUT && !this.leaving) this.onEnd();
       if (generation !== this.generation) return;
       this.fail();
-      this.again();
+      this.retryLater();
     };
-    socket.onopen = async () => {
-      try {
-        const reply = await this.request('hello', { xsrf: this.session.xsrf, expert: this.expert || '' });
-        if (!reply.ok || generation !== this.generation) return;
-        this.pause = 0.3;
-        this.connected = true;
-        this.onState('connected', Object.assign(this.session, { expert: reply.message }));
-      } catch (err) {
-        if (!(err instanceof Lost)) throw err;
-      }
-    };
+    socket.onopen = () => this.sayHello(generation, session);
   }
 
-  again() {
+  /**
+   * @param {number} generation
+   * @param {Session} session
+   */
+  async sayHello(generation, { xsrf }) {
+    try {
+      const reply = await this.request('hello', { xsrf, expert: this.wantedExpert });
+      if (!reply.ok || generation !== this.generation) return;
+      this.pause = SHORTEST_PAUSE_S;
+      this.connected = true;
+      this.expert = reply.message;
+      this.onState('connected');
+    } catch (err) {
+      unlessLost(err);
+    }
+  }
+
+  retryLater() {
     this.connected = false;
-    this.onState('lost', this.session);
+    this.onState('lost');
     this.timer = setTimeout(() => this.connect(), this.pause * 1000);
     this.pause = Math.min(LONGEST_PAUSE_S, this.pause * 1.7);
   }
 
+  /** Nothing that is asked for will be answered. */
   fail() {
     this.connected = false;
-    for (const waiting of this.waiting.values()) waiting.reject(new Lost('the connection was lost'));
+    const lost = new ConnectionLost('the connection was lost');
+    for (const waiting of this.waiting.values()) waiting.reject(lost);
     this.waiting.clear();
   }
 
-  take(message) {
-    if (message.re === undefined) {
-      this.store.take(message);
+  /** @param {Batch | Reply} message */
+  receive(message) {
+    if (!('re' in message)) {
+      this.store.receive(message);
       return;
     }
     const waiting = this.waiting.get(message.re);
@@ -129,29 +152,53 @@ export class Link {
     if (waiting) waiting.resolve(message);
   }
 
-  // One command; rejects with Lost where the connection goes before the reply is there.
+  /**
+   * One command; rejects with ConnectionLost where the connection goes before the reply is there.
+   * @template {keyof Commands} Name
+   * @param {Name} name
+   * @param {Commands[Name]} args
+   * @returns {Promise<import('../server').Reply<Name>>}
+   */
   request(name, args) {
-    if (!this.socket || this.socket.readyState !== WebSocket.OPEN) return Promise.reject(new Lost('not connected'));
+    const socket = this.openSocket;
+    if (!socket) return Promise.reject(new ConnectionLost('not connected'));
     const number = ++this.number;
     return new Promise((resolve, reject) => {
-      this.waiting.set(number, { resolve, reject });
+      const settle = /** @type {(reply: Reply) => void} */ (resolve);
+      this.waiting.set(number, { resolve: settle, reject });
       setTimeout(() => {
-        if (this.waiting.delete(number)) reject(new Lost('no reply within ' + REQUEST_LIMIT_S + ' s'));
+        if (!this.waiting.delete(number)) return;
+        reject(new ConnectionLost('no reply within ' + REQUEST_LIMIT_S + ' s'));
       }, REQUEST_LIMIT_S * 1000);
-      this.socket.send(JSON.stringify(Object.assign({ id: number, do: name }, args)));
+      socket.send(JSON.stringify({ id: number, do: name, ...args }));
     });
   }
 
-  // A command whose reply nobody waits for. `unlessLate`: not where earlier ones are still on their way out.
-  tell(name, args, unlessLate) {
-    if (!this.socket || this.socket.readyState !== WebSocket.OPEN || (unlessLate && this.socket.bufferedAmount > 0)) return;
-    this.socket.send(JSON.stringify(Object.assign({ id: ++this.number, do: name }, args)));
+  /**
+   * A command whose reply nobody waits for.
+   * @template {keyof Commands} Name
+   * @param {Name} name
+   * @param {Commands[Name]} args
+   * @param {boolean} unlessLate not where earlier ones are still on their way out
+   */
+  send(name, args, unlessLate) {
+    const socket = this.openSocket;
+    if (!socket || (unlessLate && socket.bufferedAmount > 0)) return;
+    socket.send(JSON.stringify({ id: ++this.number, do: name, ...args }));
   }
 
+  get openSocket() {
+    return this.socket && this.socket.readyState === WebSocket.OPEN ? this.socket : null;
+  }
+
+  /**
+   * @param {string} token
+   * @returns {Promise<number>} the status of the answer
+   */
   async signIn(token) {
-    const known = await this.whoAmI(); // another page of this browser may have signed in, and would be signed out now
-    Object.assign(this.session, known);
-    if (known.signed_in) {
+    // another page of this browser may have signed in, and would be signed out now
+    this.session = await this.whoAmI();
+    if (this.session.signed_in) {
       this.connect();
       return 200;
     }
@@ -160,7 +207,7 @@ export class Link {
     return answer.status;
   }
 
-  // Whether it could be done.
+  /** Whether it could be done. */
   async signOut() {
     this.leaving = true; // the socket may be closed before the answer is here
     const answer = await this.fetch('session', { method: 'DELETE' }).catch(() => null);
@@ -168,21 +215,25 @@ export class Link {
     return this.leaving;
   }
 
-  // What this page alone may ask for. Where there is a new session meanwhile, begun by another page of this browser (all of
-  // them share the cookie) or because the old one had become too old, it is asked for once more in the name of that.
-  async fetch(path, options) {
-    const { xsrf } = this.session;
-    const ask = () => fetch(path, Object.assign({ cache: 'no-store' }, options, { headers: { 'X-Xsrf': this.session.xsrf } }));
+  /**
+   * What this page alone may ask for. Where there is a new session meanwhile, begun by another page
+   * of this browser (all of them share the cookie) or because the old one had become too old, it is
+   * asked for once more in the name of that.
+   * @param {string} path
+   * @param {RequestInit} [init]
+   */
+  async fetch(path, init) {
+    const xsrf = this.xsrf;
+    const ask = () => fetch(path, { cache: 'no-store', ...init, headers: { 'X-Xsrf': this.xsrf } });
     const answer = await ask();
     if (answer.status !== 403 && answer.status !== 401) return answer;
-    if (this.session.xsrf === xsrf) {
-      const known = await this.whoAmI();
-      Object.assign(this.session, known); // that of now: meanwhile it may be another one
-    }
-    if (!this.session.signed_in && this.connected && !this.leaving) {
+    if (this.xsrf === xsrf) this.session = await this.whoAmI(); // else it is another one already
+    if (!this.session?.signed_in && this.connected && !this.leaving) {
       this.fail();
       this.connect(); // which asks for the token
     }
-    return this.session.xsrf === xsrf ? answer : ask();
+    return this.xsrf === xsrf ? answer : ask();
   }
+
+  get xsrf() { return this.session ? this.session.xsrf : ''; }
 }

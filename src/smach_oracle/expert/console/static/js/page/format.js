@@ -1,55 +1,104 @@
-// Numbers as people read them.
+// @ts-check
+// Numbers and names as people read them.
 import { h } from './dom.js';
 
-export const CLASSES = { 0: '', 1: 'low', 2: 'moderate', 3: 'high' };
+/** @typedef {import('../server').FailureClass} FailureClass */
+/** @typedef {import('../server').TrialEvent} TrialEvent */
 
+/** @type {{ [rank in FailureClass]: string }} */
+export const FAILURE_CLASSES = { 0: '', 1: 'low', 2: 'moderate', 3: 'high' };
+
+/** @param {number} seconds */
 export function duration(seconds) {
   const whole = Math.max(0, Math.floor(seconds));
   if (whole < 60) return whole + ' s';
-  if (whole < 3600) return Math.floor(whole / 60) + ':' + String(whole % 60).padStart(2, '0') + ' min';
-  return Math.floor(whole / 3600) + ':' + String(Math.floor((whole % 3600) / 60)).padStart(2, '0') + ' h';
+  if (whole < 3600) return Math.floor(whole / 60) + ':' + twoDigits(whole % 60) + ' min';
+  return Math.floor(whole / 3600) + ':' + twoDigits(Math.floor((whole % 3600) / 60)) + ' h';
 }
 
+/** @param {number} number */
+function twoDigits(number) { return String(number).padStart(2, '0'); }
+
+/** @param {number | null | undefined} share */
 export function percent(share) {
   return share === null || share === undefined ? '–' : Math.round(100 * share) + '%';
 }
 
+/**
+ * Of a failure rate: green to red, in degrees.
+ * @param {number} rate
+ */
 export function hue(rate) {
   return Math.round(130 * (1 - Math.min(Math.max(rate, 0), 1)));
 }
 
+/** @param {number} epoch s */
 export function clock(epoch) {
   return new Date(epoch * 1000).toLocaleTimeString();
 }
 
+/** @param {number} number */
 export function times(number) {
-  return number === 1 ? 'once' : number === 2 ? 'twice' : number + ' times';
+  if (number === 1) return 'once';
+  return number === 2 ? 'twice' : number + ' times';
 }
 
-// A long name, that may be broken after each such sign.
+/**
+ * '1 bag', '2 bags'.
+ * @param {number} number
+ * @param {string} one
+ * @param {string} [many]
+ */
+export function counted(number, one, many = one + 's') {
+  return number + ' ' + (number === 1 ? one : many);
+}
+
+/**
+ * A long name, that may be broken after each such sign.
+ * @param {string} name
+ * @param {string} sign
+ */
 export function breakable(name, sign) {
   return name.split(sign).flatMap((part, index) => (index ? [sign, h('wbr', {}), part] : [part]));
 }
 
-// Of a traceback that is the line that says what happened.
+/**
+ * Of a traceback that is the line that says what happened.
+ * @param {string} text
+ */
 function lastLine(text) {
-  return text.trim().split('\n').pop().slice(-300);
+  const lines = text.trim().split('\n');
+  return lines[lines.length - 1].slice(-300);
 }
 
-// What the text of an event adds to its words.
+/**
+ * What the text of an event adds to its words.
+ * @param {Pick<TrialEvent, 'text' | 'words'>} event
+ */
 export function added(event) {
-  const text = lastLine(event.text || '');
-  return text && !(event.words || '').includes(text) ? ' ' + text : '';
+  const text = lastLine(event.text);
+  return text && !event.words.includes(text) ? ' ' + text : '';
 }
 
-// A bar for a failure rate, green to red; `share` is what is filled, where it is not the rate itself.
+/**
+ * A bar for a failure rate, green to red.
+ * @param {number | null | undefined} rate
+ * @param {number} [share] what is filled, where it is not the rate itself
+ * @param {string} [text]
+ */
 export function rateBar(rate, share, text) {
   if (rate === null || rate === undefined) return h('span', { class: 'rate unknown' }, '–');
   const filled = share === undefined ? rate : share;
-  return h('span', { class: 'rate', '--hue': hue(rate), '--fill': Math.round(100 * filled) + '%' },
+  const looks = { '--hue': hue(rate), '--fill': Math.round(100 * filled) + '%' };
+  return h('span', { class: 'rate', ...looks },
     h('span', { class: 'rate-bar' }), h('span', { class: 'rate-text' }, text || percent(filled)));
 }
 
-export function chip(text, kind, title) {
-  return h('span', { class: 'chip ' + (kind || ''), title }, text);
+/**
+ * @param {string} text
+ * @param {string} [kind]
+ * @param {string} [title]
+ */
+export function chip(text, kind = '', title) {
+  return h('span', { class: 'chip ' + kind, title }, text);
 }

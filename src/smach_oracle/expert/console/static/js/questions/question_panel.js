@@ -1,23 +1,37 @@
+// @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
-import { h, redraw, replace, setText, typing } from './dom.js';
-import { breakable, chip, duration, percent, rateBar } from './format.js';
-import { Detail } from './question_detail.js';
+import { h, modified, replace, setText, typing } from '../page/dom.js';
+import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+import { QuestionDetail, URGENT_S } from './question_detail.js';
 
-export const questions = { id: 'questions', title: 'Questions', create: (app) => new Questions(app) };
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Panel} Panel */
+/** @typedef {import('../server').Question} Question */
 
-class Questions {
+/** @type {Panel} */
+export const questions = { id: 'questions', title: 'Questions',
+  create: (app) => new QuestionPanel(app) };
+
+const NO_SERVER = 'No robot with an expert query server is known yet.';
+const QUIET = 'Robots recover by themselves where they can; they ask here where they cannot.';
+
+class QuestionPanel {
+  /** @param {App} app */
   constructor(app) {
     this.app = app;
+    /** @type {QuestionDetail | null} */
     this.detail = null;
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
-    this.root = h('div', { class: 'panel questions' }, h('aside', { class: 'queue-side' }, this.queue, this.servers), this.stage);
+    this.root = h('div', { class: 'panel questions' },
+      h('aside', { class: 'queue-side' }, this.queue, this.servers), this.stage);
     window.addEventListener('keydown', (event) => this.key(event));
     this.showStage();
   }
 
-  get open() { return this.app.store.get('questions') || []; }
+  get open() { return this.app.store.questions; }
 
   badge() { return this.open.filter((each) => each.status === 'pending').length; }
 
@@ -30,6 +44,7 @@ class Questions {
     if (this.detail) this.detail.tick();
   }
 
+  /** @param {string[]} names */
   update(names) {
     if (names.includes('servers')) this.showServers();
     if (names.includes('questions')) this.showQueue();
@@ -38,38 +53,60 @@ class Questions {
   }
 
   showServers() {
-    const servers = this.app.store.get('servers') || [];
-    setText(this.servers, servers.length ? 'Listening to ' + servers.map((each) => each.name + (each.connected ? '' : ' (gone)')).join(', ')
-      : 'No robot with an expert query server is known yet.');
+    const servers = (this.app.store.get('servers') || [])
+      .map(({ name, connected }) => name + (connected ? '' : ' (gone)'));
+    setText(this.servers, servers.length ? 'Listening to ' + servers.join(', ') : NO_SERVER);
   }
 
   showQueue() {
-    const open = this.open;
-    redraw(this.queue, open.length ? open.map((question) => this.row(question)) : h('p', { class: 'empty' }, 'No open questions.'));
+    const { open } = this;
+    redraw(this.queue, open.length ? open.map((question) => this.row(question))
+      : h('p', { class: 'empty' }, 'No open questions.'));
   }
 
+  /** @param {string} key */
+  isChosen(key) { return Boolean(this.detail && this.detail.key === key); }
+
+  /** @param {Question} question */
   row(question) {
-    const { key, holder } = question;
-    const mine = holder && holder === this.app.expert;
-    const who = question.status === 'interface' ? chip(question.interface + ' runs', 'accent', 'The interface that somebody started for it')
-      : holder ? chip(mine ? 'yours' : holder, mine ? 'good' : 'warn') : chip('waiting', 'bad');
-    return h('button', { key, class: 'question-row ' + question.status, 'data-key': key, 'aria-current': Boolean(this.detail && this.detail.key === key), onclick: () => this.choose(key) },
-      h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(question.state, '_')), h('span', { class: 'spacer' }), who),
-      h('span', { class: 'row dim' }, h('span', { class: 'where' }, question.robot + ' · ' + question.path), h('span', { class: 'spacer' }), h('span', { title: 'How often it fails, as learned' }, rateBar(question.rate, undefined, percent(question.rate) + ' fail'))),
-      this.times(question));
+    const { key, status, state, robot, path, rate } = question;
+    return h('button', { key, class: 'question-row ' + status, 'data-key': key,
+      'aria-current': this.isChosen(key), onclick: () => this.choose(key) },
+    h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
+      h('span', { class: 'spacer' }), this.statusChip(question)),
+    h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
+      h('span', { class: 'spacer' }),
+      h('span', { title: 'How often it fails, as learned' },
+        rateBar(rate, undefined, percent(rate) + ' fail'))),
+    this.times(question));
   }
 
+  /** @param {Question} question */
+  statusChip({ status, holder, interface: name }) {
+    if (status === 'interface') {
+      return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
+    }
+    if (!holder) return chip('waiting', 'bad');
+    return holder === this.app.expert ? chip('yours', 'good') : chip(holder, 'warn');
+  }
+
+  /** @param {Question} question */
   times({ asked, deadline }) {
     const now = this.app.store.now();
-    return h('span', { class: 'row' }, h('span', { class: 'dim' }, 'asked ' + duration(now - asked) + ' ago'), h('span', { class: 'spacer' }),
-      deadline !== null && h('span', { class: 'left' + (deadline - now < 20 ? ' urgent' : '') }, duration(deadline - now) + ' left'));
+    const left = deadline === null ? Infinity : deadline - now;
+    return h('span', { class: 'row' },
+      h('span', { class: 'dim' }, 'asked ' + duration(now - asked) + ' ago'),
+      h('span', { class: 'spacer' }),
+      left < Infinity && h('span', { class: 'left' + (left < URGENT_S ? ' urgent' : '') },
+        duration(left) + ' left'));
   }
 
+  /** @param {string} key */
   choose(key) {
     const question = this.open.find((each) => each.key === key);
-    if (!question || (this.detail && this.detail.key === key)) return;
+    if (!question || this.isChosen(key)) return;
     this.close();
-    this.detail = new Detail(this.app, question, () => this.close());
+    this.detail = new QuestionDetail(this.app, question, () => this.close());
     this.showStage();
     this.showQueue();
     this.detail.begin();
@@ -91,15 +128,18 @@ class Questions {
       return;
     }
     const waiting = this.badge();
-    const hint = waiting ? h('p', {}, 'Choose one, or press ', h('kbd', {}, 'n'), ' for the oldest that nobody works on.')
-      : h('p', {}, 'Robots recover by themselves where they can; they ask here where they cannot.');
-    replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, waiting ? waiting + (waiting === 1 ? ' question waits' : ' questions wait') : 'All quiet'), hint));
+    const title = waiting ? counted(waiting, 'question waits', 'questions wait') : 'All quiet';
+    const hint = waiting ? h('p', {}, 'Choose one, or press ', h('kbd', {}, 'n'),
+      ' for the oldest that nobody works on.') : h('p', {}, QUIET);
+    replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, title), hint));
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
-    if (this.app.current !== 'questions' || event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector('dialog[open]')) return;
+    if (this.app.current !== 'questions' || modified(event) || typing(event.target)
+      || document.querySelector('dialog[open]')) return;
     if (event.key === 'n') {
-      const next = this.open.find((each) => each.status === 'pending' && !(this.detail && this.detail.key === each.key));
+      const next = this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
       if (next) this.choose(next.key);
     } else if (event.key === 'Escape') {
       this.close();

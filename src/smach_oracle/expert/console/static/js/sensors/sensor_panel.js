@@ -1,51 +1,89 @@
-// The sensors: whatever cameras, point clouds, robots and joint states the console has found; up to four at a time.
-import { remember, remembered } from './alerts.js';
+// @ts-check
+// The sensors: all cameras, point clouds, robots and joint states that the server has found; up to
+// four at a time.
+import { h } from '../page/dom.js';
+import { breakable } from '../page/format.js';
+import { remember, remembered } from '../page/preferences.js';
+import { arrange, redraw } from '../page/redraw.js';
 import { CameraView } from './camera_view.js';
-import { CloudView, RobotView } from './cloud_view.js';
-import { arrange, h, redraw } from './dom.js';
-import { breakable } from './format.js';
+import { CloudView } from './cloud_view.js';
 import { JointsView } from './joints_view.js';
+import { RobotView } from './robot_view.js';
 
-export const sensors = { id: 'sensors', title: 'Sensors', create: (app) => new Sensors(app) };
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Panel} Panel */
+/** @typedef {import('../server').Sensor} Sensor */
+/** @typedef {{ root: HTMLElement, stop(): void }} View */
+
+/** @type {Panel} */
+export const sensors = { id: 'sensors', title: 'Sensors', create: (app) => new SensorPanel(app) };
 
 const MOST_VIEWS = 4;
+/** @type {['image', 'cloud', 'robot', 'joints']} */
+const KINDS = ['image', 'cloud', 'robot', 'joints'];
 const TITLES = { image: 'Cameras', cloud: 'Point clouds', robot: 'Robots in 3D', joints: 'Joints' };
 const VIEWS = { image: CameraView, cloud: CloudView, robot: RobotView, joints: JointsView };
+const NO_SENSORS = 'Cameras (Image, CompressedImage), point clouds (PointCloud2, or depth with its '
+  + 'camera_info), robots (robot_description) and joint states appear here as soon as somebody '
+  + 'publishes them.';
+const CHOOSE = 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to a sensor only '
+  + 'while somebody looks at it.';
 
-class Sensors {
+class SensorPanel {
+  /** @param {App} app */
   constructor(app) {
     this.app = app;
-    this.views = new Map();
+    /** @type {Map<string, View>} */
+    this.views = new Map(); // by name
     this.list = h('aside', { class: 'picker sensor-list', 'aria-label': 'Sensors' });
     this.stage = h('div', { class: 'sensor-stage' });
     this.root = h('div', { class: 'panel sensors' }, this.list, this.stage);
-    this.wanted = remembered('sensors', '').split('\n').filter(Boolean);
+    this.wanted = remembered('sensors', '').split('\n').filter(Boolean); // names
+    this.shape = '';
     this.showList();
   }
 
-  get known() { return (this.app.store.get('eye') || {}).sensors || []; }
+  get known() { return this.app.store.sensors; }
 
   shown() { this.showList(); }
 
+  /** @param {string[]} names */
   update(names) { if (names.includes('eye')) this.showList(); }
 
   showList() {
-    const known = this.known;
+    const { known } = this;
     const shape = JSON.stringify([known, this.wanted]);
     if (shape === this.shape) return;
     this.shape = shape;
-    redraw(this.list, known.length ? Object.keys(TITLES).map((kind) => this.group(kind, known.filter((each) => each.kind === kind)))
+    redraw(this.list, known.length ? KINDS.map((kind) => (
+      this.group(TITLES[kind], known.filter((each) => each.kind === kind))))
       : h('p', { class: 'dim' }, 'No sensors yet.'));
-    for (const sensor of known) if (this.wanted.includes(nameOf(sensor)) && !this.views.has(nameOf(sensor))) this.open(sensor);
+    for (const sensor of known) {
+      const name = nameOf(sensor);
+      if (this.wanted.includes(name) && !this.views.has(name)) this.open(sensor);
+    }
     this.showStage();
   }
 
-  group(kind, found) {
-    return found.length > 0 && h('div', { key: kind, class: 'group' }, h('span', { class: 'robot' }, TITLES[kind]), found.map((sensor) =>
-      h('button', { key: nameOf(sensor), class: 'path', title: sensor.topic + ', ' + sensor.type, 'data-topic': sensor.topic, 'aria-selected': String(this.wanted.includes(nameOf(sensor))), onclick: () => this.toggle(sensor) },
-        breakable(sensor.topic.replace(/^\//, ''), '/'))));
+  /**
+   * @param {string} title
+   * @param {Sensor[]} found
+   */
+  group(title, found) {
+    return found.length > 0 && h('div', { key: title, class: 'group' },
+      h('span', { class: 'robot' }, title), found.map((sensor) => this.button(sensor)));
   }
 
+  /** @param {Sensor} sensor */
+  button(sensor) {
+    const { topic, type } = sensor;
+    const name = nameOf(sensor);
+    return h('button', { key: name, class: 'path', title: topic + ', ' + type, 'data-topic': topic,
+      'aria-selected': this.wanted.includes(name), onclick: () => this.toggle(sensor) },
+    breakable(topic.replace(/^\//, ''), '/'));
+  }
+
+  /** @param {Sensor} sensor */
   toggle(sensor) {
     const name = nameOf(sensor);
     if (this.wanted.includes(name)) {
@@ -58,26 +96,31 @@ class Sensors {
     this.showList();
   }
 
+  /** @param {Sensor} sensor */
   open(sensor) {
-    const view = new VIEWS[sensor.kind](this.app, sensor.topic, sensor.type);
-    view.root.append(h('button', { class: 'tool view-close', 'aria-label': 'Close ' + sensor.topic, onclick: () => this.toggle(sensor) }, '×'));
+    const { topic, type, kind } = sensor;
+    const view = new VIEWS[kind](this.app, topic, type);
+    view.root.append(h('button', { class: 'tool view-close', 'aria-label': 'Close ' + topic,
+      onclick: () => this.toggle(sensor) }, '×'));
     this.views.set(nameOf(sensor), view);
   }
 
+  /** @param {string} name */
   close(name) {
     this.wanted = this.wanted.filter((each) => each !== name);
-    const view = this.views.get(name);
-    if (view) view.stop();
+    this.views.get(name)?.stop();
     this.views.delete(name);
   }
 
   showStage() {
     const roots = [...this.views.values()].map((view) => view.root);
-    arrange(this.stage, roots.length ? roots : h('div', { class: 'empty' }, h('h2', {}, this.known.length ? 'Nothing is looked at' : 'No sensors'),
-      h('p', {}, this.known.length ? 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to a sensor only while somebody looks at it.'
-        : 'Cameras (Image, CompressedImage), point clouds (PointCloud2, or depth with its camera_info), robots (robot_description) and joint states appear here as soon as somebody publishes them.')));
-    this.stage.dataset.views = roots.length;
+    const any = this.known.length > 0;
+    arrange(this.stage, roots.length ? roots : h('div', { class: 'empty' },
+      h('h2', {}, any ? 'Nothing is looked at' : 'No sensors'),
+      h('p', {}, any ? CHOOSE : NO_SENSORS)));
+    this.stage.dataset['views'] = String(roots.length);
   }
 }
 
-function nameOf(sensor) { return sensor.type + ' ' + sensor.topic; }
+/** @param {Sensor} sensor */
+function nameOf({ type, topic }) { return type + ' ' + topic; }

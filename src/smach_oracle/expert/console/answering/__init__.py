@@ -1,0 +1,1 @@
+"""Questions on the console: claims, answers, marking, driving."""

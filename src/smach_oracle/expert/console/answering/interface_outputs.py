@@ -1,0 +1,19 @@
+"""What an interface has printed, as plain data for the page. Pure."""
+from typing import Any, Dict, Optional
+
+from smach_oracle.msg import InterfaceOutput
+
+_STATUS = {
+    InterfaceOutput.STARTING: 'starting', InterfaceOutput.RUNNING: 'running',
+    InterfaceOutput.FAILED: 'failed', InterfaceOutput.STOPPED: 'stopped'
+}
+SHOWN_LINES = 60
+LONGEST_TEXT = 500
+
+
+def interface_output_view(message: Optional[InterfaceOutput]) -> Optional[Dict[str, Any]]:
+    """Status, text and the last lines; None where nothing was started."""
+    if message is None:
+        return None
+    return {'status': _STATUS.get(message.status, ''), 'text': message.text[:LONGEST_TEXT],
+            'lines': list(message.lines[-SHOWN_LINES:])}

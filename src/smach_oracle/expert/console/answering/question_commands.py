@@ -1,0 +1,137 @@
+"""Carries out commands about questions: claims, answers, and those of their interfaces.
+
+Claims are kept alive as long as the pages are there that show the questions. Called from several
+threads; a call takes as long as a robot's service does, 5 s at most.
+"""
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
+
+import genpy
+import roslib.message
+
+from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, UserdataItem
+from smach_oracle.oracle.errors import OracleError
+from smach_oracle.ros.service_calls import ServerGoneError
+from smach_oracle.ros.userdata_codec import encode
+from smach_oracle.srv import ClaimQueryRequest
+
+from ...claims import LEASE_S, Claim, ClaimKeeper
+from ...followed_server import ListedQuestion
+from ...front_end import FrontEnd
+from ..commands.checks import TypedOutput
+from ..commands.commands import KINDS, Command, CommandReply
+from ..web.audit import Audit, Person
+
+_KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,
+                         ExpertDecision.INTERFACE)))
+_ACTION = {'claim': ClaimQueryRequest.CLAIM, 'take_over': ClaimQueryRequest.TAKE_OVER,
+           'release': ClaimQueryRequest.RELEASE}
+_FIELD = {'goto': 'state', 'supersede': 'outcome', 'give_up': 'outcome', 'interface': 'interface'}
+
+
+# may raise ServerGoneError
+CommandWorker = Callable[[Command, Person, ListedQuestion], CommandReply]
+
+
+class OutputError(OracleError):
+    """An output that cannot be sent; the text names it and says why."""
+
+
+class QuestionCommands:
+    """Works on the open questions of a front end, for several people at once."""
+
+    def __init__(self, front_end: FrontEnd, audit: Audit, others: Mapping[str,
+                                                                          CommandWorker]) -> None:
+        """`others`: further commands about questions, by name."""
+        self._front_end = front_end
+        self._others = others
+        self._audit = audit
+        self.claims = ClaimKeeper(front_end)  # held by the pages that show the questions
+
+    def carry_out(self, command: Command, person: Person, page: int) -> CommandReply:
+        """Do one of claim, take_over, release, answer and the others, and record it."""
+        listed = self._front_end.find(command.arguments['question'])
+        reply = self._try(command, person, page, listed)
+        arguments = {name: value for name, value in command.arguments.items() if name != 'question'}
+        self._audit.record(person, command.name, reply.ok, reply.message, arguments, listed)
+        return reply
+
+    def leave(self, page: int) -> None:
+        """A page is gone: its claims are renewed no longer, and run out unless it comes back."""
+        self.claims.leave_all(page)
+
+    def _try(self, command: Command, person: Person, page: int,
+             listed: Optional[ListedQuestion]) -> CommandReply:
+        if listed is None:
+            return CommandReply(False, 'This question is open no longer.')
+        try:
+            if command.name in self._others:
+                return self._others[command.name](command, person, listed)
+            if command.name == 'answer':
+                return self._answer(command, person, listed)
+            return self._claim(command.name, person, page, listed)
+        except (ServerGoneError, OutputError) as err:
+            return CommandReply(False, str(err))
+
+    def _claim(self, name: str, person: Person, page: int, listed: ListedQuestion) -> CommandReply:
+        if name == 'release' and not self.claims.leave(Claim(listed.key, person.expert), page):
+            return CommandReply(True, '')  # another page of the same person shows it
+        response = self._front_end.server(listed).claim(listed.goal.query_id, person.expert,
+                                                        _ACTION[name], LEASE_S)
+        if response.ok and name != 'release':
+            self.claims.keep(listed, person.expert, page)
+        return CommandReply(response.ok, response.message)
+
+    def _answer(self, command: Command, person: Person, listed: ListedQuestion) -> CommandReply:
+        arguments = command.arguments
+        decision = ExpertDecision(kind=_KIND[arguments['kind']], by=person.expert,
+                                  why=arguments['why'])
+        setattr(decision, _FIELD[arguments['kind']], arguments['name'])
+        decision.outputs = items(arguments['outputs'], listed.goal)
+        response = self._front_end.server(listed).answer(listed.goal.query_id, decision)
+        if response.ok:
+            self.claims.drop(Claim(listed.key, person.expert))
+        return CommandReply(response.ok, response.message)
+
+
+def items(outputs: Sequence[TypedOutput], goal: ExpertQueryGoal) -> List[UserdataItem]:
+    """Typed values as userdata.
+
+    :raises OutputError: for a message type that does not occur in the question, or a value that
+        does not fit it.
+    """
+    known = {
+        item.type + ('[]' if item.encoding == UserdataItem.ROS_MESSAGES else '')
+        for item in goal.userdata
+        if item.encoding in (UserdataItem.ROS_MESSAGE, UserdataItem.ROS_MESSAGES)
+    }
+    found = []
+    for output in outputs:
+        if output.type and output.type not in known:
+            raise OutputError('output {}: {} is not a message type of this question'.format(
+                output.key, output.type))
+        found.append(encode(output.key, _message(output) if output.type else output.value))
+        if found[-1].encoding == UserdataItem.UNSENT:
+            raise OutputError('output {}: this value cannot be sent'.format(output.key))
+    return found
+
+
+def _message(output: TypedOutput) -> Union[genpy.Message, List[genpy.Message]]:
+    many = output.type.endswith('[]')
+    message_class = roslib.message.get_message_class(output.type[:-2] if many else output.type)
+    if message_class is None:
+        raise OutputError('output {}: {} is not installed here'.format(output.key, output.type))
+    values = output.value if many else [output.value]
+    if not isinstance(values, list) or not values or not all(
+            isinstance(value, dict) for value in values):
+        raise OutputError('output {}: {} is written as {}'.format(
+            output.key, output.type, 'a list of JSON objects' if many else 'a JSON object'))
+    return [_filled(output, message_class(), value) for value in values] if many else _filled(
+        output, message_class(), values[0])
+
+
+def _filled(output: TypedOutput, message: genpy.Message, value: Dict[str, Any]) -> genpy.Message:
+    try:
+        genpy.message.fill_message_args(message, [value])
+    except (genpy.MessageException, ValueError, TypeError, AttributeError) as err:
+        raise OutputError('output {}: {}'.format(output.key, err)) from err
+    return message

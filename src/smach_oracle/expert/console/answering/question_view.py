@@ -1,0 +1,89 @@
+"""An open question as plain data for the page. Pure."""
+import math
+from typing import Any, Callable, Dict, List
+
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery, UserdataItem
+from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
+
+from ...followed_server import ListedQuestion
+from ...wording import failure_words
+from ..feeds.views import number
+from ..trials.recovery_statistics import RecoveryCounts
+
+LONGEST_TEXT = 8000
+LONGEST_VALUE = 4000
+_VISITS = {1: 'success', 2: 'failure', 3: 'superseded', 4: 'preempted'}
+_STATUS = {OpenQuery.PENDING: 'pending', OpenQuery.CLAIMED: 'claimed',
+           OpenQuery.INTERFACE_RUNNING: 'interface'}
+
+
+def question_view(listed: ListedQuestion, epoch_s: float,
+                  recovery_counts: Callable[[str], RecoveryCounts]) -> Dict[str, Any]:
+    """One open question with all that is known of it.
+
+    :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
+    :param score: how often going to a state has helped.
+    """
+    goal = listed.goal
+    return {
+        'key': listed.key, 'server': listed.server, 'id': goal.query_id, 'trial': goal.trial_id,
+        'robot': goal.robot, 'path': goal.container_path, 'state': goal.failed_state,
+        'what': failure_words(goal), 'outcome': goal.outcome, 'text': _end(goal.text),
+        'class': goal.failure_class, 'rate': number(goal.rate), 'continuous': goal.continuous,
+        'recoveries': goal.recoveries, 'reason': goal.reason, 'tried': list(goal.tried),
+        'status': _STATUS.get(listed.status, 'pending'), 'holder': listed.holder,
+        'interface': goal.interface, 'asked': round(epoch_s + listed.asked_s, 1),
+        'deadline': None if listed.deadline_s == math.inf else round(epoch_s +
+                                                                     listed.deadline_s, 1),
+        'fallback': goal.fallback, 'history': [{
+            'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')
+        } for visit in goal.history], 'choices': _choices(goal, recovery_counts),
+        'supersede': _supersede(goal), 'outputs': list(goal.output_keys),
+        'give_up': list(goal.give_up_outcomes), 'interfaces': [
+            {'name': offer.name, 'description': offer.description} for offer in goal.interfaces
+        ], 'userdata': [_item(item) for item in goal.userdata]
+    }
+
+
+def _choices(goal: ExpertQueryGoal,
+             recovery_counts: Callable[[str], RecoveryCounts]) -> List[Dict[str, Any]]:
+    return [{
+        'state': choice.state, 'success': number(choice.predicted_success),
+        'class': choice.failure_class, 'visits': choice.visits,
+        'missing': list(choice.missing_keys), 'preconditions': list(choice.preconditions),
+        'blocked': choice.blocked, 'helped': list(recovery_counts(choice.state))
+    } for choice in goal.choices]
+
+
+def _supersede(goal: ExpertQueryGoal) -> List[Dict[str, str]]:
+    """First those with which the machine goes on."""
+    states = {choice.state for choice in goal.choices}
+    return [{
+        'outcome': choice.outcome, 'target': choice.target
+    } for choice in sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)]
+
+
+def _item(item: UserdataItem) -> Dict[str, str]:
+    """A key of the userdata: its type, and its value as text where it was sent."""
+    if item.encoding == UserdataItem.UNSENT:
+        return {'key': item.key, 'type': item.type, 'value': '', 'note': 'not sent'}
+    try:
+        if item.encoding == UserdataItem.JSON:
+            return {
+                'key': item.key, 'type': '',
+                'value': bytes(item.value).decode('utf-8')[:LONGEST_VALUE], 'note': ''
+            }
+        value = decode(item)
+        text = '\n---\n'.join(map(str, value)) if isinstance(value, list) else str(value)
+        kind = item.type + ('[]' if isinstance(value, list) else '')
+        return {'key': item.key, 'type': kind, 'value': text[:LONGEST_VALUE], 'note': ''}
+    except (UserdataCodecError, UnicodeDecodeError) as err:
+        return {
+            'key': item.key, 'type': item.type, 'value': '',
+            'note': 'cannot be shown: {}'.format(err)
+        }
+
+
+def _end(text: str) -> str:
+    """The end of a long text: of a traceback that is the part that says something."""
+    return text if len(text) <= LONGEST_TEXT else '…' + text[-LONGEST_TEXT:]

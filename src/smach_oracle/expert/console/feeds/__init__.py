@@ -1,0 +1,1 @@
+"""What robots publish, followed and made plain."""

@@ -1,0 +1,53 @@
+"""ROS messages as plain data for the page. Pure.
+
+A robot's words are passed on as text, never as markup.
+"""
+import math
+from typing import Any, Dict, Optional
+
+from smach_oracle.msg import OracleEvent, OracleRates
+from smach_oracle.oracle.records.events import Event, EventKind
+
+from ...wording import event_words
+
+LONGEST_TEXT = 8000
+_KINDS = {int(kind): kind for kind in EventKind}
+
+
+def event_of(message: OracleEvent) -> Event:
+    """The event as the executive emitted it; of its data only what a trial's start has."""
+    kind: Any = _KINDS.get(message.kind, message.kind)
+    data = {'recovers': '"recovers": false' not in message.data
+            } if kind == EventKind.TRIAL_START else None
+    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
+                 message.state, message.outcome, message.target, message.failure_kind,
+                 message.failure_class, message.rate, message.continuous, message.query_id,
+                 message.by, message.text, data)
+
+
+def event_view(event: Event) -> Dict[str, Any]:
+    """One event of a trial's time axis."""
+    return {
+        'seq': event.seq, 'kind': getattr(event.kind, 'name', str(event.kind)).lower(),
+        't': event.wall_time, 'path': event.path, 'state': event.state, 'outcome': event.outcome,
+        'target': event.target, 'class': event.failure_class, 'rate': number(event.rate),
+        'continuous': event.continuous, 'query': event.query_id, 'by': event.by,
+        'text': event.text[:LONGEST_TEXT], 'words': event_words(event)
+    }
+
+
+def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
+    """The learned rates: container path -> label -> rate, class and counts."""
+    found: Dict[str, Dict[str, Dict[str, Any]]] = {}
+    for row in message.states:
+        found.setdefault(row.path, {})[row.state] = {
+            'rate': number(row.rate), 'class': row.failure_class, 'successes': row.successes,
+            'failures': row.failures, 'recoveries': row.recoveries,
+            'preconditions': row.has_preconditions
+        }
+    return found
+
+
+def number(value: float, digits: int = 4) -> Optional[float]:
+    """A number that JSON knows: rounded to some digits; None for what is not finite."""
+    return round(float(value), digits) if math.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Machines as graphs, laid out by dot."""

@@ -1,0 +1,1 @@
+"""Robots found and followed."""

@@ -1,0 +1,1 @@
+"""Cameras, clouds and robots as a browser can show them."""

@@ -1,0 +1,171 @@
+// @ts-check
+// Everything that may be answered, each a button: one press sends it. Keys: 1 to 9 a state, s the
+// first supersede, i the first interface, g give up.
+import { h, setText } from '../page/dom.js';
+import { whenLetGo } from '../page/redraw.js';
+import { outputFields, readOutputs } from './output_field.js';
+import { PreconditionList } from './precondition_list.js';
+import { likeliest, stateLines } from './state_choices.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Answer} Answer */
+/** @typedef {import('../server').AnswerKind} AnswerKind */
+/** @typedef {import('../server').PreconditionCheck} PreconditionCheck */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('../server').StateChoice} StateChoice */
+
+const MOST_AT_ONCE = 12; // states
+const MOST_OPEN = 2; // outputs
+const REASON = 'Reason, for the record';
+
+export class AnswerForm {
+  /**
+   * @param {Question} question
+   * @param {(answer: Answer) => void} onAnswer
+   */
+  constructor(question, onAnswer) {
+    this.question = question;
+    this.onAnswer = onAnswer;
+    /** @type {HTMLButtonElement[]} */
+    this.buttons = [];
+    /** @type {Map<string, HTMLButtonElement>} */
+    this.keys = new Map();
+    /** @type {Map<string, PreconditionList>} */
+    this.preconditions = new Map(); // by state
+    this.why = h('input', { type: 'text', class: 'why', maxlength: 2000,
+      placeholder: REASON + ' (optional)', 'aria-label': REASON });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.outputs = outputFields(question, () => setText(this.problem, ''));
+    this.root = h('div', { class: 'answer-form' }, this.goTo(), this.interfaces(), this.supersede(),
+      this.giveUp(), this.problem, this.why);
+    this.enable(false);
+  }
+
+  /** @param {boolean} on */
+  enable(on) {
+    for (const button of this.buttons) {
+      button.disabled = !on || button.dataset['blocked'] === 'yes';
+    }
+  }
+
+  /**
+   * Whether the preconditions of states hold.
+   * @param {{ [state: string]: PreconditionCheck[] | undefined }} checks
+   * @param {number} now by the server's clock
+   */
+  showPreconditions(checks, now) {
+    whenLetGo(this.root, () => {
+      for (const [state, list] of this.preconditions) list.show(checks[state], now);
+    });
+  }
+
+  /** @param {string} key */
+  press(key) {
+    const button = this.keys.get(key);
+    if (button && !button.disabled) button.click();
+  }
+
+  /**
+   * @param {AnswerKind} kind
+   * @param {string} name
+   */
+  send(kind, name) {
+    const outputs = readOutputs(kind === 'supersede' ? this.outputs : [], this.problem);
+    if (outputs) this.onAnswer({ kind, name, outputs, why: this.why.value });
+  }
+
+  /**
+   * One button.
+   * @param {AnswerKind} kind
+   * @param {string} name of the state, outcome or interface
+   * @param {string} key that presses it, '' for none
+   * @param {Child} words
+   */
+  choice(kind, name, key, words) {
+    const button = h('button', { class: 'choice ' + kind, type: 'button', 'data-kind': kind,
+      'data-name': name, onclick: () => this.send(kind, name) },
+    h('kbd', {}, key), h('span', { class: 'choice-text' }, words));
+    if (key) this.keys.set(key, button);
+    this.buttons.push(button);
+    return button;
+  }
+
+  /** @returns {Child} */
+  goTo() {
+    const { choices } = this.question;
+    const first = choices.length <= MOST_AT_ONCE ? choices : likeliest(this.question);
+    const rest = choices.filter((choice) => !first.includes(choice));
+    return [h('h4', {}, 'Go to'), choicesBox(first.map((choice, index) => (
+      this.state(choice, String(index + 1))))), rest.length > 0 && this.otherStates(rest)];
+  }
+
+  /** @param {StateChoice[]} choices */
+  otherStates(choices) {
+    const buttons = choices.map((choice) => this.state(choice, ''));
+    const filter = h('input', { type: 'search', class: 'state-filter',
+      placeholder: 'Part of a name', 'aria-label': 'States whose name has',
+      oninput: () => {
+        const wanted = filter.value.trim().toLowerCase();
+        choices.forEach(({ state }, index) => {
+          buttons[index].hidden = !state.toLowerCase().includes(wanted);
+        });
+      } });
+    return h('details', { class: 'all-states' }, h('summary', {}, choices.length + ' more states'),
+      filter, choicesBox(buttons));
+  }
+
+  /**
+   * @param {StateChoice} choice
+   * @param {string} key
+   */
+  state(choice, key) {
+    const { state, preconditions, blocked } = choice;
+    const words = stateLines(choice, this.question.state);
+    if (preconditions.length) {
+      const list = new PreconditionList(preconditions);
+      this.preconditions.set(state, list);
+      words.push(list.root);
+    }
+    const button = this.choice('goto', state, key, words);
+    if (blocked) button.dataset['blocked'] = 'yes';
+    return button;
+  }
+
+  /** @returns {Child} */
+  interfaces() {
+    const { interfaces } = this.question;
+    return interfaces.length > 0 && [h('h4', {}, 'Do it through an interface'),
+      choicesBox(interfaces.map(({ name, description }, index) => (
+        this.choice('interface', name, index ? '' : 'i', [h('strong', {}, name),
+          description && h('span', { class: 'dim' }, description)]))))];
+  }
+
+  /** @returns {Child} */
+  supersede() {
+    const { supersede, state } = this.question;
+    const { outputs } = this;
+    return supersede.length > 0 && [h('h4', {}, 'I have done the work of ', state),
+      outputs.length > 0 && h('details', { class: 'outputs', open: outputs.length <= MOST_OPEN },
+        h('summary', {}, 'Its output userdata'), outputs.map((output) => output.root)),
+      choicesBox(supersede.map(({ outcome, target }, index) => (
+        this.choice('supersede', outcome, index ? '' : 's', [h('strong', {}, outcome),
+          h('span', { class: 'dim' }, '→ ', target)]))), 'short')];
+  }
+
+  /** @returns {Child} */
+  giveUp() {
+    const { give_up: outcomes, path } = this.question;
+    const asFailed = h('strong', {}, 'as the failure would have ended ', path);
+    return [h('h4', {}, 'Give up'), choicesBox([this.choice('give_up', '', 'g', asFailed),
+      ...outcomes.map((outcome) => (
+        this.choice('give_up', outcome, '', h('strong', {}, 'with ', outcome))))], 'short')];
+  }
+}
+
+/**
+ * @param {HTMLButtonElement[]} buttons
+ * @param {string} [kind]
+ */
+function choicesBox(buttons, kind) {
+  return h('div', { class: 'choices' + (kind ? ' ' + kind : '') }, buttons);
+}

@@ -1,0 +1,68 @@
+// @ts-check
+// The states that a machine may be told to go to: which come first, and what is said of each.
+import { h } from '../page/dom.js';
+import { FAILURE_CLASSES, breakable, chip, counted, percent, rateBar } from '../page/format.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('../server').StateChoice} StateChoice */
+
+const LIKELIEST = 6;
+const MOST_HELPFUL = 2;
+
+/**
+ * Of very many states those that are chosen most: what has helped, the failed one, where its
+ * success leads, and whence the machine came.
+ * @param {Question} question
+ */
+export function likeliest({ choices, state, supersede, history }) {
+  /** @param {StateChoice} choice */
+  const share = ({ helped: [helped, tried] }) => helped / tried;
+  const helpful = choices.filter((choice) => choice.helped[0] > 0)
+    .sort((one, other) => share(other) - share(one)).slice(0, MOST_HELPFUL);
+  const came = history.filter((visit) => visit.result === 'success').reverse();
+  const names = [...helpful.map((choice) => choice.state), state,
+    ...supersede.map((choice) => choice.target), ...came.map((visit) => visit.state)];
+  const known = names.filter((name) => choices.some((choice) => choice.state === name));
+  const first = [...new Set(known)].slice(0, LIKELIEST);
+  return choices.filter((choice) => first.includes(choice.state));
+}
+
+/**
+ * What a button says of a state.
+ * @param {StateChoice} choice
+ * @param {string} failed the state that failed
+ * @returns {Child[]}
+ */
+export function stateLines(choice, failed) {
+  return [
+    h('span', { class: 'row' },
+      h('strong', { class: 'ellipsis' }, breakable(choice.state, '_')),
+      choice.state === failed && chip('again', '', 'The state that failed'),
+      h('span', { class: 'spacer' }), successBar(choice.success)),
+    h('span', { class: 'chips' }, stateChips(choice, failed)),
+  ];
+}
+
+/** @param {number | null} success predicted */
+function successBar(success) {
+  return success === null ? rateBar(null) : rateBar(1 - success, success, percent(success) + ' ok');
+}
+
+/**
+ * @param {StateChoice} choice
+ * @param {string} failed the state that failed
+ * @returns {Child[]}
+ */
+function stateChips({ class: rank, blocked, missing, visits, helped: [helped, tried] }, failed) {
+  const words = FAILURE_CLASSES[rank];
+  return [
+    words && chip(words, 'class-' + rank),
+    blocked && chip('blocked: ' + blocked, 'bad'),
+    missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
+      'Userdata that it needs and would not have'),
+    visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),
+    tried > 0 && chip('helped ' + helped + ' of ' + tried, helped * 2 > tried ? 'good' : '',
+      'How often going there helped when ' + failed + ' had failed, as far as this console saw'),
+  ];
+}

@@ -1,0 +1,72 @@
+// What the page sends: commands with their arguments, and what the replies hold. The server's
+// commands.py checks every bit of it; test/unit/console/test_console_types.py compares the two.
+// Lengths are metres unless something else is written beside them.
+import { Vector } from './drawing/types';
+import { DriveFrame } from './server';
+
+interface OfQuestion { question: string } // its key
+
+/** A value for the userdata. */
+export interface Output { key: string; value: unknown; type: string }
+
+export type AnswerKind = 'goto' | 'supersede' | 'give_up' | 'interface';
+
+export interface Answer { kind: AnswerKind; name: string; outputs: Output[]; why: string }
+
+/** A line on an image, px. */
+export interface Stroke { foreground: boolean; width: number; points: Point[] }
+export type Point = [x: number, y: number];
+
+/** What a person holds. Axes are -1 to 1. */
+export interface DriveWish {
+  held: boolean;
+  linear: Vector; // forward, left, up
+  angular: Vector; // about these
+  gripper: '' | 'open' | 'close';
+}
+
+/** Commands by their names, with their arguments. */
+export interface Commands {
+  hello: { xsrf: string; expert: string };
+  watch: { trial: string };
+  claim: OfQuestion;
+  take_over: OfQuestion;
+  release: OfQuestion;
+  answer: OfQuestion & Answer;
+  mark: OfQuestion & { stamp: string; region: Point[]; strokes: Stroke[] };
+  use_frame: OfQuestion & { frame: 'at_goal' | 'fresh' };
+  hand_over: OfQuestion & { outcome: string; outputs?: Output[]; why: string };
+  give_up_interface: OfQuestion & { why: string };
+  take_wheel: OfQuestion;
+  leave_wheel: OfQuestion;
+  drive: OfQuestion & DriveWish & { frame: DriveFrame; arm: string; sent: number }; // ms
+}
+
+/** What a reply to some commands holds. */
+export interface ReplyData {
+  mark: Marked;
+  take_wheel: { wheel: number };
+}
+
+export interface Reply<Name extends keyof Commands = keyof Commands> {
+  re: number; // the command's number
+  ok: boolean;
+  message: string;
+  data?: Name extends keyof ReplyData ? ReplyData[Name] : never;
+}
+
+/** What a perception interface has made out. */
+export interface Marked {
+  outlines: number[][]; // x, y, x, y, ... px of each line around the mask
+  elapsed: number; // s
+  object?: MarkedObject;
+}
+
+export interface MarkedObject {
+  frame: string;
+  position: Vector;
+  yaw: number; // rad
+  points: number;
+  size: Vector;
+  cloud: { kind: 'cloud'; count: number; of: number; offset: Vector; scale: Vector; data: string };
+}

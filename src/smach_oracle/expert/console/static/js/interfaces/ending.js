@@ -1,0 +1,40 @@
+// @ts-check
+// How an interface ends: the outcome of the state whose work it did, and the reply of the robot.
+import { unlessLost } from '../page/connection.js';
+import { h, setText } from '../page/dom.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').Commands} Commands */
+/** @typedef {import('../server').Question} Question */
+
+const LOST = 'The connection was lost before the robot had confirmed; try again.';
+
+/** @param {Question} question */
+export function outcomeChoice({ supersede }) {
+  return h('select', { 'aria-label': 'Outcome' }, supersede.map(({ outcome, target }) => (
+    h('option', { value: outcome, selected: outcome === 'succeeded' }, outcome + ' → ' + target))));
+}
+
+/** @param {HTMLSelectElement} choice */
+export function outcomeRow(choice) {
+  return h('label', { class: 'outcome-row' },
+    h('span', { class: 'dim' }, 'The state ends with'), choice);
+}
+
+/**
+ * The reply to a command; null where the connection was lost, which `problem` says then.
+ * @template {keyof Commands} Name
+ * @param {App} app
+ * @param {Element} problem
+ * @param {Name} command
+ * @param {Commands[Name]} args
+ */
+export async function replyTo(app, problem, command, args) {
+  try {
+    return await app.connection.request(command, args);
+  } catch (err) {
+    unlessLost(err);
+    setText(problem, LOST);
+    return null;
+  }
+}

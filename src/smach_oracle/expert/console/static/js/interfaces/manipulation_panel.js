@@ -1,0 +1,281 @@
+// @ts-check
+// Driving a robot's hand: hold to move, let go to stop. The server relays what is fresh only, and
+// the robot has a watchdog.
+import { vector } from '../drawing/transforms.js';
+import { unlessLost } from '../page/connection.js';
+import { dropFocus, h, setText } from '../page/dom.js';
+import { remember, remembered } from '../page/preferences.js';
+import { redraw } from '../page/redraw.js';
+import { DriveCamera } from './drive_camera.js';
+import { DriveInput } from './drive_input.js';
+import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
+import { factsOf, lightOf } from './hand_state.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').DriveFrame} DriveFrame */
+/** @typedef {import('../server').DriveWish} DriveWish */
+/** @typedef {import('../server').Manipulation} Manipulation */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('./drive_moves.js').Move} Move */
+/** @typedef {import('./drive_moves.js').MoveKind} MoveKind */
+
+const PERIOD_MS = 25;
+const IDLE_MS = 500; // how often a page that holds the wheel says so while nothing moves
+const FRAMES = { tool: 'Tool', base: 'Base', camera: 'Camera' };
+const TITLES = { linear: 'Move', angular: 'Turn' };
+const HOLD = 'Hold to move, let go to stop. ';
+const PAD = 'A gamepad moves while a shoulder button is held.';
+/** @type {DriveWish} */
+const NOTHING = { held: false, linear: [0, 0, 0], angular: [0, 0, 0], gripper: '' };
+/** @type {Manipulation} */
+const UNKNOWN = { frames: [], arms: [], boxes: null, wheel: null, driver: '' };
+
+/** @param {string} name */
+function frameOf(name) {
+  return name === 'base' || name === 'camera' ? name : 'tool';
+}
+
+export class ManipulationPanel {
+  /**
+   * @param {App} app
+   * @param {Question} question
+   */
+  constructor(app, question) {
+    this.app = app;
+    this.question = question;
+    this.input = new DriveInput((held) => this.changed(held));
+    this.sentMs = 0;
+    this.arm = ''; // the one that the interface has chosen, until the person chooses
+    /** @type {number | null} */
+    this.wheel = null; // the number under which this page took it
+    this.armsKey = '';
+    this.factsKey = '[]';
+    this.arms = h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm' });
+    this.wheelButton = h('button', { class: 'primary wheel', onclick: () => this.turnWheel() });
+    this.driver = h('span', { class: 'dim driver', role: 'status' });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.frames = { tool: this.frameButton('tool'), base: this.frameButton('base'),
+      camera: this.frameButton('camera') };
+    this.scale = h('input', { type: 'range', min: 5, max: 100, step: 5,
+      value: remembered('drive speed', '30'), oninput: () => this.showScale(),
+      'aria-label': 'Speed, % of the interface\'s own limit' });
+    this.scaleText = h('output', { class: 'number' });
+    /** @type {Map<Move, HTMLButtonElement>} */
+    this.pads = new Map(MOVES.map((move) => [move, this.pad(move)]));
+    this.light = h('div', { class: 'drive-light' });
+    this.facts = h('dl', { class: 'drive-facts' });
+    this.camera = new DriveCamera(app);
+    this.hint = h('p', { class: 'dim hint' });
+    this.root = this.build();
+    this.showScale();
+    this.frame = this.choose(frameOf(remembered('drive frame', 'tool')));
+    this.showHeld(this.input.read());
+    this.timer = setInterval(() => this.beat(), PERIOD_MS);
+    this.update();
+  }
+
+  build() {
+    return h('section', { class: 'card manipulation', 'aria-label': 'Drive the hand' },
+      h('div', { class: 'manipulation-head' },
+        h('h3', {}, 'Drive the hand for ', this.question.state), this.driver,
+        h('span', { class: 'spacer' }), this.wheelButton),
+      this.problem,
+      h('div', { class: 'manipulation-body' },
+        h('div', { class: 'manipulation-see' }, this.light, this.camera.root, this.facts),
+        this.buildControls()));
+  }
+
+  buildControls() {
+    return h('div', { class: 'manipulation-controls' },
+      h('div', { class: 'manipulation-choices' }, this.arms,
+        h('div', { class: 'row wrap' },
+          h('span', { class: 'dim frame-words' }, 'Along the axes of the'),
+          Object.values(this.frames))),
+      h('label', { class: 'row' },
+        h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
+      h('h4', {}, TITLES.linear), this.padGroup('linear'),
+      h('h4', {}, TITLES.angular), this.padGroup('angular'),
+      h('h4', {}, 'Gripper'),
+      h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' },
+        this.pads.get('open'), this.pads.get('close')),
+      this.hint);
+  }
+
+  /** @param {MoveKind} kind */
+  padGroup(kind) {
+    return h('div', { class: 'pads', role: 'group', 'aria-label': TITLES[kind] },
+      MOTIONS.filter((motion) => motion.kind === kind).map(({ move }) => this.pads.get(move)));
+  }
+
+  /** @param {DriveFrame} name */
+  frameButton(name) {
+    return h('button', { class: 'tool', 'data-frame': name,
+      onclick: () => { this.frame = this.choose(name); } }, FRAMES[name]);
+  }
+
+  /** @param {Move} move */
+  pad(move) {
+    const { key, sign } = BUTTONS[move];
+    const button = h('button', { class: 'pad', 'data-move': move, title: move },
+      h('span', { class: 'sign' }, sign), h('span', { class: 'pad-name' }, move),
+      h('kbd', {}, key));
+    this.input.bind(button, move);
+    return button;
+  }
+
+  /** The interface as it stands; undefined where it is gone. */
+  get manipulation() { return this.app.store.get('hand')?.[this.question.key]; }
+
+  /** Whether this page drives. */
+  get mine() {
+    const now = this.manipulation;
+    return Boolean(now && this.wheel && now.wheel === this.wheel && this.app.connection.connected);
+  }
+
+  stop() {
+    this.input.stop();
+    clearInterval(this.timer);
+    this.camera.stop();
+    if (!this.wheel) return;
+    this.app.connection.request('leave_wheel', { question: this.question.key }).catch(() => {});
+  }
+
+  /** Take the wheel, or leave it. */
+  async turnWheel() {
+    const command = this.mine ? 'leave_wheel' : 'take_wheel';
+    this.input.releaseAll();
+    setText(this.problem, '');
+    try {
+      const reply = await this.app.connection.request(command, { question: this.question.key });
+      this.wheel = reply.ok && reply.data ? reply.data.wheel : null;
+      if (!reply.ok) setText(this.problem, reply.message);
+    } catch (err) {
+      unlessLost(err);
+      this.wheel = null;
+    }
+    dropFocus();
+    this.update();
+  }
+
+  /**
+   * @param {DriveFrame} frame along whose axes the hand moves
+   * @returns {DriveFrame}
+   */
+  choose(frame) {
+    this.input.releaseAll();
+    remember('drive frame', frame);
+    for (const button of Object.values(this.frames)) {
+      button.setAttribute('aria-pressed', String(button === this.frames[frame]));
+    }
+    dropFocus(); // keys drive, they press no buttons
+    return frame;
+  }
+
+  /** @param {string} arm */
+  chooseArm(arm) {
+    this.input.releaseAll();
+    this.arm = arm;
+    dropFocus();
+    this.update();
+  }
+
+  /**
+   * Where the interface offers several: the one that moves, and the others to change to.
+   * @param {Manipulation} manipulation
+   */
+  showArms({ arms, state }) {
+    if (this.arm && !arms.includes(this.arm)) this.arm = '';
+    const now = this.arm || (state ? state.arm : '');
+    const key = JSON.stringify([arms, now]);
+    if (key === this.armsKey) return;
+    this.armsKey = key;
+    this.arms.hidden = arms.length < 2;
+    redraw(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { key: arm,
+      class: 'tool', 'data-arm': arm, 'aria-pressed': arm === now,
+      onclick: () => this.chooseArm(arm) }, arm)));
+  }
+
+  showScale() {
+    setText(this.scaleText, this.scale.value + ' %');
+    remember('drive speed', this.scale.value);
+  }
+
+  /**
+   * Not with the next beat: a key that is let go stops now.
+   * @param {boolean} held
+   */
+  changed(held) {
+    if (!this.mine) return;
+    if (held) this.beat();
+    else this.send(NOTHING);
+    this.showHeld(this.input.read());
+  }
+
+  beat() {
+    if (!this.mine) return;
+    const wish = this.input.read();
+    this.showHeld(wish);
+    if (!wish.held && performance.now() - this.sentMs < IDLE_MS) return;
+    const share = Number(this.scale.value) / 100;
+    this.send({ held: wish.held, linear: vector((axis) => wish.linear[axis] * share),
+      angular: vector((axis) => wish.angular[axis] * share), gripper: wish.gripper });
+  }
+
+  /** @param {DriveWish} wish */
+  send(wish) {
+    this.sentMs = performance.now();
+    const { frame, arm, sentMs: sent } = this;
+    const question = this.question.key;
+    this.app.connection.send('drive', { question, frame, arm, sent, ...wish }, wish.held);
+  }
+
+  /** @param {DriveWish} wish */
+  showHeld({ held }) {
+    const { gamepad, moves } = this.input;
+    setText(this.hint, HOLD + (gamepad.words || ('getGamepads' in navigator ? PAD : '')));
+    for (const [move, button] of this.pads) button.classList.toggle('held', moves.has(move));
+    this.root.classList.toggle('driving', held);
+  }
+
+  update() {
+    const { mine } = this;
+    const now = this.manipulation;
+    const { frames, state } = now || UNKNOWN;
+    if (!mine) this.input.releaseAll();
+    this.input.active = mine;
+    this.showWheel(now);
+    this.root.classList.toggle('mine', mine);
+    for (const button of this.pads.values()) button.disabled = !mine;
+    for (const name of /** @type {DriveFrame[]} */ (Object.keys(this.frames))) {
+      this.frames[name].hidden = !frames.includes(name);
+    }
+    if (frames.length && !frames.includes(this.frame)) this.frame = this.choose(frames[0]);
+    this.showArms(now || UNKNOWN);
+    const { text, kind } = lightOf(state);
+    setText(this.light, text);
+    this.light.dataset['kind'] = kind;
+    this.showFacts(now && state ? factsOf(now, state) : []);
+    this.camera.update();
+  }
+
+  /** @param {Manipulation | undefined} now */
+  showWheel(now) {
+    const { connected } = this.app.connection;
+    const may = this.app.role === 'teleoperator';
+    this.wheelButton.disabled = !may || !now || !connected;
+    setText(this.wheelButton, this.mine ? 'Leave the wheel' : 'Take the wheel');
+    const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
+    const driver = now && now.driver ? now.driver + ' drives.' : nobody;
+    const shown = this.mine ? 'You drive.' : driver;
+    setText(this.driver, connected ? shown : 'No connection: the hand stands.');
+  }
+
+  /** @param {[name: string, value: string][]} facts */
+  showFacts(facts) {
+    const key = JSON.stringify(facts);
+    if (key === this.factsKey) return;
+    this.factsKey = key;
+    redraw(this.facts, facts.map(([name, value]) => [h('dt', {}, name),
+      h('dd', { class: 'number', 'data-fact': name.toLowerCase() }, value)]));
+  }
+}

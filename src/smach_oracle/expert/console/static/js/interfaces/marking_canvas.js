@@ -1,0 +1,102 @@
+// @ts-check
+// The canvas over an image, on which a person marks an object.
+import { h } from '../page/dom.js';
+import { Marking, isBrush } from './marking.js';
+import { drawMarking } from './marking_drawing.js';
+
+/** @typedef {import('../server').Point} Point */
+/** @typedef {import('./marking.js').Tool} Tool */
+/**
+ * @typedef {object} Use
+ * @property {() => boolean} may whether somebody may draw now
+ * @property {() => void} refused the image has no region yet that could be corrected
+ * @property {() => void} begun a new region is being drawn
+ * @property {() => void} marked there is something new to cut out
+ * @property {() => void} ended a line has ended
+ */
+
+const BRUSH = 7; // px of the screen
+const THINNEST = 2; // px of the image
+
+export class MarkingCanvas {
+  /** @param {Use} use */
+  constructor(use) {
+    this.use = use;
+    this.marking = new Marking();
+    /** @type {number[][]} */
+    this.outlines = []; // of what was cut out
+    /** @type {Tool} */
+    this.tool = 'rectangle';
+    this.root = h('canvas', { class: 'drawing', width: 4, height: 3 });
+    this.root.addEventListener('pointerdown', (event) => this.begin(event));
+    this.root.addEventListener('pointermove', (event) => this.move(event));
+    this.root.addEventListener('pointerup', () => this.end());
+    this.root.addEventListener('pointercancel', () => this.cancel());
+  }
+
+  /**
+   * As large as the image.
+   * @param {[width: number, height: number]} size px
+   */
+  setSize([width, height]) { Object.assign(this.root, { width, height }); }
+
+  /** @param {PointerEvent} event */
+  begin(event) {
+    if (!this.use.may() || !event.isPrimary || event.button) return;
+    event.preventDefault();
+    this.root.setPointerCapture(event.pointerId);
+    const correcting = isBrush(this.tool);
+    if (correcting && !this.marking.region) {
+      this.use.refused();
+      return;
+    }
+    const width = Math.max(THINNEST, Math.round(BRUSH * this.scale));
+    this.marking.begin(this.tool, this.at(event), width);
+    if (!correcting) this.use.begun();
+    this.paint();
+  }
+
+  /** @param {PointerEvent} event */
+  move(event) {
+    if (!this.marking.line) return;
+    const passed = event.getCoalescedEvents ? event.getCoalescedEvents() : [];
+    for (const each of [...passed, event]) this.marking.move(this.at(each));
+    this.paint();
+  }
+
+  end() {
+    if (this.marking.end()) this.use.marked();
+    this.use.ended();
+  }
+
+  cancel() {
+    this.marking.line = null;
+    this.use.ended();
+  }
+
+  /** Pixels of the image for one of the screen. */
+  get scale() { return this.root.width / (this.root.clientWidth || 1); }
+
+  /**
+   * The pixel of the image.
+   * @param {PointerEvent} event
+   * @returns {Point}
+   */
+  at(event) {
+    const { left, top, width, height } = this.root.getBoundingClientRect();
+    /**
+     * @param {number} share
+     * @param {number} size
+     */
+    const place = (share, size) => Math.round(Math.min(Math.max(share, 0), 1) * (size - 1));
+    return [place((event.clientX - left) / width, this.root.width),
+      place((event.clientY - top) / height, this.root.height)];
+  }
+
+  paint() {
+    const context = this.root.getContext('2d');
+    if (!context) return;
+    context.clearRect(0, 0, this.root.width, this.root.height);
+    drawMarking(context, this.marking, this.outlines, this.scale);
+  }
+}

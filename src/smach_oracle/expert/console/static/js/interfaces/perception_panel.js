@@ -1,0 +1,295 @@
+// @ts-check
+// Marking an object in the very image of the failure: draw around it, refine, accept; the machine
+// goes on.
+import { h, replace, setText } from '../page/dom.js';
+import { drawImage } from '../sensors/image_canvas.js';
+import { SensorFeed } from '../sensors/sensor_feed.js';
+import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
+import { markedFacts } from './marked_facts.js';
+import { MarkingCanvas } from './marking_canvas.js';
+import { ObjectView } from './object_view.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Commands} Commands */
+/** @typedef {import('../server').ImageFacts} ImageFacts */
+/** @typedef {import('../server').Marked} Marked */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('./marking.js').Tool} Tool */
+
+/** @type {{ tool: Tool, text: string, title: string }[]} */
+const TOOLS = [
+  { tool: 'rectangle', text: '▭ Rectangle', title: 'Drag from corner to corner around the object' },
+  { tool: 'free', text: '✎ Free region', title: 'Draw a line around the object' },
+  { tool: 'object', text: '+ Object', title: 'Paint what belongs to it' },
+  { tool: 'background', text: '− Background', title: 'Paint what does not belong to it' },
+];
+const FULL = 1280; // px: the width asked for
+const PERIOD_MS = 200;
+const FIRST = 'First draw a region around the object.';
+const VIEWER = 'You are signed in as a viewer: operators mark objects.';
+const NOT_YET = 'No object yet: refine, or draw again.';
+const DRAW = 'Draw around the whole object, closely; the rest is cut out by itself.';
+
+export class PerceptionPanel {
+  /**
+   * @param {App} app
+   * @param {Question} question
+   * @param {() => void} onEnd an object was accepted, or the expert gave up
+   */
+  constructor(app, question, onEnd) {
+    this.app = app;
+    this.question = question;
+    this.onEnd = onEnd;
+    this.over = false;
+    this.busy = false;
+    this.cutting = false;
+    this.stamp = ''; // of the image
+    this.generation = 0; // of what is drawn
+    this.askedMs = 0;
+    /** @type {Marked | null} */
+    this.marked = null;
+    this.warning = '';
+    this.resultKey = ''; // of what is shown of it
+    this.image = h('canvas', { class: 'image', width: 4, height: 3,
+      'aria-label': 'The frame to draw on' });
+    this.canvas = this.makeCanvas();
+    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the frame…');
+    /** @type {Map<Tool, HTMLButtonElement>} */
+    this.tools = new Map(TOOLS.map(({ tool, text, title }) => [tool, h('button', { class: 'tool',
+      'data-tool': tool, title, onclick: () => this.take(tool) }, text)]));
+    this.result = h('div', { class: 'marked', role: 'status' });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.outcome = outcomeChoice(question);
+    this.buttons = this.makeButtons();
+    this.object = new ObjectView(app, () => this.sensors);
+    this.root = this.build();
+    this.take('rectangle');
+    /** @type {SensorFeed<ImageFacts>} */
+    this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
+      { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
+        say: (text) => this.say(text) });
+    this.refresh();
+  }
+
+  makeCanvas() {
+    return new MarkingCanvas({
+      may: () => this.may && Boolean(this.stamp),
+      refused: () => setText(this.problem, FIRST),
+      begun: () => this.forget(),
+      marked: () => this.cut(),
+      ended: () => this.refresh(),
+    });
+  }
+
+  makeButtons() {
+    return {
+      undo: button('Undo', () => this.undo()),
+      clear: button('Clear', () => this.clear()),
+      failed: button('Frame of the failure', () => this.useFrame('at_goal')),
+      fresh: button('New frame', () => this.useFrame('fresh')),
+      accept: button('Accept the object', () => this.accept(), 'primary accept'),
+      quit: button('Give up', () => this.giveUp(), 'quit'),
+    };
+  }
+
+  build() {
+    const { failed, fresh } = this.buttons;
+    return h('section', { class: 'card perception', 'aria-label': 'Mark the object' },
+      h('div', { class: 'perception-head' },
+        h('h3', {}, 'Mark the object for ', this.question.state),
+        h('span', { class: 'spacer' }), failed, fresh),
+      h('div', { class: 'perception-body' },
+        h('div', { class: 'screen' }, this.image, this.canvas.root, this.note), this.object.root,
+        h('div', { class: 'perception-side' }, this.buildSide())));
+  }
+
+  /** @returns {Child} */
+  buildSide() {
+    const { undo, clear, accept, quit } = this.buttons;
+    const several = this.question.supersede.length > 1;
+    return [h('div', { class: 'tool-row', role: 'toolbar' }, [...this.tools.values()]),
+      h('div', { class: 'tool-row' }, undo, clear), this.result, this.problem,
+      h('span', { class: 'spacer' }),
+      h('div', { class: 'perception-end' }, several && outcomeRow(this.outcome), accept, quit)];
+  }
+
+  stop() {
+    this.feed.stop();
+    this.object.stop();
+  }
+
+  /** Numbers of the sensors of its image and of the cloud of that, null before there are any. */
+  get sensors() {
+    const running = this.app.store.get('eye')?.perception || {};
+    return running[this.question.key] || { image: null, cloud: null };
+  }
+
+  get may() { return this.app.mayAnswer && !this.over; }
+
+  get marking() { return this.canvas.marking; }
+
+  /** @param {Tool} tool */
+  take(tool) {
+    this.canvas.tool = tool;
+    for (const [name, each] of this.tools) {
+      each.setAttribute('aria-pressed', String(name === tool));
+    }
+  }
+
+  /** @param {string} text */
+  say(text) {
+    if (text === 'Nothing new comes.') return; // one image is all there is to come
+    setText(this.note, this.stamp ? '' : text);
+    this.note.hidden = !this.note.textContent;
+  }
+
+  /**
+   * @param {Response} answer
+   * @param {ImageFacts} facts
+   */
+  async show(answer, { size, stamp }) {
+    await drawImage(this.image, answer, size);
+    this.canvas.setSize(size);
+    if (this.stamp !== stamp) {
+      this.marking.clear();
+      this.forget();
+    }
+    this.stamp = stamp;
+    this.root.classList.add('shown');
+    this.refresh();
+  }
+
+  /** What was cut out is about something else. */
+  forget() {
+    this.canvas.outlines = [];
+    this.marked = null;
+    this.object.show(null);
+    this.generation += 1; // so is a reply that is still on its way
+    setText(this.problem, '');
+  }
+
+  /** Have it cut out. One cut at a time; what was drawn meanwhile is cut out next. */
+  async cut() {
+    this.askedMs = performance.now();
+    this.generation += 1;
+    if (this.cutting) return;
+    this.cutting = true;
+    let done = 0;
+    while (done !== this.generation && this.marking.region && !this.over) {
+      done = this.generation;
+      const { region, strokes } = this.marking;
+      const reply = await this.ask('mark',
+        { question: this.question.key, stamp: this.stamp, region, strokes });
+      if (reply && done === this.generation) this.takeIn(reply);
+    }
+    this.cutting = false;
+    this.refresh();
+  }
+
+  /** @param {import('../server').Reply<'mark'>} reply */
+  takeIn({ ok, message, data }) {
+    this.canvas.outlines = data ? data.outlines : [];
+    this.marked = ok && data ? data : null;
+    this.object.show(this.marked?.object || null);
+    this.root.dataset['shownAfter'] = String(Math.round(performance.now() - this.askedMs));
+    setText(this.problem, ok ? '' : message);
+    this.warning = ok ? message : '';
+    this.refresh();
+  }
+
+  undo() {
+    if (this.marking.undo()) this.cut();
+    else this.forget();
+    this.refresh();
+  }
+
+  clear() {
+    this.marking.clear();
+    this.forget();
+    this.refresh();
+  }
+
+  /** @param {'at_goal' | 'fresh'} frame */
+  async useFrame(frame) {
+    this.busy = true;
+    this.clear();
+    const reply = await this.ask('use_frame', { question: this.question.key, frame });
+    this.busy = false;
+    if (reply && !reply.ok) setText(this.problem, reply.message);
+    this.refresh();
+  }
+
+  accept() {
+    return this.settle('hand_over',
+      { question: this.question.key, outcome: this.outcome.value, why: '' });
+  }
+
+  giveUp() { return this.settle('give_up_interface', { question: this.question.key, why: '' }); }
+
+  /**
+   * @template {'hand_over' | 'give_up_interface'} Name
+   * @param {Name} command
+   * @param {Commands[Name]} args
+   */
+  async settle(command, args) {
+    if (this.busy) return;
+    this.busy = true;
+    this.refresh();
+    const reply = await this.ask(command, args);
+    this.busy = false;
+    if (reply && reply.ok) {
+      this.over = true;
+      this.onEnd();
+    } else if (reply) {
+      setText(this.problem, reply.message);
+    }
+    this.refresh();
+  }
+
+  /**
+   * null where the connection was lost.
+   * @template {keyof Commands} Name
+   * @param {Name} command
+   * @param {Commands[Name]} args
+   */
+  ask(command, args) { return replyTo(this.app, this.problem, command, args); }
+
+  refresh() {
+    const { may, busy } = this;
+    const { undo, clear, failed, fresh, accept, quit } = this.buttons;
+    this.canvas.paint();
+    for (const each of [...this.tools.values(), failed, fresh, quit]) each.disabled = !may || busy;
+    undo.disabled = clear.disabled = !may || !this.marking.region || busy;
+    accept.disabled = !may || !this.marked || busy || this.cutting;
+    this.showResult();
+  }
+
+  showResult() {
+    const { marked, warning, cutting } = this;
+    const drawn = Boolean(this.marking.region);
+    const key = JSON.stringify([marked, drawn, cutting, warning, this.may]);
+    if (key === this.resultKey) return;
+    this.resultKey = key;
+    if (marked && marked.object) {
+      replace(this.result, markedFacts(marked.object, marked.elapsed),
+        warning && h('p', { class: 'dim' }, warning));
+    } else replace(this.result, h('p', { class: 'dim' }, this.hint(drawn)));
+  }
+
+  /** @param {boolean} drawn */
+  hint(drawn) {
+    if (!this.app.mayAnswer) return VIEWER;
+    if (this.cutting) return 'Cutting it out…';
+    return drawn ? NOT_YET : DRAW;
+  }
+}
+
+/**
+ * @param {string} text
+ * @param {() => void} onclick
+ * @param {string} [kind]
+ */
+function button(text, onclick, kind = 'tool') {
+  return h('button', { class: kind, onclick }, text);
+}

@@ -1,0 +1,158 @@
+// @ts-check
+// The frame around the panels: the top bar, the tabs, and which panel is shown.
+import { Alerts } from './alerts.js';
+import { Connection } from './connection.js';
+import { h, part, replace, setText, toast } from './dom.js';
+import { leaveNote, remember, remembered, takeNote } from './preferences.js';
+import { askName, askToken } from './sign_in.js';
+import { Store } from './store.js';
+
+/** @typedef {import('./connection.js').State} State */
+/** @typedef {import('./types').App} AppOfPanels */
+/** @typedef {import('./types').Panel} Panel */
+/** @typedef {import('./types').PanelView} PanelView */
+/** @typedef {'auto' | 'light' | 'dark'} Theme */
+/**
+ * @typedef {object} Tab
+ * @property {string} id
+ * @property {PanelView} view
+ * @property {HTMLButtonElement} button
+ * @property {HTMLElement} badge
+ */
+
+/** @type {{ [state in State]: string }} */
+const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': 'signed out',
+  lost: 'connection lost – trying again' };
+/** @type {{ [theme in Theme]: { words: string, next: Theme } }} */
+const THEMES = {
+  auto: { words: '◐ Auto', next: 'light' },
+  light: { words: '○ Light', next: 'dark' },
+  dark: { words: '● Dark', next: 'auto' },
+};
+
+/** @implements {AppOfPanels} */
+export class App {
+  /** @param {Panel[]} panels the first one is shown at first */
+  constructor(panels) {
+    this.store = new Store();
+    this.alerts = new Alerts();
+    this.connection = new Connection(this.store, (state) => this.onState(state),
+      () => this.leave('You have signed out on another page of this browser.'));
+    this.connection.wantedExpert = remembered('expert', '');
+    this.note = takeNote();
+    this.current = '';
+    this.status = h('span', { id: 'status', class: 'status' });
+    this.person = h('button', { id: 'person', class: 'icon-button', disabled: true,
+      title: 'Your name, as robots and records have it', onclick: () => this.askName() });
+    /** @type {Theme} */
+    this.theme = 'auto';
+    this.themeButton = h('button', { class: 'icon-button',
+      title: 'Colours: dark, light, or as the system has them',
+      onclick: () => this.setTheme(THEMES[this.theme].next) });
+    this.buildTop();
+    this.tabs = panels.map((panel) => this.tab(panel));
+    replace(part('nav'), this.tabs.map((tab) => tab.button));
+    this.store.onChange((names) => this.update(names));
+    setInterval(() => this.tick(), 1000);
+  }
+
+  get role() { return this.connection.session ? this.connection.session.role : ''; }
+
+  get expert() { return this.connection.expert; }
+
+  get mayAnswer() { return this.role === 'operator' || this.role === 'teleoperator'; }
+
+  buildTop() {
+    const theme = remembered('theme', 'auto');
+    this.setTheme(theme === 'light' || theme === 'dark' ? theme : 'auto');
+    replace(part('top'), h('img', { src: 'static/icon.svg', alt: '', class: 'logo' }),
+      h('strong', { class: 'brand' }, 'Operator console'), this.status,
+      h('span', { class: 'spacer' }), this.alerts.buttons(), this.themeButton, this.person);
+  }
+
+  /**
+   * @param {Panel} panel
+   * @returns {Tab}
+   */
+  tab({ id, title, create }) {
+    const badge = h('span', { class: 'badge', hidden: true });
+    const button = h('button', { class: 'tab', id: 'tab-' + id, onclick: () => this.show(id) },
+      h('span', {}, title), badge);
+    return { id, view: create(this), button, badge };
+  }
+
+  /** @param {string} id */
+  show(id) {
+    const shown = this.tabs.find((tab) => tab.id === id) || this.tabs[0];
+    this.current = shown.id;
+    for (const tab of this.tabs) {
+      tab.button.setAttribute('aria-current', tab === shown ? 'page' : 'false');
+    }
+    const main = part('main');
+    if (main.firstElementChild !== shown.view.root) replace(main, shown.view.root);
+    history.replaceState(null, '', '#' + this.current);
+    shown.view.shown?.();
+  }
+
+  /** @param {string[]} names of sections */
+  update(names) {
+    if (names.includes('questions')) this.alerts.look(this.store.questions);
+    for (const { view, badge } of this.tabs) {
+      view.update?.(names);
+      const count = view.badge ? view.badge() : 0;
+      badge.hidden = !count;
+      setText(badge, count);
+    }
+  }
+
+  tick() {
+    for (const { id, view } of this.tabs) if (id === this.current) view.tick?.();
+  }
+
+  /** @param {State} state */
+  onState(state) {
+    setText(this.status, STATES[state]);
+    this.status.dataset['state'] = state;
+    document.body.dataset['connection'] = state;
+    const name = this.expert && this.expert + (this.mayAnswer ? '' : ' (viewer)');
+    setText(this.person, name || 'Name');
+    this.person.hidden = state === 'signed-out';
+    this.person.disabled = !this.connection.session;
+    if (state === 'signed-out') {
+      askToken(this.connection, this.note);
+      this.note = null;
+    }
+    if (state === 'connected') this.begin();
+  }
+
+  /** The connection is there: so are the panels. */
+  begin() {
+    const current = this.tabs.find((tab) => tab.id === this.current) || this.tabs[0];
+    if (!part('main').contains(current.view.root)) this.show(location.hash.slice(1));
+    for (const { view } of this.tabs) view.connected?.();
+  }
+
+  askName() { askName(this.connection, () => this.signOut()); }
+
+  async signOut() {
+    if (await this.connection.signOut()) this.leave('You have signed out.');
+    else toast('The console does not answer: you are still signed in.', 'bad');
+  }
+
+  /**
+   * Begin anew: nothing of what the person saw or typed stays on the page.
+   * @param {string} why
+   */
+  leave(why) {
+    leaveNote(why);
+    location.reload();
+  }
+
+  /** @param {Theme} theme */
+  setTheme(theme) {
+    this.theme = theme;
+    document.documentElement.dataset['theme'] = theme;
+    remember('theme', theme);
+    setText(this.themeButton, THEMES[theme].words);
+  }
+}

@@ -1,0 +1,155 @@
+// @ts-check
+// Elements made of plain text: whatever a robot says is a text node, never markup.
+
+/** @typedef {import('./types').Child} Child */
+/** @typedef {import('./types').Properties} Properties */
+
+const SVG = 'http://www.w3.org/2000/svg';
+const TOAST_MS = 6000;
+// what steers a terminal, turns the reading direction, or cannot be seen
+const UNSEEN = new RegExp('[\\u0000-\\u0008\\u000b-\\u001f\\u007f-\\u009f\\u00ad\\u200b-\\u200f'
+  + '\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb]', 'g');
+/** @type {WeakMap<Node, string>} */
+const keys = new WeakMap();
+
+/** @param {unknown} text */
+function clean(text) {
+  return String(text).replace(UNSEEN, '\ufffd');
+}
+
+/**
+ * The `key` that an element was made with, '' where it has none.
+ * @param {Node} node
+ */
+export function keyOf(node) { return keys.get(node) || ''; }
+
+/**
+ * @template {HTMLElement | SVGElement} Made
+ * @param {Made} element
+ * @param {Properties} properties
+ * @param {Child[]} children
+ */
+function fill(element, properties, children) {
+  for (const [name, value] of Object.entries(properties)) {
+    if (value === null || value === undefined) continue;
+    if (typeof value === 'function') {
+      element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+    } else if (name === 'key') keys.set(element, String(value));
+    else setAttribute(element, name, value);
+  }
+  element.append(...nodesOf(children));
+  return element;
+}
+
+/**
+ * @param {HTMLElement | SVGElement} element
+ * @param {string} name
+ * @param {string | number | boolean} value aria says true and false, else the attribute is there
+ *   or not
+ */
+function setAttribute(element, name, value) {
+  const there = typeof value === 'boolean' && !name.startsWith('aria-');
+  if (there && !value) return;
+  if (name.startsWith('--')) element.style.setProperty(name, String(value));
+  else element.setAttribute(name, there ? '' : clean(value));
+}
+
+/**
+ * @param {Child[]} children
+ * @returns {Node[]}
+ */
+export function nodesOf(children) {
+  return children.flatMap((child) => {
+    if (Array.isArray(child)) return nodesOf(child);
+    if (child === null || child === undefined || child === false) return [];
+    return [child instanceof Node ? child : document.createTextNode(clean(child))];
+  });
+}
+
+/**
+ * An element: h('button', {class: 'x', onclick: f, '--hue': 3}, 'text', other elements).
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Properties} properties
+ * @param {...Child} children
+ * @returns {HTMLElementTagNameMap[Tag]}
+ */
+export function h(tag, properties, ...children) {
+  return fill(document.createElement(tag), properties, children);
+}
+
+/**
+ * An element of a drawing.
+ * @template {keyof SVGElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Properties} properties
+ * @param {...Child} children
+ * @returns {SVGElementTagNameMap[Tag]}
+ */
+export function svg(tag, properties, ...children) {
+  return fill(document.createElementNS(SVG, tag), properties, children);
+}
+
+/**
+ * @param {Element} element
+ * @param {...Child} children
+ */
+export function replace(element, ...children) {
+  element.replaceChildren(...nodesOf(children));
+}
+
+/**
+ * Change an element only where its content differs, so that selections and scroll positions stay.
+ * @param {Element} element
+ * @param {string | number} text
+ */
+export function setText(element, text) {
+  const cleaned = clean(text);
+  if (element.textContent !== cleaned) element.textContent = cleaned;
+}
+
+/**
+ * Options of a select.
+ * @param {string[]} values
+ * @param {string} chosen
+ */
+export function options(values, chosen) {
+  return values.map((value) => h('option', { value, selected: value === chosen }, value));
+}
+
+/**
+ * An element of index.html.
+ * @param {string} id
+ */
+export function part(id) {
+  const found = document.getElementById(id);
+  if (!found) throw new Error('the page has no ' + id);
+  return found;
+}
+
+/**
+ * @param {string} text
+ * @param {string} kind
+ */
+export function toast(text, kind) {
+  const shown = h('div', { class: 'toast ' + kind }, text);
+  part('toasts').append(shown);
+  setTimeout(() => shown.remove(), TOAST_MS);
+}
+
+/**
+ * Whether keys that are pressed there are text.
+ * @param {EventTarget | null} target
+ */
+export function typing(target) {
+  return target instanceof HTMLElement
+    && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName));
+}
+
+/** Whether a key is pressed together with another one that gives it a meaning of its own.
+ * @param {KeyboardEvent} event */
+export function modified(event) { return event.ctrlKey || event.metaKey || event.altKey; }
+
+export function dropFocus() {
+  if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+}

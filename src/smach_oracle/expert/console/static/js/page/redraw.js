@@ -1,0 +1,135 @@
+// @ts-check
+// Lists that change in place. What is pressed stays under the pointer until it is let go: around it
+// nothing comes or goes meanwhile, so that a click that has begun is not lost, nor lands elsewhere.
+import { keyOf, nodesOf } from './dom.js';
+
+/** @typedef {import('./types').Child} Child */
+
+const CLICK_MS = 100; // by then the click of what was let go has come
+const PRESSED = 'button, summary, [role="button"], .mark, .event';
+/** @type {Map<Element, () => void>} */
+const waiting = new Map(); // by element, its newest change
+/** @type {Element | null} */
+let pressed = null;
+let timer = 0;
+
+/**
+ * The element's children are these, in this order. Those that stay are not taken out, not even for
+ * a moment: that would cost them focus and scroll position, and the click that has begun on them.
+ * @param {Element} element
+ * @param {...Child} children
+ */
+export function arrange(element, ...children) {
+  whenLetGo(element, () => put(element, nodesOf(children)));
+}
+
+/**
+ * As if the element's children were replaced by these, which were made anew; but those that are
+ * there become like them, each like the one of its kind and `key`. They keep their listeners, which
+ * therefore go by the key alone.
+ * @param {Element} element
+ * @param {...Child} children
+ */
+export function redraw(element, ...children) {
+  whenLetGo(element, () => {
+    /** @type {Map<string, ChildNode[]>} */
+    const before = new Map();
+    for (const node of element.childNodes) {
+      const same = before.get(nameOf(node));
+      if (same) same.push(node);
+      else before.set(nameOf(node), [node]);
+    }
+    put(element, nodesOf(children).map((node) => {
+      const old = (before.get(nameOf(node)) || []).shift();
+      return old ? alike(old, node) : node;
+    }));
+  });
+}
+
+/**
+ * @param {Element} element
+ * @param {Node[]} nodes
+ */
+function put(element, nodes) {
+  const wanted = new Set(nodes);
+  for (const node of [...element.childNodes]) if (!wanted.has(node)) node.remove();
+  let at = element.firstChild;
+  for (const node of wanted) {
+    if (node.parentNode === element && node.contains(document.activeElement)) {
+      while (at && at !== node) { // it keeps the focus; those before it move
+        const next = at.nextSibling;
+        element.append(at);
+        at = next;
+      }
+    }
+    if (at && node === at) at = at.nextSibling;
+    else element.insertBefore(node, at);
+  }
+}
+
+/** @param {Node} node */
+function nameOf(node) { return node.nodeName + ' ' + keyOf(node); }
+
+/**
+ * A node that is there, made like another one of its kind.
+ * @param {Node} old
+ * @param {Node} fresh
+ */
+function alike(old, fresh) {
+  if (old instanceof Text && fresh instanceof Text) {
+    if (old.data !== fresh.data) old.data = fresh.data;
+  } else if (old instanceof Element && fresh instanceof Element) {
+    copyAttributes(fresh, old);
+    redraw(old, [...fresh.childNodes]);
+  }
+  return old;
+}
+
+/**
+ * @param {Element} from
+ * @param {Element} to
+ */
+function copyAttributes(from, to) {
+  for (const { name } of [...to.attributes]) {
+    if (!from.hasAttribute(name) && name !== 'open') to.removeAttribute(name); // a person opened it
+  }
+  for (const { name, value } of from.attributes) {
+    if (to.getAttribute(name) === value) continue;
+    if (name === 'style' && (to instanceof HTMLElement || to instanceof SVGElement)) {
+      to.style.cssText = value; // the page's policy allows no other way
+    } else to.setAttribute(name, value);
+  }
+}
+
+/**
+ * Change what is in an element, unless something in it is pressed: then as soon as that is let go.
+ * @param {Element} element
+ * @param {() => void} change
+ */
+export function whenLetGo(element, change) {
+  waiting.delete(element);
+  if (pressed && element.contains(pressed)) waiting.set(element, change);
+  else change();
+}
+
+function letGo() {
+  clearTimeout(timer);
+  pressed = null;
+  const changes = [...waiting.values()];
+  waiting.clear();
+  for (const change of changes) change();
+}
+
+window.addEventListener('pointerdown', (event) => {
+  letGo();
+  const main = !event.button && event.target instanceof Element;
+  pressed = main ? event.target.closest(PRESSED) : null;
+}, true);
+window.addEventListener('click', letGo, true);
+for (const type of ['pointerup', 'pointercancel']) {
+  window.addEventListener(type, () => {
+    clearTimeout(timer); // of another finger
+    timer = setTimeout(letGo, CLICK_MS);
+  }, true);
+}
+window.addEventListener('blur', letGo);

@@ -1,0 +1,58 @@
+// @ts-check
+// The newest sections that the server has sent; they are kept while the connection is away.
+
+/** @typedef {import('../server').Batch} Batch */
+/** @typedef {import('../server').EventSlice} EventSlice */
+/** @typedef {import('../server').Sections} Sections */
+
+export class Store {
+  constructor() {
+    /** @type {Map<string, unknown>} */
+    this.sections = new Map();
+    /** @type {((names: string[]) => void)[]} */
+    this.listeners = [];
+    /** @type {((slice: EventSlice) => void)[]} */
+    this.eventListeners = [];
+    this.offset = 0; // s, of the server's clock to this one
+  }
+
+  /**
+   * @template {keyof Sections} Name
+   * @param {Name} name
+   * @returns {Sections[Name] | undefined}
+   */
+  get(name) { return /** @type {Sections[Name] | undefined} */ (this.sections.get(name)); }
+
+  get questions() { return this.get('questions') || []; }
+
+  get sensors() { return this.get('eye')?.sensors || []; }
+
+  /**
+   * The server's clock.
+   * @returns {number} s
+   */
+  now() { return Date.now() / 1000 + this.offset; }
+
+  /** @param {(names: string[]) => void} listener */
+  onChange(listener) { this.listeners.push(listener); }
+
+  /** @param {(slice: EventSlice) => void} listener */
+  onEvents(listener) { this.eventListeners.push(listener); }
+
+  /** @param {Batch} batch */
+  receive({ now, all, sections = {}, events }) {
+    this.offset = now - Date.now() / 1000;
+    /** @type {Map<string, unknown>} */
+    const changed = new Map(Object.entries(sections));
+    if (all) {
+      for (const name of this.sections.keys()) if (!changed.has(name)) changed.set(name, null);
+    }
+    for (const [name, section] of changed) {
+      if (section === null) this.sections.delete(name);
+      else this.sections.set(name, section);
+    }
+    const names = [...changed.keys()];
+    if (names.length) this.listeners.forEach((listener) => listener(names));
+    if (events) this.eventListeners.forEach((listener) => listener(events));
+  }
+}

@@ -1,0 +1,56 @@
+// Shapes of the page itself: elements, and what the frame and its panels know of each other.
+import { Connection } from './connection.js';
+import { Store } from './store.js';
+import { Role } from '../server';
+
+/** What an element may hold: null, undefined and false are left out. */
+export type Child = Node | string | number | false | null | undefined | Child[];
+
+type Handlers = {
+  [Type in keyof GlobalEventHandlersEventMap as `on${Type}`]?:
+    ((event: GlobalEventHandlersEventMap[Type]) => void) | null;
+};
+
+type AttributeName = 'alt' | 'autocomplete' | 'class' | 'cx' | 'cy' | 'd' | 'disabled' | 'for'
+  | 'height' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth' | 'marker-end'
+  | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient' | 'placeholder' | 'r' | 'refX'
+  | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope' | 'selected' | 'spellcheck' | 'src'
+  | 'step' | 'tabindex' | 'text-anchor' | 'title' | 'transform' | 'type' | 'value' | 'viewBox'
+  | 'width' | 'x' | 'x1' | 'x2' | 'y' | 'y1' | 'y2';
+
+/** Attributes, properties of the style (--hue), listeners; `key`: which one it is, for redraw. */
+export type Properties = Handlers & {
+  [name in AttributeName | `data-${string}` | `aria-${string}` | `--${string}` | 'key']?:
+    string | number | boolean | null | undefined;
+};
+
+/** The frame around the panels, as they know it. */
+export interface App {
+  readonly store: Store;
+  readonly connection: Connection;
+  readonly current: string; // id of the panel that is shown
+  readonly role: Role | '';
+  readonly expert: string;
+  readonly mayAnswer: boolean;
+}
+
+/** One tab of the page. */
+export interface Panel {
+  id: string;
+  title: string;
+  create(app: App): PanelView;
+}
+
+export interface PanelView {
+  readonly root: HTMLElement;
+  /** Sections have changed. */
+  update?(names: string[]): void;
+  /** It is shown now. */
+  shown?(): void;
+  /** A second has passed while it is shown. */
+  tick?(): void;
+  /** The connection is there, again. */
+  connected?(): void;
+  /** How many things wait there. */
+  badge?(): number;
+}

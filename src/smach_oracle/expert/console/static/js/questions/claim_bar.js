@@ -1,0 +1,91 @@
+// @ts-check
+// Who works on a question, and how to take it.
+import { h, replace } from '../page/dom.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Question} Question */
+/**
+ * @typedef {object} ClaimState
+ * @property {boolean} settled this page has answered it
+ * @property {Question | undefined} now undefined: it is open no longer
+ * @property {boolean} mine
+ * @property {boolean} held this page has claimed it
+ * @property {boolean} claiming
+ * @property {boolean} sending
+ * @property {boolean} mayAnswer
+ * @property {string} problem
+ */
+/**
+ * @typedef {object} Use
+ * @property {() => void} leave
+ * @property {() => void} claim
+ * @property {() => void} takeOver
+ */
+/** @typedef {{ kind: 'good' | 'warn' | '', words: Child }} Bar */
+
+const CLOSED = 'This question is closed: it was answered elsewhere, taken back, or its time was '
+  + 'over. ';
+const VIEWER = 'You are signed in as a viewer: you can watch, others answer.';
+
+export class ClaimBar {
+  /** @param {Use} use what its buttons do */
+  constructor(use) {
+    this.use = use;
+    this.root = h('div', { class: 'claim-bar', role: 'status' });
+    this.key = ''; // of what is shown
+    this.offersTakeOver = false;
+  }
+
+  /** @param {ClaimState} state */
+  show(state) {
+    const { now, problem } = state;
+    const key = JSON.stringify([{ ...state, now: now && [now.holder, now.status] }]);
+    if (key === this.key) return;
+    this.key = key;
+    this.offersTakeOver = false;
+    const { kind, words } = this.barOf(state);
+    this.root.className = 'claim-bar ' + kind;
+    replace(this.root, words && h('span', {}, words),
+      problem && h('span', { class: 'problem', role: 'alert' }, problem));
+    this.root.hidden = !words && !problem;
+  }
+
+  /**
+   * @param {ClaimState} state
+   * @returns {Bar}
+   */
+  barOf({ settled, now, mine, held, claiming, sending, mayAnswer }) {
+    if (settled) return { kind: '', words: null };
+    if (!now) return { kind: 'warn', words: [CLOSED, button('Back to the list', this.use.leave)] };
+    const holder = h('strong', {}, now.holder || 'somebody');
+    if (now.status === 'interface') {
+      const name = h('strong', {}, now.interface);
+      return { kind: '', words: ['Interface ', name, ' runs for it; ', holder, ' started it.'] };
+    }
+    if (!mayAnswer) {
+      return { kind: '', words: [VIEWER, now.holder && [' ', holder, ' works on it.']] };
+    }
+    if (mine) return { kind: 'good', words: sending ? 'Sending…' : this.yours() };
+    if (now.holder) return { kind: 'warn', words: [holder, ' works on it. ', this.takeOver()] };
+    if (claiming || held) return { kind: '', words: 'Taking it…' };
+    const take = button('Take it', this.use.claim, 'claim');
+    return { kind: '', words: ['Nobody works on it. ', take] };
+  }
+
+  /** @returns {Child} */
+  yours() { return ['It is yours. ', button('Leave it to others', this.use.leave)]; }
+
+  takeOver() {
+    this.offersTakeOver = true;
+    return button('Take it over', this.use.takeOver, 'take-over');
+  }
+}
+
+/**
+ * @param {string} text
+ * @param {() => void} onclick
+ * @param {string} [id]
+ */
+function button(text, onclick, id) {
+  return h('button', { class: 'inline', onclick, 'data-action': id }, text);
+}

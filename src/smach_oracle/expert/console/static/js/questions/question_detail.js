@@ -1,0 +1,273 @@
+// @ts-check
+// One question: what failed and why, everything that may be answered, and what the robot does then.
+import { AnswerForm } from '../answering/answer_form.js';
+import { FollowUp } from '../answering/follow_up.js';
+import { InterfacePanel } from '../interfaces/interface_panel.js';
+import { PerceptionPanel } from '../interfaces/perception_panel.js';
+import { unlessLost } from '../page/connection.js';
+import { h, replace, setText } from '../page/dom.js';
+import { duration } from '../page/format.js';
+import { MachineView, machinesNow } from '../robots/machine_view.js';
+import { ClaimBar } from './claim_bar.js';
+import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
+import { SituationCamera } from './situation_camera.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').Answer} Answer */
+/** @typedef {import('../server').Question} Question */
+
+export const URGENT_S = 20;
+const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
+  + 'answer twice does no harm.';
+
+export class QuestionDetail {
+  /**
+   * @param {App} app
+   * @param {Question} question as it was when it was chosen
+   * @param {() => void} onLeave
+   */
+  constructor(app, question, onLeave) {
+    this.app = app;
+    this.question = question;
+    this.key = question.key;
+    this.onLeave = onLeave;
+    this.settled = false; // this page has answered it
+    this.claiming = false;
+    this.held = false; // this page has claimed it
+    this.sending = false;
+    this.ended = false; // it is shown no longer
+    this.problem = '';
+    /** @type {FollowUp | null} */
+    this.followUp = null;
+    /** @type {PerceptionPanel | null} */
+    this.perceptionPanel = null;
+    /** @type {InterfacePanel | null} */
+    this.interfacePanel = null;
+    this.interfaceSeen = false;
+    this.machine = new MachineView(machinesNow(app.store), () => {});
+    this.camera = new SituationCamera(app, question);
+    this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
+    this.interfacePlace = h('div', { class: 'workbench', hidden: true });
+    this.time = h('span', { class: 'time' });
+    this.claimBar = new ClaimBar({ leave: onLeave, claim: () => this.claim('claim'),
+      takeOver: () => this.claim('take_over') });
+    this.form = new AnswerForm(question, (answer) => this.answer(answer));
+    this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'),
+      this.form.root);
+    this.root = this.build();
+    this.machine.show(question.robot, question.path);
+    this.show();
+  }
+
+  build() {
+    const { question } = this;
+    return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
+      this.claimBar.root, this.perceptionPlace, this.interfacePlace,
+      h('div', { class: 'detail-body' },
+        h('div', { class: 'situation' }, failureCard(question), this.camera.root,
+          h('section', { class: 'card mini-machine' }, this.machine.root), visitsCard(question),
+          userdataCard(question)),
+        this.answers));
+  }
+
+  head() {
+    const { state, robot, path } = this.question;
+    return h('header', { class: 'detail-head' },
+      h('button', { class: 'back', 'aria-label': 'Back to the list', onclick: this.onLeave }, '‹'),
+      h('div', {}, h('h2', {}, state, ' failed'), h('p', { class: 'dim' }, robot, ' · ', path)),
+      h('span', { class: 'spacer' }), this.time);
+  }
+
+  /** The question as it stands; undefined where it is open no longer. */
+  get now() { return this.app.store.questions.find((each) => each.key === this.key); }
+
+  get mine() {
+    const { now } = this;
+    return Boolean(now && now.holder && now.holder === this.app.expert && now.status === 'claimed');
+  }
+
+  /** Take the question, unless somebody else works on it. */
+  begin() {
+    this.showPerception();
+    this.showInterface();
+    if (this.app.mayAnswer && this.question.status === 'pending') this.claim('claim');
+    this.show();
+  }
+
+  /** The connection is back: so is the claim, if nobody has taken it meanwhile. */
+  connected() {
+    if (this.held && !this.settled) this.claim('claim');
+    if (this.followUp) this.followUp.watch();
+  }
+
+  end() {
+    if (this.held && !this.settled) this.release();
+    this.ended = true;
+    this.camera.stop();
+    if (this.perceptionPanel) this.perceptionPanel.stop();
+    if (this.interfacePanel) this.interfacePanel.stop();
+  }
+
+  release() {
+    this.app.connection.request('release', { question: this.key }).catch(() => {});
+  }
+
+  /** @param {'claim' | 'take_over'} command */
+  async claim(command) {
+    if (this.claiming) return;
+    this.claiming = true;
+    this.problem = '';
+    try {
+      const reply = await this.app.connection.request(command, { question: this.key });
+      this.held = reply.ok;
+      if (!reply.ok) this.problem = reply.message;
+      if (this.ended && reply.ok && !this.settled) this.release();
+    } catch (err) {
+      unlessLost(err);
+    }
+    this.claiming = false;
+    this.show();
+  }
+
+  /** @param {Answer} answer */
+  async answer(answer) {
+    if (this.sending || this.settled || !this.mine) return;
+    this.sending = true;
+    this.problem = '';
+    this.show();
+    const followUp = new FollowUp(this.app, this.question, this.onLeave);
+    try {
+      const reply = await this.app.connection.request('answer', { question: this.key, ...answer });
+      if (reply.ok) {
+        this.held = false;
+        this.turnTo(followUp, answer);
+      } else {
+        this.problem = reply.message;
+      }
+    } catch (err) {
+      unlessLost(err);
+      this.problem = LOST;
+    }
+    this.sending = false;
+    this.show();
+  }
+
+  /** @param {string} key */
+  press(key) {
+    if (key === 't' && this.claimBar.offersTakeOver) this.claim('take_over');
+    else if (this.mine && !this.settled) this.form.press(key);
+  }
+
+  tick() {
+    const { now } = this;
+    if (!now || this.settled) {
+      setText(this.time, '');
+      return;
+    }
+    const clock = this.app.store.now();
+    const left = now.deadline === null ? Infinity : now.deadline - clock;
+    this.form.showPreconditions(this.app.store.get('conditions')?.[this.key] || {}, clock);
+    setText(this.time, 'asked ' + duration(clock - now.asked) + ' ago · '
+      + (left === Infinity ? 'no time limit' : duration(left) + ' left'));
+    this.time.classList.toggle('urgent', left < URGENT_S);
+  }
+
+  /** The tools of a perception interface, for as long as one runs for this question. */
+  showPerception() {
+    const running = this.key in (this.app.store.get('eye')?.perception || {});
+    if (running && !this.perceptionPanel && !this.ended) {
+      this.perceptionPanel = new PerceptionPanel(this.app, this.question, () => this.follow());
+      replace(this.perceptionPlace, this.perceptionPanel.root);
+      this.perceptionPlace.scrollIntoView({ block: 'nearest' });
+    } else if (!running && this.perceptionPanel) {
+      this.perceptionPanel.stop();
+      this.perceptionPanel = null;
+      replace(this.perceptionPlace);
+    }
+    this.perceptionPlace.hidden = !this.perceptionPanel;
+  }
+
+  /** Show what the robot does after an interface that somebody else may have started. */
+  follow() {
+    if (this.followUp) return;
+    const { now } = this;
+    this.turnTo(new FollowUp(this.app, this.question, this.onLeave),
+      { kind: 'interface', name: now ? now.interface : '' });
+    this.show();
+  }
+
+  /**
+   * What the robot does takes the place of what it could do; where the page is narrow it comes
+   * first.
+   * @param {FollowUp} followUp
+   * @param {Pick<Answer, 'kind' | 'name'>} answer
+   */
+  turnTo(followUp, answer) {
+    this.settled = true;
+    this.followUp = followUp;
+    followUp.begin(answer);
+    replace(this.answers, followUp.root);
+    this.root.classList.add('answered');
+    this.root.scrollIntoView({ block: 'start' });
+  }
+
+  /** What the interface that runs prints, its end, and the controls of the hand that it moves. */
+  showInterface() {
+    const { now } = this;
+    const name = now && now.status === 'interface' && !this.ended ? now.interface : null;
+    if (name === null) this.endInterface();
+    else if (this.interfacePanel) this.interfacePanel.update();
+    else {
+      this.interfacePanel = new InterfacePanel(this.app, this.question, name, () => this.follow());
+      replace(this.interfacePlace, this.interfacePanel.root);
+      this.interfaceSeen = false;
+    }
+    this.interfacePlace.hidden = !this.interfacePanel;
+    if (this.interfacePanel && this.interfacePanel.manipulation && !this.interfaceSeen) {
+      this.interfaceSeen = true;
+      this.interfacePlace.scrollIntoView({ block: 'start' }); // it comes in above what was pressed
+    }
+  }
+
+  endInterface() {
+    if (!this.interfacePanel) return;
+    this.interfacePanel.stop();
+    this.interfacePanel = null;
+    replace(this.interfacePlace);
+  }
+
+  /** @param {string[]} names of sections */
+  update(names) {
+    /** @param {...string} wanted */
+    const changed = (...wanted) => wanted.some((name) => names.includes(name));
+    if (changed('questions', 'hand', 'output', 'eye')) this.showInterface();
+    if (changed('conditions')) this.tick();
+    if (changed('stills', 'eye')) this.camera.update();
+    if (changed('eye')) this.showPerception();
+    if (changed('questions')) this.showClaim();
+    const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
+    if (machines || changed('questions')) this.machine.update();
+    if (this.followUp) this.followUp.update();
+  }
+
+  /** Keep the claim, or see that it is lost. */
+  showClaim() {
+    const { now } = this;
+    const free = now && !now.holder && now.status === 'pending';
+    // a server that was restarted knows nobody who holds it
+    if (free && this.held && this.app.connection.connected) this.claim('claim');
+    if (this.held && now && now.holder && now.holder !== this.app.expert) {
+      this.held = false;
+      this.problem = now.holder + ' has taken this question over.';
+    }
+    this.show();
+  }
+
+  show() {
+    const { now, mine, settled, held, claiming, sending, problem } = this;
+    const { mayAnswer } = this.app;
+    this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer });
+    this.form.enable(mine && !sending && !settled);
+    this.tick();
+  }
+}

@@ -1,0 +1,86 @@
+// @ts-check
+// What a question says of the situation: the failure, the way there, and the userdata.
+import { h } from '../page/dom.js';
+import { FAILURE_CLASSES, chip, rateBar } from '../page/format.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('../server').UserdataItem} UserdataItem */
+/** @typedef {import('../server').Visit} Visit */
+
+/** @type {{ [result in Visit['result']]: { sign: string, kind: string } }} */
+const RESULTS = { success: { sign: '✓', kind: 'good' }, failure: { sign: '✗', kind: 'bad' },
+  superseded: { sign: '☞', kind: 'accent' }, preempted: { sign: '■', kind: 'warn' },
+  '': { sign: '?', kind: '' } };
+const MOST_VISITS = 24;
+const LONG = 160; // characters of a value
+const BEGINNING = 80;
+const CONTINUOUS = 'It failed again without a success in between';
+
+/** @param {Question} question */
+export function failureCard(question) {
+  const { state, what, text } = question;
+  return h('section', { class: 'card failure' },
+    h('p', { class: 'what' }, state, ' ', what, '.'), text && h('pre', { class: 'text' }, text),
+    h('dl', {}, failureFacts(question)));
+}
+
+/**
+ * @param {Question} question
+ * @returns {Child}
+ */
+function failureFacts(question) {
+  const { rate, class: rank, continuous, reason, recoveries, tried, deadline, fallback } = question;
+  return [
+    fact('Failure rate', h('span', { class: 'chips' }, rateBar(rate),
+      chip(FAILURE_CLASSES[rank] || '?', 'class-' + rank),
+      continuous && chip('continuous', 'warn', CONTINUOUS))),
+    fact('Asked because', reason),
+    fact('Recoveries spent', recoveries),
+    tried.length > 0 && fact('The oracle tried',
+      h('ol', { class: 'tried' }, tried.map((step) => h('li', {}, step)))),
+    deadline !== null && fact('If nobody answers', fallback || 'the fallback happens'),
+  ];
+}
+
+/**
+ * @param {string} name
+ * @param {Child} value
+ * @returns {Child}
+ */
+function fact(name, value) {
+  return [h('dt', {}, name), h('dd', {}, value)];
+}
+
+/** @param {Question} question */
+export function visitsCard({ history }) {
+  return history.length > 0 && h('section', { class: 'card' }, h('h3', {}, 'How it came here'),
+    h('ol', { class: 'visits' }, history.slice(-MOST_VISITS).map(visitItem)));
+}
+
+/** @param {Visit} visit */
+function visitItem({ state, outcome, result }) {
+  const { sign, kind } = RESULTS[result];
+  return h('li', { class: kind, title: outcome }, state, ' ', h('span', { class: 'sign' }, sign),
+    result === 'failure' && outcome && h('span', { class: 'dim' }, ' ' + outcome));
+}
+
+/** @param {Question} question */
+export function userdataCard({ userdata }) {
+  return userdata.length > 0 && h('section', { class: 'card' }, h('h3', {}, 'Userdata'),
+    h('table', { class: 'userdata' }, h('tbody', {}, userdata.map((item) => (
+      h('tr', {}, h('th', { scope: 'row' }, item.key), h('td', {}, valueOf(item))))))));
+}
+
+/**
+ * @param {UserdataItem} item
+ * @returns {Child}
+ */
+function valueOf({ type, value, note }) {
+  const notes = note && h('span', { class: 'dim' }, ' ' + note);
+  if (value.length > LONG) {
+    return [h('details', {}, h('summary', {}, type || value.slice(0, BEGINNING) + '…'),
+      h('pre', {}, value)), notes];
+  }
+  return [value && h('code', {}, value), ' ', type && h('span', { class: 'dim' }, type), notes];
+}

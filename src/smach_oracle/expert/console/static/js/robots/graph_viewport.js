@@ -1,0 +1,183 @@
+// @ts-check
+// Which part of a drawing is seen: all of it where that stays readable, else what is active; or
+// what a person has moved into view, by mouse, wheel or fingers.
+
+/** @typedef {{ width: number, height: number }} Size px */
+/** @typedef {[x: number, y: number]} Place px */
+
+const MARGIN = 24; // px
+const FOOT = 52; // px below the drawing, where the buttons are
+const SMALLEST_READABLE = 0.55;
+const LARGEST_FIT = 1.15;
+const SMALLEST = 0.08;
+const LARGEST = 3;
+
+export class GraphViewport {
+  /**
+   * @param {SVGSVGElement} drawing
+   * @param {HTMLElement} root the frame around it
+   * @param {() => Place} focusOf what shall be in view where not all can be
+   * @param {(on: boolean) => void} onFollow
+   */
+  constructor(drawing, root, focusOf, onFollow) {
+    this.drawing = drawing;
+    this.root = root;
+    this.focusOf = focusOf;
+    this.onFollow = onFollow;
+    /** @type {Size | null} */
+    this.size = null;
+    this.view = { x: 0, y: 0, scale: 1 };
+    this.follow = true;
+    this.fitted = false;
+    /** @type {Map<number, PointerEvent>} */
+    this.pointers = new Map();
+    this.spread = 0; // px between two fingers
+    this.listen();
+    new ResizeObserver(() => this.place()).observe(root);
+  }
+
+  get box() { return this.root.getBoundingClientRect(); }
+
+  /** @param {boolean} on */
+  setFollow(on) {
+    this.follow = on;
+    this.onFollow(on);
+    if (on) this.place();
+  }
+
+  /** As a person wants all of it. */
+  fitAll() {
+    this.setFollow(false);
+    this.fitted = true;
+    this.fit();
+  }
+
+  place() {
+    const { box, size } = this;
+    if (!size || !box.width) return;
+    if (!this.follow) {
+      if (this.fitted) this.fit();
+      else this.apply();
+      return;
+    }
+    this.fit();
+    if (this.view.scale < SMALLEST_READABLE) this.showFocus(size, box);
+  }
+
+  /**
+   * @param {Size} size
+   * @param {DOMRect} box
+   */
+  showFocus({ width, height }, box) {
+    const room = box.width - 2 * MARGIN;
+    const scale = Math.max(SMALLEST_READABLE, Math.min(1, room / width));
+    const [x, y] = this.focusOf();
+    const [seenWidth, seenHeight] = [box.width / scale, box.height / scale];
+    this.view = { scale,
+      x: width * scale > room ? x - seenWidth / 2 : (width - seenWidth) / 2,
+      y: Math.max(-MARGIN, Math.min(y - seenHeight / 2, height + FOOT / scale - seenHeight)) };
+    this.apply();
+  }
+
+  fit() {
+    const { box, size } = this;
+    if (!size || !box.width) return;
+    const { width, height } = size;
+    const scale = Math.min(LARGEST_FIT, (box.width - 2 * MARGIN) / width,
+      (box.height - MARGIN - FOOT) / height);
+    this.view = { scale, x: (width - box.width / scale) / 2,
+      y: (height - (box.height + MARGIN - FOOT) / scale) / 2 };
+    this.apply();
+  }
+
+  apply() {
+    const { box } = this;
+    const { x, y, scale } = this.view;
+    this.drawing.setAttribute('viewBox', [x, y, box.width / scale, box.height / scale].join(' '));
+  }
+
+  /**
+   * @param {number} factor
+   * @param {Place} [at] px in the frame: what stays there; else its middle
+   */
+  zoom(factor, at) {
+    const { box, view } = this;
+    const [px, py] = at || [box.width / 2, box.height / 2];
+    const scale = Math.min(LARGEST, Math.max(SMALLEST, view.scale * factor));
+    this.leave();
+    this.view = { scale, x: this.view.x + px / this.view.scale - px / scale,
+      y: this.view.y + py / this.view.scale - py / scale };
+    this.apply();
+  }
+
+  /** A person moves it: it follows nothing any more. */
+  leave() {
+    this.setFollow(false);
+    this.fitted = false;
+  }
+
+  listen() {
+    const { drawing, pointers } = this;
+    drawing.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY / 400), this.inFrame(event.clientX, event.clientY));
+    }, { passive: false });
+    drawing.addEventListener('pointerdown', (event) => {
+      pointers.set(event.pointerId, event);
+      this.spread = 0;
+    });
+    window.addEventListener('pointermove', (event) => this.move(event));
+    /** @param {PointerEvent} event */
+    const end = (event) => {
+      pointers.delete(event.pointerId);
+      this.spread = 0;
+    };
+    window.addEventListener('pointerup', end);
+    window.addEventListener('pointercancel', end);
+  }
+
+  /**
+   * px in the frame.
+   * @param {number} x
+   * @param {number} y
+   * @returns {Place}
+   */
+  inFrame(x, y) {
+    const { box } = this;
+    return [x - box.left, y - box.top];
+  }
+
+  /** @param {PointerEvent} event */
+  move(event) {
+    const before = this.pointers.get(event.pointerId);
+    if (!before) return;
+    this.pointers.set(event.pointerId, event);
+    const fingers = [...this.pointers.values()];
+    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
+    if (fingers.length === 1) this.shift(dx, dy);
+    else if (fingers.length === 2) this.pinch(fingers[0], fingers[1]);
+  }
+
+  /**
+   * @param {number} dx px
+   * @param {number} dy px
+   */
+  shift(dx, dy) {
+    if (this.follow && Math.abs(dx) + Math.abs(dy) < 2) return;
+    this.leave();
+    this.view.x -= dx / this.view.scale;
+    this.view.y -= dy / this.view.scale;
+    this.apply();
+  }
+
+  /**
+   * @param {PointerEvent} one
+   * @param {PointerEvent} other
+   */
+  pinch(one, other) {
+    const spread = Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+    const [x, y] = [(one.clientX + other.clientX) / 2, (one.clientY + other.clientY) / 2];
+    if (this.spread) this.zoom(spread / this.spread, this.inFrame(x, y));
+    this.spread = spread;
+  }
+}

@@ -1,0 +1,152 @@
+// @ts-check
+// All containers of all robots: one of them is shown, live.
+import { h, setText } from '../page/dom.js';
+import { remember, remembered } from '../page/preferences.js';
+import { arrange, redraw } from '../page/redraw.js';
+import { MachineView, machinesNow } from './machine_view.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Panel} Panel */
+/**
+ * @typedef {object} PickerRow
+ * @property {string} path
+ * @property {boolean} failed
+ * @property {boolean} active
+ * @property {boolean} current
+ */
+/** @typedef {{ robot: string, alive: boolean | undefined, rows: PickerRow[] }} PickerGroup */
+
+/** @type {Panel} */
+export const machines = { id: 'machines', title: 'Machines',
+  create: (app) => new MachinePanel(app) };
+
+const NO_ROBOTS = 'No robots yet. Every state machine that publishes its structure, or runs under '
+  + 'the oracle, appears here by itself.';
+const PREFERENCE = 'machine-list';
+
+class MachinePanel {
+  /** @param {App} app */
+  constructor(app) {
+    this.app = app;
+    this.robot = '';
+    this.path = '';
+    this.source = machinesNow(app.store);
+    this.view = new MachineView(this.source, (path) => this.open(this.robot, path));
+    this.view.prefersList = remembered(PREFERENCE, 'no') === 'yes';
+    this.picker = h('div', { class: 'picker', role: 'tree',
+      'aria-label': 'Robots and their machines' });
+    this.pickerKey = ''; // of what it shows
+    this.title = h('h2', { class: 'ellipsis' });
+    this.state = h('span', { class: 'dim ellipsis' });
+    this.toggle = h('button', { class: 'tool', onclick: () => this.toggleList() });
+    this.body = h('section', { class: 'card machine-card' },
+      h('div', { class: 'row head' }, this.title, this.state, h('span', { class: 'spacer' }),
+        this.toggle), this.view.root, legend());
+    this.root = h('div', { class: 'panel machines' }, this.picker, this.body);
+    this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
+    this.showToggle();
+  }
+
+  toggleList() {
+    this.view.prefersList = !this.view.prefersList;
+    remember(PREFERENCE, this.view.prefersList ? 'yes' : 'no');
+    this.showToggle();
+    this.view.update();
+  }
+
+  showToggle() { setText(this.toggle, this.view.prefersList ? 'Graph' : 'List'); }
+
+  /**
+   * @param {string} robot
+   * @param {string} path
+   */
+  open(robot, path) {
+    this.robot = robot;
+    this.path = path;
+    this.show();
+  }
+
+  shown() { this.show(); }
+
+  /** @param {string[]} names */
+  update(names) {
+    if (names.some((name) => name === 'robots' || name === 'questions' || name.startsWith('live ')
+      || name.startsWith('graph '))) this.show();
+  }
+
+  show() {
+    const robots = (this.app.store.get('robots') || []).filter((robot) => this.paths(robot).length);
+    this.settle(robots);
+    arrange(this.root, robots.length ? [this.picker, this.body] : this.empty);
+    this.showPicker(robots);
+    setText(this.title, this.path || this.robot);
+    const gone = this.source.state(this.robot).alive === false;
+    setText(this.state, this.robot + (gone ? ' · gone' : ''));
+    if (this.robot) this.view.show(this.robot, this.path);
+    this.toggle.hidden = !this.view.drawable;
+  }
+
+  /**
+   * Keep to the container that is shown; where it is gone, turn to another one.
+   * @param {string[]} robots
+   */
+  settle(robots) {
+    if (!robots.includes(this.robot)) {
+      const living = robots.find((robot) => this.source.state(robot).alive);
+      this.robot = living || robots[0] || '';
+      this.path = '';
+    }
+    const paths = this.paths(this.robot);
+    if (!paths.includes(this.path)) this.path = paths[0] || '';
+  }
+
+  /** @param {string} robot */
+  paths(robot) { return this.source.state(robot).paths; }
+
+  /** @param {string[]} robots */
+  showPicker(robots) {
+    const groups = robots.map((robot) => this.pickerGroup(robot));
+    const key = JSON.stringify(groups);
+    if (key === this.pickerKey) return;
+    this.pickerKey = key;
+    redraw(this.picker, groups.map(({ robot, alive, rows }) => (
+      h('div', { key: robot, class: 'group' },
+        h('div', { class: 'robot' + (alive ? '' : ' gone') }, h('span', { class: 'dot' }), robot),
+        rows.map((row) => this.pickerButton(robot, row))))));
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {PickerGroup}
+   */
+  pickerGroup(robot) {
+    const { alive, active, failed, paths } = this.source.state(robot);
+    const rows = paths.map((path) => ({
+      path,
+      failed: Boolean(failed[path]),
+      active: Boolean(alive) && (active[path] || []).some((label) => label && label !== 'None'),
+      current: robot === this.robot && path === this.path,
+    }));
+    return { robot, alive, rows };
+  }
+
+  /**
+   * @param {string} robot
+   * @param {PickerRow} row
+   */
+  pickerButton(robot, { path, failed, active, current }) {
+    const names = path.split('/');
+    return h('button', { key: path,
+      class: 'path' + (active ? ' active' : '') + (failed ? ' failed' : ''), role: 'treeitem',
+      'aria-selected': current, '--depth': names.length - 1,
+      onclick: () => this.open(robot, path), title: path }, names[names.length - 1]);
+  }
+}
+
+function legend() {
+  return h('div', { class: 'legend' },
+    h('span', {}, 'failure rate ', h('span', { class: 'scale' }), ' 0 to 100%'),
+    h('span', {}, h('span', { class: 'swatch active' }), 'active'),
+    h('span', {}, h('span', { class: 'swatch failed' }), 'failed, being recovered'),
+    h('span', {}, h('span', { class: 'swatch oracle' }), 'oracle: pale until used'));
+}

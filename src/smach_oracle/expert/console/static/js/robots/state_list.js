@@ -1,0 +1,82 @@
+// @ts-check
+// A container as a list of its states: for where there is no drawing, and for who prefers it.
+import { h } from '../page/dom.js';
+import { FAILURE_CLASSES, chip, percent, rateBar } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Graph} Graph */
+/** @typedef {import('./types').MachineState} MachineState */
+
+const TITLES = ['State', 'Failure rate', 'Class', 'Ok / failed', 'Leads to'];
+
+export class StateList {
+  /** @param {(path: string) => void} onOpen a nested container was chosen */
+  constructor(onOpen) {
+    this.onOpen = onOpen;
+    this.body = h('tbody', {});
+    this.key = ''; // of what is shown
+    const titles = TITLES.map((title) => h('th', { scope: 'col' }, title));
+    this.root = h('div', { class: 'table-frame' }, h('table', { class: 'states' },
+      h('thead', {}, h('tr', {}, titles)), this.body));
+  }
+
+  /**
+   * @param {string} robot
+   * @param {Graph} graph
+   * @param {MachineState} machine
+   */
+  set(robot, graph, machine) {
+    const key = JSON.stringify([robot, graph, machine]);
+    if (key === this.key) return;
+    this.key = key;
+    redraw(this.body, graph.states.map(({ label, nested }) => (
+      this.row(robot + '/' + graph.path + '/' + label, label, nested, graph, machine))));
+  }
+
+  /**
+   * @param {string} id
+   * @param {string} label
+   * @param {boolean} nested
+   * @param {Graph} graph
+   * @param {MachineState} machine
+   */
+  row(id, label, nested, graph, machine) {
+    const { path } = graph;
+    const learned = machine.rates[path]?.[label];
+    const failed = machine.failed[path]?.state === label;
+    const active = machine.alive && (machine.active[path] || []).includes(label);
+    const open = () => this.onOpen(path + '/' + label);
+    const name = nested ? h('button', { class: 'link', onclick: open }, label, ' ›') : label;
+    return h('tr', { key: id, class: (active ? 'active ' : '') + (failed ? 'failed' : ''),
+      'data-id': id },
+    h('th', { scope: 'row' }, name, active && chip('active', 'accent'),
+      failed && chip('failed', 'bad')),
+    h('td', {}, learned ? rateBar(learned.rate) : '–'),
+    h('td', {}, learned
+      ? chip(FAILURE_CLASSES[learned.class] || '–', 'class-' + learned.class) : '–'),
+    h('td', { class: 'number' }, learned ? learned.successes + ' / ' + learned.failures : '–'),
+    h('td', {}, leadsTo(label, graph, machine)));
+  }
+}
+
+/**
+ * Where a state leads, and how often it did.
+ * @param {string} label
+ * @param {Graph} graph
+ * @param {MachineState} machine
+ * @returns {Child}
+ */
+function leadsTo(label, { path, edges, oracle }, machine) {
+  const counts = (machine.counts[path] || []).filter(([from]) => from === label);
+  const found = edges.filter((edge) => edge.from === label).map(({ outcome, to }) => {
+    const taken = counts.find(([, by, where]) => by === outcome && where === to);
+    return h('span', { class: 'leads' }, outcome, ' → ', to, taken ? ' ' + percent(taken[4]) : '');
+  });
+  const failures = counts.filter(([, , to]) => to === oracle);
+  const share = failures.reduce((sum, row) => sum + row[4], 0);
+  if (share) {
+    found.push(h('span', { class: 'leads to-oracle' }, 'failure → ', oracle, ' ', percent(share)));
+  }
+  return found;
+}

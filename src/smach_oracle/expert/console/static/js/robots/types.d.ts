@@ -1,0 +1,21 @@
+// Shapes of machines as they are drawn.
+import { ByPath, ByState, Graph, LearnedRate, TransitionCount } from '../server';
+
+/** What the containers of a robot do at a moment. */
+export interface MachineState {
+  alive?: boolean; // false: the robot is gone
+  active: ByPath<string[]>;
+  latest: ByPath<[from: string, to: string]>;
+  failed: ByPath<{ state: string }>;
+  rates: ByPath<ByState<ShownRate>>;
+  counts: ByPath<TransitionCount[]>;
+  paths: string[];
+}
+
+export type ShownRate = Pick<LearnedRate, 'rate' | 'class' | 'successes' | 'failures'>;
+
+/** Where a view of machines has them from: the robot now, or a trial at a moment. */
+export interface MachineSource {
+  graph(robot: string, path: string): Graph | undefined;
+  state(robot: string): MachineState;
+}

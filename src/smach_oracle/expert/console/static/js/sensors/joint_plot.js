@@ -1,0 +1,65 @@
+// @ts-check
+// Curves of some joints over the last minute.
+import { h } from '../page/dom.js';
+
+export const HUES = [245, 20, 150, 320]; // of the curves
+export const SPAN_S = 60;
+
+/** @typedef {[time: number, value: number]} Sample s, and the joint's unit */
+
+export class JointPlot {
+  constructor() {
+    this.canvas = h('canvas', { class: 'plot', role: 'img',
+      'aria-label': 'Chosen joints over time' });
+  }
+
+  /**
+   * @param {Sample[][]} curves
+   * @param {number} now s
+   */
+  draw(curves, now) {
+    const { canvas } = this;
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const context = canvas.getContext('2d');
+    if (!width || !height || !context) return;
+    Object.assign(canvas, { width: width * ratio, height: height * ratio });
+    context.scale(ratio, ratio);
+    const values = curves.flat().map(([, value]) => value);
+    const low = values.length ? Math.min(...values) : 0;
+    const high = Math.max(low + 0.01, ...values);
+    const [bottom, top] = [low - 0.08 * (high - low), high + 0.2 * (high - low)];
+    /** @param {number} value */
+    const y = (value) => height * (top - value) / (top - bottom);
+    this.drawLevels(context, [low, (low + high) / 2, high], y, values.length > 0);
+    curves.forEach((curve, index) => {
+      context.strokeStyle = 'hsl(' + HUES[index] + ' 70% 58%)';
+      context.lineWidth = 1.8;
+      context.beginPath();
+      for (const [time, value] of curve) {
+        context.lineTo(width * (1 - (now - time) / SPAN_S), y(value));
+      }
+      context.stroke();
+    });
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[]} levels
+   * @param {(value: number) => number} y
+   * @param {boolean} numbered
+   */
+  drawLevels(context, levels, y, numbered) {
+    const style = getComputedStyle(this.canvas);
+    context.font = '11px ' + style.fontFamily;
+    context.fillStyle = style.color;
+    context.strokeStyle = style.borderBottomColor;
+    for (const level of levels) {
+      context.beginPath();
+      context.moveTo(0, y(level));
+      context.lineTo(this.canvas.clientWidth, y(level));
+      context.stroke();
+      if (numbered) context.fillText(level.toFixed(3), 4, y(level) - 3);
+    }
+  }
+}

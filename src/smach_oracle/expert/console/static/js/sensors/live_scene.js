@@ -1,0 +1,194 @@
+// @ts-check
+// A point cloud and a robot in one scene, live: either may be chosen first, the other joins it.
+import { CloudLayer, unpacked } from '../drawing/cloud_layer.js';
+import { GridLayer } from '../drawing/grid_layer.js';
+import { SceneView } from '../drawing/scene_view.js';
+import { boxAround, vector } from '../drawing/transforms.js';
+import { h, replace, setText } from '../page/dom.js';
+import { RobotFeed } from './robot_feed.js';
+import { SensorFeed, numberOf } from './sensor_feed.js';
+
+/** @typedef {import('../drawing/types').Box} Box */
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').CloudFacts} CloudFacts */
+
+const PERIOD_MS = 150;
+const OFFER_MS = 1000; // how often it is looked for what else may be shown
+const NEAR = 1.2; // m: what of a cloud is near a robot
+
+/** @abstract */
+export class LiveScene {
+  /**
+   * @param {App} app
+   * @param {string} topic
+   * @param {string} choiceLabel
+   */
+  constructor(app, topic, choiceLabel) {
+    this.app = app;
+    this.topic = topic;
+    this.scene = new SceneView(topic, () => this.home());
+    this.choice = h('select', { class: 'beside', 'aria-label': choiceLabel,
+      onchange: () => this.choose(this.choice.value) });
+    this.count = h('span', { class: 'dim number' });
+    this.lack = h('p', { class: 'view-lack dim', hidden: true });
+    this.root = h('figure', { class: 'view cloud-view', 'data-topic': topic }, this.scene.root,
+      h('figcaption', {}, h('div', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
+        h('span', { class: 'spacer' }), this.count, this.choice), this.lack));
+    /** @type {SensorFeed<CloudFacts> | null} */
+    this.clouds = null;
+    /** @type {RobotFeed | null} */
+    this.robot = null;
+    /** @type {{ layer: CloudLayer, facts: CloudFacts } | null} */
+    this.cloud = null;
+    this.said = { cloud: '', robot: '' }; // what the feeds say
+    /** @type {string | null} */
+    this.offered = null;
+    this.shape = ''; // what is there
+    this.offering = 0;
+  }
+
+  begin() {
+    this.offer();
+    this.offering = setInterval(() => this.offer(), OFFER_MS);
+  }
+
+  stop() {
+    clearInterval(this.offering);
+    this.scene.stop();
+    for (const feed of [this.clouds, this.robot]) if (feed) feed.stop();
+  }
+
+  /** Offer what else there is to be shown. */
+  offer() { throw new Error('not a kind of scene'); }
+
+  /**
+   * What else is shown: a topic, or ''.
+   * @param {string} _topic
+   */
+  choose(_topic) { throw new Error('not a kind of scene'); }
+
+  /**
+   * @param {string[]} topics
+   * @param {string} chosen
+   * @param {string} none says that nothing is chosen
+   * @param {(topic: string) => string} nameOf
+   */
+  offerTopics(topics, chosen, none, nameOf) {
+    const shape = topics.join('\n');
+    if (shape === this.offered) return;
+    this.offered = shape;
+    replace(this.choice, h('option', { value: '' }, none), topics.map((topic) => (
+      h('option', { value: topic, selected: topic === chosen }, nameOf(topic)))));
+    this.choice.hidden = !topics.length;
+    this.choose(this.choice.value);
+  }
+
+  /** @param {string} topic '' for none */
+  startRobot(topic) {
+    if (this.robot) this.robot.stop();
+    this.robot = topic ? new RobotFeed(this.app, topic, this.root,
+      { moved: () => this.changed(), say: (text) => this.sayOfRobot(text) }) : null;
+    this.sayOfRobot('');
+    this.changed();
+  }
+
+  /**
+   * @param {string} topic '' for none
+   * @param {string} [type]
+   */
+  startClouds(topic, type) {
+    if (this.clouds) this.clouds.stop();
+    this.cloud = null;
+    const which = () => numberOf(this.app, topic, type);
+    this.clouds = topic ? new SensorFeed(this.app, which, this.root, {
+      every: PERIOD_MS,
+      beside: () => (this.robot ? this.robot.number : undefined),
+      take: (answer, facts) => this.takeCloud(answer, facts),
+      say: (text) => this.sayOfCloud(text),
+    }) : null;
+    this.sayOfCloud(topic ? 'Waiting for the first cloud…' : '');
+    this.changed();
+  }
+
+  /**
+   * @param {Response} answer
+   * @param {CloudFacts} facts
+   */
+  async takeCloud(answer, facts) {
+    const points = unpacked(await answer.arrayBuffer(), facts);
+    this.cloud = { layer: new CloudLayer(points, facts.place), facts };
+    const all = facts.count < facts.of ? ' of ' + facts.of : '';
+    setText(this.count, facts.count + all + ' points');
+    this.changed();
+  }
+
+  /** The robot; beside a cloud only where that has a place at it. */
+  get robotLayer() {
+    const layer = this.robot && this.robot.layer;
+    return layer && (!this.cloud || this.cloud.facts.place) ? layer : null;
+  }
+
+  changed() {
+    const [robot, cloud] = [this.robotLayer, this.cloud];
+    const floor = robot && this.robot ? new GridLayer(this.robot.floor) : null;
+    this.scene.show([floor, cloud && cloud.layer, robot]);
+    const isPlaced = cloud && Boolean(cloud.facts.place);
+    const shape = [Boolean(robot), Boolean(cloud), isPlaced].join();
+    if (shape !== this.shape && (robot || cloud)) this.home();
+    this.shape = shape;
+    this.showLack();
+  }
+
+  /**
+   * As the sensor sees it where there is no robot: optical frames look along z with y down, others
+   * along x with z up.
+   */
+  home() {
+    const [robot, cloud] = [this.robotLayer, this.cloud];
+    const optical = Boolean(cloud && !cloud.facts.place && /optical|^$/.test(cloud.facts.frame));
+    const boxes = [cloud && cloud.layer.bounds(), robot && robot.bounds()];
+    if (!robot) this.scene.frame(boxes, { optical });
+    else {
+      const near = cloud ? around(...boxes) : null;
+      this.scene.frame(near ? [near] : boxes,
+        { optical, azimuth: -1.15, elevation: 0.35, reach: near ? 0.9 : 1.25 });
+    }
+  }
+
+  /** @param {string} text */
+  sayOfCloud(text) {
+    this.said.cloud = text;
+    this.showLack();
+  }
+
+  /** @param {string} text */
+  sayOfRobot(text) {
+    this.said.robot = text.startsWith('Nothing') ? 'No joint states come.' : text;
+    this.showLack();
+  }
+
+  /** In the middle of the scene as long as it is empty, below it from then on. */
+  showLack() {
+    const { cloud, robot } = this.said;
+    const something = Boolean(this.cloud || this.robotLayer);
+    this.scene.say(something ? '' : cloud || robot);
+    const lacks = this.robot ? this.robot.lacks : '';
+    const lost = this.cloud && this.robot && this.cloud.facts.astray;
+    const text = [lost, cloud, lacks || robot].filter(Boolean).join(' ');
+    setText(this.lack, something ? text : '');
+    this.lack.hidden = !something || !text;
+  }
+}
+
+/**
+ * The box of a robot, and of what a cloud has near it.
+ * @param {Box | null} [cloud]
+ * @param {Box | null} [robot]
+ */
+function around(cloud, robot) {
+  if (!cloud || !robot) return cloud || robot || null;
+  const [low, high] = robot;
+  const near = cloud.map((corner) => vector((axis) => (
+    Math.min(high[axis] + NEAR, Math.max(low[axis] - NEAR, corner[axis])))));
+  return boxAround([...near, low, high]);
+}

@@ -1,0 +1,36 @@
+// @ts-check
+// A robot, with a point cloud that a person has chosen.
+import { setText } from '../page/dom.js';
+import { LiveScene } from './live_scene.js';
+
+/** @typedef {import('../page/types').App} App */
+
+export class RobotView extends LiveScene {
+  /**
+   * @param {App} app
+   * @param {string} topic
+   */
+  constructor(app, topic) {
+    super(app, topic, 'Point cloud in the picture');
+    this.startRobot(topic);
+    this.begin();
+  }
+
+  get knownClouds() { return this.app.store.sensors.filter((each) => each.kind === 'cloud'); }
+
+  /** @override */
+  offer() {
+    const topics = this.knownClouds.map((each) => each.topic);
+    this.offerTopics(topics, this.choice.value, 'no point cloud',
+      (topic) => 'with ' + topic.replace(/^\//, ''));
+  }
+
+  /**
+   * @override
+   * @param {string} topic
+   */
+  choose(topic) {
+    this.startClouds(topic, this.knownClouds.find((each) => each.topic === topic)?.type);
+    if (!topic) setText(this.count, '');
+  }
+}

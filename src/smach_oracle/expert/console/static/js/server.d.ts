@@ -1,0 +1,345 @@
+// What the server sends: every shape of JSON, as the server makes it. What the page sends is in
+// commands.d.ts. test/unit/console/test_console_types.py compares both with what the server does.
+// Times are seconds since the epoch, lengths metres, unless something else is written beside them.
+import { Colour, Vector } from './drawing/types';
+
+export type Role = 'viewer' | 'operator' | 'teleoperator';
+
+/** GET, POST and DELETE /session: who uses this browser. */
+export interface Session {
+  signed_in: boolean;
+  role: Role | '';
+  name: string; // '' where the person may choose
+  tokens: boolean; // whether one signs in here at all
+  xsrf: string;
+}
+
+// --- what the socket sends
+
+/** What has changed since the batch before; `now` is the server's clock. */
+export interface Batch {
+  now: number;
+  all?: true; // what is not among the sections is gone
+  sections?: { [Name in keyof Sections]?: Sections[Name] | null }; // null: it is gone
+  events?: EventSlice;
+}
+
+/** Named pieces of what the pages show; each comes whole. */
+export interface Sections {
+  questions: Question[];
+  servers: QueryServer[];
+  conditions: ByKey<ByState<PreconditionCheck[]>>;
+  stills: ByKey<KeptImage[]>;
+  robots: string[]; // names of their nodes
+  trials: TrialOverview;
+  bags: BagOverview;
+  eye: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
+  hand: ByKey<Manipulation>;
+  output: ByKey<InterfaceOutput>;
+  [name: `live ${string}`]: LiveMachines; // by robot
+  [name: `graph ${string}`]: Graph; // by robot and container path
+}
+
+/** By the key of a question. */
+export interface ByKey<Value> { [key: string]: Value | undefined }
+/** By the label of a state. */
+export interface ByState<Value> { [label: string]: Value | undefined }
+/** By the path of a container, such as KITCHEN/FETCH. */
+export interface ByPath<Value> { [path: string]: Value | undefined }
+
+// --- questions
+
+export type FailureClass = 0 | 1 | 2 | 3; // none, low, moderate, high
+
+/** An open question. */
+export interface Question {
+  key: string; // tells questions of all robots apart
+  server: string;
+  id: string; // at its server
+  trial: string;
+  robot: string;
+  path: string; // of the container
+  state: string; // that failed
+  what: string; // went wrong, in words
+  outcome: string;
+  text: string; // of an exception
+  class: FailureClass;
+  rate: number | null;
+  continuous: boolean;
+  recoveries: number; // that were spent on it
+  reason: string; // why the oracle asks
+  tried: string[];
+  status: 'pending' | 'claimed' | 'interface';
+  holder: string; // the expert who has claimed it
+  interface: string; // that runs for it
+  asked: number;
+  deadline: number | null; // null: it waits without end
+  fallback: string;
+  history: Visit[];
+  choices: StateChoice[];
+  supersede: OutcomeChoice[];
+  outputs: string[]; // keys of the userdata that the state writes
+  give_up: string[]; // outcomes
+  interfaces: InterfaceOffer[];
+  userdata: UserdataItem[];
+}
+
+export type VisitResult = 'success' | 'failure' | 'superseded' | 'preempted' | '';
+export interface Visit { state: string; outcome: string; result: VisitResult }
+
+/** A state to go to. */
+export interface StateChoice {
+  state: string;
+  success: number | null; // predicted, 0 to 1
+  class: FailureClass;
+  visits: number; // in this trial
+  missing: string[]; // userdata that it needs and would not have
+  preconditions: string[];
+  blocked: string; // why; '' where it is not
+  helped: [helped: number, tried: number]; // how often going there helped
+}
+
+export interface OutcomeChoice { outcome: string; target: string }
+export interface InterfaceOffer { name: string; description: string }
+
+export interface UserdataItem {
+  key: string;
+  type: string; // of a ROS message, with [] of a list of them; '' of plain data
+  value: string; // JSON of plain data
+  note: string; // why it is not shown
+}
+
+export interface QueryServer { name: string; connected: boolean }
+
+export interface PreconditionCheck {
+  name: string;
+  holds: boolean | null; // null: unknown
+  text: string;
+  looked: number | null; // null: never
+}
+
+/** An image that the server keeps: what a camera gave when a question was put. */
+export interface KeptImage {
+  id: number;
+  topic: string;
+  late: number | null; // s after the question; null: it is of the failure itself
+  size: [width: number, height: number]; // px
+}
+
+export interface InterfaceOutput {
+  status: 'starting' | 'running' | 'failed' | 'stopped' | '';
+  text: string;
+  lines: string[]; // that it printed
+}
+
+// --- robots
+
+/** What the containers of a robot do. */
+export interface LiveMachines {
+  trial: string;
+  alive: boolean;
+  active: ByPath<string[]>;
+  latest: ByPath<[from: string, to: string]>; // transitions; from '': the oracle
+  failed: ByPath<{ state: string; rate: number | null }>;
+  rates: ByPath<ByState<LearnedRate>>;
+  counts: ByPath<TransitionCount[]>;
+  paths: string[];
+}
+
+export interface LearnedRate {
+  rate: number | null;
+  class: FailureClass;
+  successes: number;
+  failures: number;
+  recoveries: number;
+  preconditions: boolean;
+}
+
+/** A transition that was taken, and its share of all that left its state. */
+export type TransitionCount =
+  [from: string, outcome: string, to: string, times: number, share: number];
+
+/** A container, and where dot has laid its states. Lengths are px. */
+export interface Graph {
+  path: string;
+  oracle: string; // its label; '' where there is none
+  drawn: boolean; // whether there is a layout
+  size: [width: number, height: number] | null;
+  states: { label: string; nested: boolean; at: Place | null }[];
+  outcomes: { label: string; at: Place | null }[];
+  edges: GraphEdge[];
+}
+
+/** px, of the middle. */
+export type Place = [x: number, y: number, width: number, height: number];
+
+export interface GraphEdge {
+  from: string;
+  outcome: string;
+  to: string;
+  points: number[]; // x, y, x, y, ... of Bezier curves, the arrow's tip at the end
+  label: [x: number, y: number] | null;
+}
+
+// --- trials
+
+export type EventKind = 'trial_start' | 'trial_end' | 'container_start' | 'container_end'
+  | 'state_start' | 'transition' | 'failure' | 'precondition_start' | 'precondition_end'
+  | 'decision' | 'jump' | 'query_opened' | 'query_claimed' | 'query_released' | 'query_answered'
+  | 'query_expired' | 'query_cancelled' | 'interface_start' | 'interface_end' | 'supersede'
+  | 'give_up' | 'preempt' | 'warning'
+  | `${number}`; // of a later release
+
+export interface TrialEvent {
+  seq: number;
+  kind: EventKind;
+  t: number;
+  path: string;
+  state: string;
+  outcome: string;
+  target: string;
+  class: FailureClass;
+  rate: number | null;
+  continuous: boolean;
+  query: string; // id of the question
+  by: string; // the expert
+  text: string;
+  words: string; // what happened, in a sentence
+}
+
+/** Events of the trial that is watched, from a position on. */
+export interface EventSlice { trial: string; from: number; events: TrialEvent[] }
+
+export interface TrialOverview { table: CountsRow[]; trials: Trial[]; heard: number }
+
+export interface Trial {
+  id: string;
+  robot: string;
+  experiment: string;
+  start: number;
+  end: number;
+  ending: 'success' | 'failure' | 'preempted' | 'unfinished' | ''; // '': it runs
+  outcome: string;
+  oracle: boolean; // whether it recovers
+  failures: number;
+  recoveries: number;
+  questions: number;
+  answered: number;
+  lost: number; // events
+  detailed: boolean; // whether its events are kept
+  number?: number; // of a trial of a bag
+  bag?: string;
+}
+
+/** A row of the paper's Table I. */
+export interface CountsRow {
+  experiment: string;
+  oracle?: boolean; // of trials that were heard
+  arm?: string; // of trials of bags: the variant
+  runs: number;
+  endings: { success: number; failure: number; preempted: number; unfinished?: number };
+  counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
+}
+
+/** In how many trials, and how often in all. */
+export interface Count { trials: number; events: number | null }
+
+export interface BagOverview {
+  waiting: number; // bags that are still to be read
+  note: string;
+  table: CountsRow[];
+  trials: Trial[];
+  broken: { name: string; reason: string }[];
+}
+
+/** GET /recorded/NUMBER: a trial of a bag. */
+export interface RecordedTrial {
+  events: TrialEvent[];
+  graphs: ByPath<Graph>;
+  stills: { [query: string]: KeptImage[] | undefined };
+}
+
+// --- sensors
+
+export type SensorKind = 'image' | 'cloud' | 'robot' | 'joints';
+
+export interface Sensor { id: number; topic: string; kind: SensorKind; type: string }
+
+/** Numbers of the sensors of a perception interface's image and cloud; null: there is none yet. */
+export interface PerceptionSensors { image: number | null; cloud: number | null }
+
+/** GET /frame/NUMBER: what is told beside the newest message of a sensor. */
+export interface SensorFacts { sequence: number }
+
+export interface StampedFacts extends SensorFacts {
+  frame: string; // of its coordinates
+  stamp: string; // seconds.nanoseconds
+}
+
+export interface ImageFacts extends StampedFacts {
+  kind: 'colour' | 'depth';
+  size: [width: number, height: number]; // px, of the original
+  range?: [near: number, far: number];
+}
+
+export interface CloudFacts extends StampedFacts {
+  kind: 'cloud';
+  count: number;
+  of: number; // points that there are
+  offset: Vector; // positions are 16 bit shares of the scale, from the offset on
+  scale: Vector;
+  place?: number[]; // 3 x 4, by rows: at the robot that was asked for
+  astray?: string; // why that is not known
+}
+
+export interface JointFacts extends StampedFacts { kind: 'joints'; joints: JointRow[] }
+type Measured = number | null;
+export type JointRow = [name: string, position: Measured, velocity: Measured, effort: Measured];
+
+export interface RobotFacts extends SensorFacts {
+  kind: 'robot';
+  model: string; // version
+  root: string; // link
+  joints: number; // that are known
+}
+
+/** GET /model/NUMBER begins with this: what a robot looks like. */
+export interface ModelHeader {
+  name: string;
+  version: string;
+  root: string;
+  links: string[];
+  geometries: { corners: number; triangles: number; offset: Vector; scale: Vector }[];
+  missing: string[];
+  lost: number;
+  parts: [link: number, geometry: number, pose: number[], colour: Colour][];
+}
+
+// --- driving
+
+export type DriveFrame = 'tool' | 'base' | 'camera';
+
+/** A manipulation interface that runs for a question. */
+export interface Manipulation {
+  frames: DriveFrame[];
+  arms: string[];
+  boxes: number | null; // in the robot's collision map; null: there is none
+  wheel: number | null; // which page drives
+  driver: string;
+  state?: HandState;
+}
+
+export interface HandState {
+  arm: string;
+  moving: boolean;
+  limit: string; // what slows it
+  refused: string;
+  share: number | null; // of the commanded speed
+  speed: number | null; // m/s
+  clearance: number | null;
+  gripper: number | null; // m between the fingers
+  stalled: boolean;
+  at: [x: number | null, y: number | null, z: number | null]; // the tool
+}
+
+export * from './commands';

@@ -1,0 +1,31 @@
+// @ts-check
+// The counts of the paper's Table I.
+import { h } from '../page/dom.js';
+import { percent } from '../page/format.js';
+
+/** @typedef {import('../server').CountsRow} CountsRow */
+
+const COLUMNS = ['Experiment', 'Arm', 'Runs', 'Failures', 'Oracle recoveries', 'Questions',
+  'Expert interventions', 'Ended in failure'];
+
+/**
+ * @param {string} caption
+ * @param {CountsRow[]} rows
+ */
+export function countsTable(caption, rows) {
+  const titles = COLUMNS.map((title) => h('th', { scope: 'col' }, title));
+  return h('table', {}, h('caption', {}, caption), h('thead', {}, h('tr', {}, titles)),
+    h('tbody', {}, rows.map(rowOf)));
+}
+
+/** @param {CountsRow} row */
+function rowOf({ experiment, arm, oracle, runs, counts, endings }) {
+  /** @param {number} trials */
+  const share = (trials) => h('td', { class: 'number' }, trials,
+    h('span', { class: 'dim' }, ' ' + percent(trials / runs)));
+  return h('tr', {}, h('th', { scope: 'row' }, experiment),
+    h('td', {}, arm || (oracle ? 'with oracle' : 'without oracle')),
+    h('td', { class: 'number' }, runs),
+    share(counts.failures.trials), share(counts.recoveries.trials), share(counts.questions.trials),
+    share(counts.answered.trials), share(endings.failure));
+}

@@ -1,0 +1,62 @@
+// @ts-check
+// The buttons of a replay.
+import { h, setText } from '../page/dom.js';
+
+const SPEEDS = [0.25, 1, 4, 16, 64, 256];
+
+/**
+ * @typedef {object} Use
+ * @property {() => void} first
+ * @property {() => void} back
+ * @property {() => void} play
+ * @property {() => void} forward
+ * @property {() => void} last
+ * @property {() => void} follow
+ */
+
+export class ReplayControls {
+  /** @param {Use} use what each button does */
+  constructor(use) {
+    this.playButton = button('▶', 'Play', 'play', use.play);
+    this.speedChoice = h('select', { class: 'replay-speed', 'aria-label': 'Speed' },
+      SPEEDS.map((each) => h('option', { value: each, selected: each === 1 }, each + '×')));
+    this.liveButton = h('button', { class: 'tool replay-live', type: 'button',
+      title: 'Follow what happens', onclick: use.follow, 'data-replay': 'live' }, 'Live');
+    this.time = h('span', { class: 'number replay-time' });
+    this.root = h('div', { class: 'row replay-controls', role: 'group', 'aria-label': 'Replay' },
+      button('|◂', 'To the beginning', 'first', use.first),
+      button('◂', 'One event back', 'back', use.back), this.playButton,
+      button('▸', 'One event on', 'on', use.forward), button('▸|', 'To the end', 'last', use.last),
+      this.speedChoice, this.liveButton, h('span', { class: 'spacer' }), this.time);
+  }
+
+  get speed() { return Number(this.speedChoice.value); }
+
+  /** @param {boolean} playing */
+  showPlaying(playing) {
+    const title = playing ? 'Pause' : 'Play';
+    setText(this.playButton, playing ? '❚❚' : '▶');
+    this.playButton.title = title;
+    this.playButton.setAttribute('aria-label', title);
+  }
+
+  /** @param {boolean} on */
+  showFollowing(on) { this.liveButton.setAttribute('aria-pressed', String(on)); }
+
+  /** @param {boolean} running whether there is something to follow */
+  showRunning(running) { this.liveButton.hidden = !running; }
+
+  /** @param {string} text */
+  showTime(text) { setText(this.time, text); }
+}
+
+/**
+ * @param {string} sign
+ * @param {string} title
+ * @param {string} id
+ * @param {() => void} onclick
+ */
+function button(sign, title, id, onclick) {
+  return h('button', { class: 'tool', type: 'button', title, 'aria-label': title, onclick,
+    'data-replay': id }, sign);
+}

@@ -1,0 +1,63 @@
+// @ts-check
+// A question of a trial that is replayed, its answer, and what cameras gave when it was put.
+import { h, replace } from '../page/dom.js';
+import { chip } from '../page/format.js';
+import { FailureImageView } from '../sensors/failure_image_view.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').KeptImage} KeptImage */
+/** @typedef {import('./types').AskedQuestion} AskedQuestion */
+
+export class ReplayQuestion {
+  /** @param {App} app */
+  constructor(app) {
+    this.app = app;
+    this.root = h('div', { class: 'replay-question', hidden: true });
+    this.key = 'null'; // of what is shown
+    /** @type {KeptImage[]} */
+    this.images = [];
+    this.imagesRoot = h('div', { class: 'replay-images' });
+  }
+
+  /**
+   * @param {AskedQuestion | null} question
+   * @param {KeptImage[]} images
+   */
+  show(question, images) {
+    const key = JSON.stringify(question);
+    if (key === this.key) return;
+    this.key = key;
+    this.root.hidden = !question;
+    if (!question) return;
+    const { state, reason, holder, steps, answer } = question;
+    replace(this.root, h('div', { class: 'replay-words-of-question' },
+      h('p', {}, h('strong', {}, 'Question about ', state), reason && ': ' + reason,
+        holder && !answer && [' ', chip(holder + ' works on it', 'warn')]),
+      steps.map((step) => h('p', { class: 'dim' }, step)), answerOf(question)),
+    this.showImages(images));
+  }
+
+  /**
+   * They are asked for once.
+   * @param {KeptImage[]} images
+   */
+  showImages(images) {
+    if (!images.length) return null;
+    if (this.images !== images) {
+      this.images = images;
+      replace(this.imagesRoot, images.map((image) => new FailureImageView(this.app, image).root));
+    }
+    return this.imagesRoot;
+  }
+}
+
+/** @param {AskedQuestion} question */
+function answerOf({ answer, closed }) {
+  if (!answer) {
+    return h('p', { class: 'dim' }, closed ? 'No answer: ' + closed + '.' : 'Not answered yet.');
+  }
+  return h('p', { class: 'replay-answer' }, h('strong', {}, 'Answer'),
+    answer.by && ' of ' + answer.by, ': ', answer.kind.replace('_', ' '),
+    answer.target && ' ' + answer.target,
+    answer.why && h('span', { class: 'dim' }, ' – ' + answer.why));
+}

@@ -1,0 +1,240 @@
+// @ts-check
+// A trial on a time axis, with a cursor: a lane for each state, one for the oracle, one for the
+// expert.
+import { h, svg } from '../page/dom.js';
+import { duration } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+import { MARKS, laneOf, lanesOf, questionBars, stateBars, ticks } from './time_axis.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').TrialEvent} TrialEvent */
+/** @typedef {import('./types').Bar} Bar */
+/** @typedef {{ left: number, right: number, begin: number, whole: number }} Scale px and s */
+/**
+ * @typedef {object} Use
+ * @property {(seq: number) => void} onPick an event was chosen
+ * @property {(t: number) => void} onSeek a time was
+ * @property {(event: KeyboardEvent) => void} onKey a key, while the cursor has the focus
+ */
+
+const LANE = 26; // px high
+const NAME = 168; // px wide, at most
+const RIGHT = 14; // px that are left free
+const TOP = 6;
+const AXIS = 24;
+const NARROWEST = 50;
+
+export class Timeline {
+  /** @param {Use} use */
+  constructor({ onPick, onSeek, onKey }) {
+    this.onPick = onPick;
+    this.onSeek = onSeek;
+    this.cursor = h('div', { class: 'cursor-line' });
+    this.lanes = h('div', {});
+    this.canvas = h('div', { class: 'timeline-canvas' }, this.lanes, this.cursor);
+    this.handle = h('div', { class: 'cursor-handle' });
+    this.axis = h('div', { class: 'axis' });
+    this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0',
+      'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey },
+    this.axis, this.handle);
+    this.root = h('div', { class: 'timeline' }, this.slider, this.canvas);
+    /** @type {TrialEvent[]} */
+    this.events = [];
+    this.end = 0;
+    /** @type {Scale | null} */
+    this.scale = null; // null: nothing is drawn
+    /** @type {string[]} */
+    this.shownLanes = [];
+    this.picked = -1; // number of an event
+    /** @type {{ t: number, words: string } | null} */
+    this.placed = null; // where the cursor is
+    for (const element of [this.slider, this.canvas]) this.listen(element);
+    new ResizeObserver(() => this.draw()).observe(this.root);
+  }
+
+  /**
+   * Press and drag, by mouse, pen or finger; up and down still scrolls the page.
+   * @param {HTMLElement} element
+   */
+  listen(element) {
+    let dragged = -1;
+    element.addEventListener('pointerdown', (event) => {
+      const mark = event.target instanceof Element && event.target.classList.contains('mark');
+      if (event.button || mark || this.isOnNames(event)) return;
+      dragged = event.pointerId;
+      element.setPointerCapture(dragged);
+      this.slider.focus({ preventScroll: true });
+      event.preventDefault();
+      this.seek(event);
+    });
+    element.addEventListener('pointermove', (event) => {
+      if (event.pointerId === dragged) this.seek(event);
+    });
+    const end = () => { dragged = -1; };
+    element.addEventListener('pointerup', end);
+    element.addEventListener('pointercancel', end);
+  }
+
+  /** @param {PointerEvent} event */
+  isOnNames(event) {
+    return this.xOf(event) < (this.scale ? this.scale.left : 0) - 12;
+  }
+
+  /**
+   * px from the left side.
+   * @param {PointerEvent} event
+   */
+  xOf(event) { return event.clientX - this.root.getBoundingClientRect().left; }
+
+  /** @param {PointerEvent} event */
+  seek(event) {
+    if (!this.scale) return;
+    const { left, right, begin, whole } = this.scale;
+    const share = (this.xOf(event) - left) / (right - left);
+    this.onSeek(begin + whole * Math.min(1, Math.max(0, share)));
+  }
+
+  /**
+   * The cursor to a time.
+   * @param {number} t
+   * @param {string} words what is there
+   */
+  place(t, words) {
+    this.placed = { t, words };
+    if (!this.scale) return;
+    const { left, right, begin, whole } = this.scale;
+    const share = Math.min(1, Math.max(0, (t - begin) / whole));
+    const at = left + (right - left) * share;
+    this.handle.style.setProperty('--at', at + 'px');
+    this.cursor.style.setProperty('--at', at + 'px');
+    this.slider.setAttribute('aria-valuemax', whole.toFixed(2));
+    this.slider.setAttribute('aria-valuenow', (whole * share).toFixed(2));
+    this.slider.setAttribute('aria-valuetext', words);
+  }
+
+  /**
+   * @param {TrialEvent[]} events
+   * @param {number} end of the axis
+   */
+  set(events, end) {
+    this.events = events;
+    this.end = end;
+    this.draw();
+  }
+
+  /** @param {number} seq */
+  pick(seq) {
+    this.picked = seq;
+    for (const mark of this.root.querySelectorAll('[data-seq]')) {
+      mark.classList.toggle('picked', mark.getAttribute('data-seq') === String(seq));
+    }
+    const event = this.events.find((each) => each.seq === seq);
+    const lane = event ? this.shownLanes.indexOf(laneOf(event)) : -1;
+    if (lane < 0) return;
+    const top = TOP + lane * LANE;
+    const { scrollTop, clientHeight } = this.canvas;
+    if (top < scrollTop || top + LANE > scrollTop + clientHeight) {
+      this.canvas.scrollTop = top - clientHeight / 2;
+    }
+  }
+
+  draw() {
+    const width = this.canvas.clientWidth;
+    const empty = !this.events.length || width < NARROWEST;
+    this.slider.hidden = this.cursor.hidden = empty;
+    if (empty) {
+      redraw(this.lanes, h('p', { class: 'empty' }, 'No events.'));
+      this.scale = null;
+      return;
+    }
+    const begin = this.events[0].t;
+    const whole = Math.max(this.end - begin, 0.001);
+    const left = Math.min(NAME, width * 0.3);
+    this.scale = { left, right: width - RIGHT, begin, whole };
+    this.shownLanes = lanesOf(this.events);
+    const shown = ticks(whole, Math.max(2, (width - left) / 62));
+    redraw(this.axis, this.drawAxis(width, shown));
+    redraw(this.lanes, this.drawLanes(width, shown, this.scale));
+    if (this.placed) this.place(this.placed.t, this.placed.words);
+  }
+
+  /**
+   * px of a time.
+   * @param {number} t
+   */
+  x(t) {
+    const { left, right, begin, whole } = this.scale || { left: 0, right: 0, begin: 0, whole: 1 };
+    return left + (right - left) * Math.min(1, Math.max(0, (t - begin) / whole));
+  }
+
+  /**
+   * px of a lane's top.
+   * @param {string} lane
+   */
+  y(lane) { return TOP + this.shownLanes.indexOf(lane) * LANE; }
+
+  /**
+   * @param {number} width
+   * @param {number[]} shown ticks
+   */
+  drawAxis(width, shown) {
+    const begin = this.scale ? this.scale.begin : 0;
+    return svg('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS,
+      'aria-hidden': true }, shown.map((tick) => svg('text', { class: 'tick-text',
+      x: Math.min(this.x(begin + tick), width - 26), y: 16 },
+    tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))));
+  }
+
+  /**
+   * @param {number} width
+   * @param {number[]} shown ticks
+   * @param {Scale} scale
+   */
+  drawLanes(width, shown, { begin, left }) {
+    const height = TOP + this.shownLanes.length * LANE + 6;
+    this.cursor.style.setProperty('--height', height + 'px');
+    const bars = [...stateBars(this.events, this.end), ...questionBars(this.events, this.end)];
+    return svg('svg', { width, height, viewBox: '0 0 ' + width + ' ' + height, role: 'img',
+      'aria-label': 'Events of the trial over time' },
+    shown.map((tick) => {
+      const x = this.x(begin + tick);
+      return svg('line', { class: 'tick', x1: x, x2: x, y1: 0, y2: height });
+    }),
+    this.shownLanes.map((lane) => svg('text', { class: 'lane', x: 0, y: this.y(lane) + 16 },
+      short(lane, left), svg('title', {}, lane))),
+    bars.map((bar) => this.drawBar(bar)),
+    this.events.map((event) => this.drawMark(event)));
+  }
+
+  /** @param {Bar} bar */
+  drawBar({ lane, from, to, kind, words }) {
+    const [x, end] = [this.x(from), this.x(to)];
+    return svg('rect', { class: 'bar ' + kind, x, y: this.y(lane) + 4, rx: 3, height: LANE - 8,
+      width: Math.max(2, end - x) }, svg('title', {}, words));
+  }
+
+  /**
+   * @param {TrialEvent} event
+   * @returns {Child}
+   */
+  drawMark(event) {
+    const { kind, seq, t, words } = event;
+    const looks = MARKS[kind];
+    return looks && svg('circle', { key: seq,
+      class: 'mark ' + looks + (seq === this.picked ? ' picked' : ''),
+      cx: this.x(t), cy: this.y(laneOf(event)) + LANE / 2, r: 4.5, 'data-seq': seq,
+      onclick: () => this.onPick(seq) }, svg('title', {}, words));
+  }
+}
+
+/**
+ * The name of a lane, as far as there is room.
+ * @param {string} lane
+ * @param {number} width px
+ */
+function short(lane, width) {
+  const most = Math.floor((width - 8) / 7.7);
+  const names = lane.split('/');
+  const label = names[names.length - 1];
+  return label.length > most ? label.slice(0, most - 1) + '…' : label;
+}

@@ -1,0 +1,209 @@
+// @ts-check
+// Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be
+// replayed.
+import { h, replace, setText } from '../page/dom.js';
+import { clock } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+import { countsTable } from './counts_table.js';
+import { EventLog } from './event_log.js';
+import { RecordedTrials } from './recorded_trials.js';
+import { TrialList, isOfBag, isRunning, summaryOf } from './trial_list.js';
+import { TrialReplay } from './trial_replay.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Panel} Panel */
+/** @typedef {import('../server').EventSlice} EventSlice */
+/** @typedef {import('../server').Trial} Trial */
+/** @typedef {import('../server').TrialEvent} TrialEvent */
+
+/** @type {Panel} */
+export const trials = { id: 'trials', title: 'Trials', create: (app) => new TrialPanel(app) };
+
+const NARROW = '(max-width: 760px)';
+const NO_TRIALS = 'No trials yet. They appear as robots run; of what happened before this console '
+  + 'was started, the bags tell.';
+const COUNTED = ': in how many each happened at least once';
+const HEARD = 'Trials that ended while this console watched' + COUNTED;
+const IN_BAGS = 'Trials in the bags' + COUNTED;
+
+class TrialPanel {
+  /** @param {App} app */
+  constructor(app) {
+    this.app = app;
+    this.chosen = ''; // id of the trial that is shown
+    /** @type {Trial | null} */
+    this.bag = null; // the trial that is shown, if it is one of a bag
+    /** @type {Trial | null} */
+    this.trial = null;
+    this.follows = true; // the newest trial is shown, until a person chooses
+    /** @type {TrialEvent[]} */
+    this.events = [];
+    this.tableKey = ''; // of what it shows
+    this.table = h('div', { class: 'table-frame card trial-counts' });
+    this.list = new TrialList((id) => this.choose(id), () => this.update(['trials']));
+    this.replay = new TrialReplay(app, (event) => this.log.mark(event.seq));
+    this.recorded = new RecordedTrials(app, () => this.showRecorded());
+    this.title = h('h2', {});
+    this.facts = h('p', { class: 'dim' });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.log = new EventLog((seq) => this.replay.pick(seq));
+    this.detail = h('section', { class: 'card trial-detail' },
+      h('div', {}, this.title, this.facts, this.problem), this.replay.root);
+    this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log.root));
+    this.body = [this.table, this.recorded.root,
+      h('div', { class: 'trial-body' }, this.list.root, this.detail)];
+    this.empty = h('p', { class: 'empty' }, NO_TRIALS);
+    this.root = h('div', { class: 'panel trials' }, this.empty);
+    app.store.onEvents((slice) => this.take(slice));
+  }
+
+  get isCurrent() { return this.app.current === 'trials'; }
+
+  shown() { this.update(['trials', 'bags']); }
+
+  connected() { if (this.chosen && !this.bag) this.watch(this.chosen); }
+
+  /** @param {string} id */
+  choose(id) {
+    this.follows = false;
+    const trial = this.all.find((each) => each.id === id);
+    if (trial) this.open(trial);
+    else this.watch(id);
+    this.update(['trials']);
+    if (matchMedia(NARROW).matches) this.detail.scrollIntoView();
+  }
+
+  /** @param {Trial} trial */
+  open(trial) {
+    if (trial.number === undefined) {
+      this.watch(trial.id);
+      return;
+    }
+    this.begin(trial.id, trial);
+    this.recorded.open(trial.number);
+  }
+
+  /**
+   * @param {string} id
+   * @param {Trial | null} bag
+   */
+  begin(id, bag) {
+    this.chosen = id;
+    this.bag = bag;
+    this.events = [];
+    setText(this.problem, '');
+    this.log.clear();
+  }
+
+  /**
+   * Ask for the events of a trial; they come from the first on, and then as they happen.
+   * @param {string} id
+   */
+  watch(id) {
+    this.begin(id, null);
+    this.app.connection.request('watch', { trial: id }).catch(() => {});
+  }
+
+  showRecorded() {
+    const { opened, problem } = this.recorded;
+    setText(this.problem, this.bag ? problem : '');
+    if (!this.bag || !opened || opened.number !== this.bag.number) return;
+    this.events = opened.events;
+    this.showEvents();
+  }
+
+  /** @param {EventSlice} slice */
+  take({ trial, from, events }) {
+    if (this.bag || trial !== this.chosen || from > this.events.length) return;
+    this.events = this.events.slice(0, from).concat(events);
+    this.showEvents();
+  }
+
+  /** Those that the server has heard of, then those in bags that it has not, newest first. */
+  get all() {
+    const heard = this.app.store.get('trials')?.trials || [];
+    const ids = new Set(heard.map((trial) => trial.id));
+    return heard.concat(this.recorded.trials.filter((trial) => !ids.has(trial.id)));
+  }
+
+  /** @param {string[]} names */
+  update(names) {
+    const drawings = names.some((name) => name.startsWith('graph '));
+    if (drawings && !this.bag && this.isCurrent) this.replay.redraw();
+    if (!names.includes('trials') && !names.includes('bags')) return;
+    this.recorded.update();
+    const { all } = this;
+    if (!all.length && !this.recorded.hasNotes) {
+      replace(this.root, this.empty);
+      return;
+    }
+    if (!this.root.contains(this.table)) replace(this.root, this.body);
+    if (this.isCurrent && all.length) this.settle(all);
+    this.showTable();
+    this.list.show(all, this.chosen);
+    const trial = all.find((each) => each.id === this.chosen);
+    if (trial) this.showFacts(trial);
+  }
+
+  /**
+   * Turn to the newest trial where the chosen one is gone, or none was chosen.
+   * @param {Trial[]} all
+   */
+  settle(all) {
+    const newest = all[0];
+    const gone = !all.some((trial) => trial.id === this.chosen);
+    const newer = this.follows && !isOfBag(newest) && newest.id !== this.chosen;
+    if (!gone && !newer) return;
+    this.follows = true;
+    this.open(newest);
+  }
+
+  showTable() {
+    const heard = this.app.store.get('trials')?.table || [];
+    const bags = this.recorded.table;
+    const key = JSON.stringify([heard, bags]);
+    if (key === this.tableKey) return;
+    this.tableKey = key;
+    this.table.hidden = !heard.length && !bags.length;
+    redraw(this.table, heard.length > 0 && countsTable(HEARD, heard),
+      bags.length > 0 && countsTable(IN_BAGS, bags));
+  }
+
+  /** @param {Trial} trial */
+  showFacts(trial) {
+    this.trial = trial;
+    const { experiment, start, lost, detailed, bag } = trial;
+    setText(this.title, experiment + ' · ' + clock(start));
+    setText(this.facts, [summaryOf(trial, this.app.store.now()), lost && lost + ' events missing',
+      !detailed && 'its events are no longer kept', bag].filter(Boolean).join(' · '));
+    this.showEvents();
+  }
+
+  showEvents() {
+    const { trial, events } = this;
+    if (!trial || trial.id !== this.chosen || !this.isCurrent) return;
+    this.replay.root.hidden = !events.length;
+    if (!events.length) return;
+    this.log.show(() => this.events);
+    const last = events[events.length - 1].t;
+    const running = !this.bag && isRunning(trial);
+    this.replay.set({ id: this.chosen, events, running, ...this.recording(trial),
+      end: running ? Math.max(last, this.app.store.now()) : last });
+  }
+
+  /**
+   * What is beside the events of a trial.
+   * @param {Trial} trial
+   * @returns {Pick<import('./types').ReplayedTrial, 'graph' | 'images'>}
+   */
+  recording({ robot }) {
+    const { store } = this.app;
+    const { opened } = this.recorded;
+    if (!this.bag || !opened) {
+      return { graph: (path) => store.get(`graph ${robot} ${path}`), images: {} };
+    }
+    return { graph: (path) => opened.graphs[path], images: opened.stills };
+  }
+
+  tick() { if (this.trial && !this.bag && isRunning(this.trial)) this.showFacts(this.trial); }
+}

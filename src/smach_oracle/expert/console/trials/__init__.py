@@ -1,0 +1,1 @@
+"""Trials on the console: those that run, and those of bags."""

@@ -1,0 +1,42 @@
+"""The counts of Table I over the trials that a console has heard of.
+
+Definitions: doc/statistics.md.
+"""
+from collections import Counter
+from typing import Any, Dict, Iterable, List, Sequence, Tuple
+
+from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
+
+ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.PREEMPTED)
+COUNTED = ('failures', 'recoveries', 'questions', 'answered')
+
+
+def has_oracle(counter: TrialCounter) -> bool:
+    """Whether a trial runs with an oracle; it does where nothing else is known yet."""
+    return counter.recovers is not False
+
+
+def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
+    """In how many trials each thing happened at least once, and how often in all.
+
+    Counted by experiment and by with or without oracle, over the trials that have ended.
+    """
+    groups: Dict[Tuple[str, bool], List[TrialCounter]] = {}
+    for trial in trials:
+        if trial.ending is not TrialEnding.UNFINISHED:
+            groups.setdefault((trial.experiment, has_oracle(trial)), []).append(trial)
+    in_order = sorted(groups, key=lambda key: (key[0], not key[1]))
+    return [_row(experiment, oracle, groups[experiment, oracle]) for experiment, oracle in in_order]
+
+
+def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[str, Any]:
+    endings = Counter(trial.ending for trial in trials)
+    return {
+        'experiment': experiment, 'oracle': oracle, 'runs': len(trials),
+        'endings': {ending.value: endings[ending] for ending in ENDINGS},
+        'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED}
+    }
+
+
+def _count(numbers: Sequence[int]) -> Dict[str, int]:
+    return {'trials': sum(1 for number in numbers if number), 'events': sum(numbers)}

@@ -1,0 +1,79 @@
+"""What every request passes first: its host, its rate, its origin, and whose session it is."""
+import time
+from typing import Dict, Optional
+
+import tornado.web
+
+from . import sessions
+from .access import ClientRateLimits, Identity
+from .audit import Audit
+from .sessions import BrowserSession
+from .settings import ConsoleSettings
+
+
+class AccessControl:
+    """What all handlers share: settings, limits, and the keys of the cookie."""
+
+    def __init__(self, settings: ConsoleSettings, secret: str, audit: Audit) -> None:
+        self.settings = settings
+        self.secret = secret
+        self.audit = audit
+        self.cookie = 'console_{}'.format(settings.port)
+        self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
+        # a page has some 80; a browser may open many pages
+        self.files = ClientRateLimits(rate=100.0, burst=1500.0, for_all=5.0)
+        self.sign_ins = ClientRateLimits(rate=0.2, burst=5.0, for_all=4.0)
+        # id of a session -> when, s; of those whose cookie might still be good
+        self._ended: Dict[str, float] = {}
+
+    def session(self, handler: tornado.web.RequestHandler) -> Optional[BrowserSession]:
+        """The session of a request's cookie; None where it has none of ours."""
+        session = sessions.from_text(
+            handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
+        over = session is None or session.id in self._ended or session.left_s <= 0.0
+        return None if over else session
+
+    def end(self, session: BrowserSession) -> None:
+        """End a session: its cookie, of which somebody may have a copy, is refused from now on."""
+        now_s = time.monotonic()
+        self._ended = {
+            id_: at_s
+            for id_, at_s in self._ended.items() if now_s - at_s < 3600.0 * sessions.HOURS
+        }
+        self._ended[session.id] = now_s
+
+    def identity(self, session: Optional[BrowserSession]) -> Optional[Identity]:
+        """The role and name of a session; None where it is not signed in any more, or too old.
+
+        Without tokens everybody who gets here may do everything, for as long as the page is open.
+        """
+        if session is not None and session.id in self._ended:
+            return None
+        if self.settings.tokens is None:
+            return Identity('teleoperator') if session else None
+        signed_in = session is not None and session.role and session.left_s > 0.0
+        return Identity(session.role, session.name) if session and signed_in else None
+
+    def refusal(self, handler: tornado.web.RequestHandler,
+                limits: Optional[ClientRateLimits] = None) -> int:
+        """The status with which a request is refused; 0 where it may go on.
+
+        :param limits: of its own, where it has any.
+        """
+        request = handler.request
+        if not self.settings.hosts.allows(request.headers.get('Host', '')):
+            return 421
+        if not (limits or self.requests).take(request.remote_ip or ''):
+            return 429
+        if not self.from_own_page(handler, must_say=request.method not in ('GET', 'HEAD')):
+            return 403
+        return 0
+
+    def from_own_page(self, handler: tornado.web.RequestHandler, must_say: bool) -> bool:
+        """Whether the Origin is this console; `must_say`: a request without one is refused, too."""
+        headers = handler.request.headers
+        origin = headers.get('Origin')
+        if origin is None:
+            return not must_say
+        return self.settings.hosts.allows_origin(origin, headers.get('Host', ''),
+                                                 self.settings.scheme)

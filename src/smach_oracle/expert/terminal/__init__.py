@@ -1,0 +1,1 @@
+"""The expert at a terminal."""

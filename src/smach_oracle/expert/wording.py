@@ -1,0 +1,87 @@
+"""Failures and events in words, for every front end. Pure.
+
+Text that a robot has sent comes out of `clean` fit for a terminal; a page shows it as text, never
+as markup.
+"""
+import unicodedata
+from typing import Union
+
+from smach_oracle.msg import ExpertQueryGoal, OracleEvent
+from smach_oracle.oracle.records.events import Event, EventKind
+
+
+def clean(text: str, lines: bool = False) -> str:
+    """Drop what steers a terminal or turns the reading direction.
+
+    :param lines: keep newlines.
+    """
+    return ''.join(_visible(character, lines) for character in text)
+
+
+def failure_words(goal: ExpertQueryGoal) -> str:
+    """How the state of a question failed."""
+    outcome = clean(goal.outcome)
+    return {
+        OracleEvent.FAILING_OUTCOME: 'ended with the failing outcome {}'.format(outcome),
+        OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(
+            outcome, clean(goal.container_path)),
+        OracleEvent.EXCEPTION: 'raised an exception',
+        OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is no outcome of it'.format(
+            outcome or 'nothing'),
+        OracleEvent.TIME_LIMIT: 'ran over its time limit',
+    }.get(goal.failure_kind, 'failed')
+
+
+def next_step_words(event: Union[OracleEvent, Event]) -> str:
+    """An event that follows an answer, as a sentence; '' for events of other kinds."""
+    state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
+    return {
+        OracleEvent.JUMP: 'The machine goes to {}.'.format(target),
+        OracleEvent.SUPERSEDE: '{} counts as having ended with {}.'.format(state, outcome),
+        OracleEvent.GIVE_UP: '{} gives up{}.'.format(clean(event.path), _with(outcome)),
+        OracleEvent.INTERFACE_START: 'Interface {} begins.'.format(target),
+        OracleEvent.INTERFACE_END: 'Interface {} ended{}.'.format(target, _with(outcome)),
+        OracleEvent.STATE_START: '{} runs.'.format(state),
+        OracleEvent.WARNING: 'The robot warns: {}'.format(clean(event.text)),
+        OracleEvent.TRIAL_END: 'The trial ended{}.'.format(_with(outcome)),
+    }.get(event.kind, '')
+
+
+def event_words(event: Event) -> str:
+    """Any event as a sentence."""
+    by = ' by ' + event.by if event.by else ''
+    sentence = {
+        EventKind.TRIAL_START: lambda: 'The trial of {} began.'.format(event.path),
+        EventKind.CONTAINER_START: lambda: '{} began in {}.'.format(event.path, event.state),
+        EventKind.CONTAINER_END: lambda: '{} ended{}.'.format(event.path, _with(event.outcome)),
+        EventKind.TRANSITION: lambda: '{} ended{}; next: {}.'.format(
+            event.state, _with(event.outcome), event.target),
+        EventKind.FAILURE: lambda: '{} failed{}.'.format(event.state, _with(event.outcome)),
+        EventKind.PRECONDITION_START: lambda: 'Precondition {} of {} is made to hold.'.format(
+            event.target, event.state),
+        EventKind.PRECONDITION_END: lambda: 'Precondition {} of {}: {}.'.format(
+            event.target, event.state, event.outcome),
+        EventKind.DECISION: lambda: 'The oracle decides: {}{}.'.format(
+            event.outcome.replace('_', ' '), ' to ' + event.target if event.target else ''),
+        EventKind.QUERY_OPENED: lambda: 'The expert is asked about {}.'.format(event.state),
+        EventKind.QUERY_CLAIMED: lambda: 'The question was taken{}.'.format(by),
+        EventKind.QUERY_RELEASED: lambda: 'The question was given back{}.'.format(by),
+        EventKind.QUERY_ANSWERED: lambda: 'The question was answered{}: {}{}.'.format(
+            by, event.outcome.replace('_', ' '), ' ' + event.target if event.target else ''),
+        EventKind.QUERY_EXPIRED: lambda: 'Nobody answered in time.',
+        EventKind.QUERY_CANCELLED: lambda: 'The question was taken back.',
+        EventKind.PREEMPT: lambda: '{} was asked to stop.'.format(event.path),
+    }.get(event.kind)
+    return sentence() if sentence else next_step_words(event)
+
+
+def _with(outcome: str) -> str:
+    return ' with ' + outcome if outcome else ''
+
+
+def _visible(character: str, lines: bool) -> str:
+    if character == '\t' or character in '\n\u2028\u2029' and not lines:
+        return ' '
+    if character == '\n' or unicodedata.category(character)[0] != 'C':
+        return character
+    return '\ufffd'
