@@ -6,14 +6,17 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .transforms import from_rpy
 
-ROUND = 0.86  # a footprint whose tightest rectangle has more than this share of the widest one's area has no heading
+# a footprint whose tightest rectangle has more than this share of the widest one's area has no
+# heading
+ROUND = 0.86
 
 
 class UprightBox(NamedTuple):
     """A box that stands upright; its x axis is turned by `yaw`."""
 
     centre: np.ndarray  # (3,) m
-    size: np.ndarray  # (3,) m, along its own axes; x is not shorter than y, except where it is round
+    # (3,) m, along its own axes; x is not shorter than y, except where it is round
+    size: np.ndarray
     yaw: float  # rad, within a quarter turn of 0
 
     @property
@@ -59,7 +62,10 @@ def _spans(values: np.ndarray, trim: float) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def _heading(flat: np.ndarray) -> float:
-    """Direction of the longer side of the tightest rectangle, in (-pi/2, pi/2]; 0 for something round."""
+    """Direction of the longer side of the tightest rectangle, in (-pi/2, pi/2].
+
+    :returns: rad; 0 for something round.
+    """
     try:
         hull = flat[ConvexHull(flat).vertices] if len(flat) > 3 else flat
     except QhullError:  # all on one line

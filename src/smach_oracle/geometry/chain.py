@@ -1,54 +1,26 @@
-"""A serial chain of joints out of a URDF: where its tip is, how it moves, and which joint positions reach a pose.
+"""A serial chain of joints: its forward and inverse kinematics.
 
-    arm = Chain.from_urdf(text, 'base_footprint', 'r_gripper_tool_frame', fixed={'torso_lift_joint': 0.2})
-    tool = arm.forward(q)                                   # 4x4, root from tip
-    q = arm.inverse(tool, seed, np.random.default_rng(1))   # None where no solution was found
+    arm = JointChain.from_urdf(text, 'base_footprint', 'r_gripper_tool_frame',
+                               fixed={'torso_lift_joint': 0.2})
+    tool = arm.forward(q)  # 4x4, root from tip
+    q = arm.inverse(tool, seed, np.random.default_rng(1))  # None where no solution was found
 """
-import xml.etree.ElementTree as ElementTree
-from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from .transforms import from_rpy, rotation_vector
+from .joints import Joint, moved, placed_parts, read_joints
+from .transforms import rotation_vector
 
 POSITION_TOLERANCE = 1e-3  # m
 ANGLE_TOLERANCE = 5e-3  # rad
 
-_TURNING = ('revolute', 'continuous')
-_MOVING = _TURNING + ('prismatic',)
 
+class JointChain:
+    """The n moving joints between two links, in order from the root.
 
-class Joint(NamedTuple):
-    """A joint of a model, as its URDF has it."""
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: np.ndarray  # 4x4, parent from joint at zero
-    axis: np.ndarray  # (3,), unit length, in the joint's frame
-    lower: float  # rad or m; -inf for a continuous joint
-    upper: float  # likewise, or inf
-    velocity: float  # rad/s or m/s, the limit; inf where none is given
-
-
-def read_joints(urdf: str) -> Dict[str, Joint]:
-    """The joints of a URDF by the link that each of them carries.
-
-    :raises ValueError: for text that is no URDF.
+    Their positions are rad, or m where they slide.
     """
-    try:
-        root = ElementTree.fromstring(urdf)
-        joints = [_joint(element) for element in root.findall('joint')]
-    except (ElementTree.ParseError, AttributeError, TypeError, ValueError) as err:
-        raise ValueError('robot description: not a URDF: {}'.format(err)) from err
-    if not joints:
-        raise ValueError('robot description: it has no joints')
-    return {joint.child: joint for joint in joints}
-
-
-class Chain:
-    """The n moving joints between two links, in order from the root; their positions are rad, or m where they slide."""
 
     def __init__(self, joints: List[Joint], fixed: Mapping[str, float]) -> None:
         """See from_urdf; `joints` are all of those between root and tip, with the fixed ones."""
@@ -56,34 +28,31 @@ class Chain:
         before = np.eye(4)
         for joint in joints:
             before = before @ joint.origin
-            if joint.kind in _MOVING and joint.name not in fixed:
+            if joint.moves and joint.name not in fixed:
                 moving.append((before, joint))
                 before = np.eye(4)
-            elif joint.kind in _MOVING:
-                still, sine, cosine = _motion(joint)
-                value = fixed[joint.name]
-                turning = joint.kind in _TURNING
-                before = before @ (still + (np.sin(value) * sine + np.cos(value) * cosine if turning
-                                            else value * sine))
+            elif joint.moves:
+                before = before @ joint.motion(fixed[joint.name])
         self._tip = before
         self.joints = [joint for _, joint in moving]
         self.names = [joint.name for joint in self.joints]
         self.lower = np.array([joint.lower for joint in self.joints])
         self.upper = np.array([joint.upper for joint in self.joints])
         self.velocity = np.array([joint.velocity for joint in self.joints])
-        self.continuous = np.array([joint.kind == 'continuous' for joint in self.joints], dtype=bool)
-        self._turning = np.array([joint.kind in _TURNING for joint in self.joints], dtype=bool)
+        self.continuous = np.array([joint.kind == 'continuous' for joint in self.joints],
+                                   dtype=bool)
+        self._turning = np.array([joint.turns for joint in self.joints], dtype=bool)
         self._axes = np.array([joint.axis for joint in self.joints])
-        parts = [[place @ part for part in _motion(joint)] for place, joint in moving]
-        self._still, self._sine, self._cosine = (np.array([part[k] for part in parts]) for k in range(3))
+        self._parts = placed_parts(self.joints, [place for place, _ in moving])
 
     @classmethod
-    def from_urdf(cls, urdf: str, root: str, tip: str, fixed: Optional[Mapping[str, float]] = None) -> 'Chain':
+    def from_urdf(cls, urdf: str, root: str, tip: str,
+                  fixed: Optional[Mapping[str, float]] = None) -> 'JointChain':
         """The chain between two links of a robot description (XML text).
 
         :param fixed: joints on the way that shall not move, with where they are (rad or m).
-        :raises ValueError: where the text is no URDF, a link or a fixed joint is not there, `tip` does not hang below
-            `root`, or no joint between them moves.
+        :raises ValueError: where the text is no URDF, a link or a fixed joint is not there, `tip`
+            does not hang below `root`, or no joint between them moves.
         """
         by_child = read_joints(urdf)
         links = set(by_child) | {joint.parent for joint in by_child.values()}
@@ -94,14 +63,16 @@ class Chain:
         link = tip
         while link != root:
             if link not in by_child:
-                raise ValueError('robot description: {!r} does not hang below {!r}'.format(tip, root))
+                raise ValueError('robot description: {!r} does not hang below {!r}'.format(
+                    tip, root))
             joints.append(by_child[link])
             link = by_child[link].parent
         joints.reverse()
         unknown = sorted(set(fixed or {}) - {joint.name for joint in joints})
         if unknown:
-            raise ValueError('no joint {} between {!r} and {!r}'.format(', '.join(unknown), root, tip))
-        if not any(joint.kind in _MOVING and joint.name not in (fixed or {}) for joint in joints):
+            raise ValueError('no joint {} between {!r} and {!r}'.format(
+                ', '.join(unknown), root, tip))
+        if not any(joint.moves and joint.name not in (fixed or {}) for joint in joints):
             raise ValueError('no joint moves between {!r} and {!r}'.format(root, tip))
         return cls(joints, fixed or {})
 
@@ -110,7 +81,7 @@ class Chain:
         return self._frames(np.asarray(q, dtype=float)[None])[1][0]
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        """(6, n): velocity of the tip's origin, then angular velocity, both in the root's axes, for each joint's."""
+        """(6, n): the tip's velocity for each joint's, linear then angular, in the root's axes."""
         return self._jacobians(*self._frames(np.asarray(q, dtype=float)[None]))[0]
 
     def clip(self, q: np.ndarray) -> np.ndarray:
@@ -118,41 +89,52 @@ class Chain:
         return np.clip(q, self.lower, self.upper)
 
     def nearest_turn(self, q: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """`q`, (n,) or (m, n), with continuous joints taken to within half a turn of `reference`, (n,)."""
+        """`q` with its continuous joints within half a turn of `reference`.
+
+        :param q: (n,) or (m, n).
+        :param reference: (n,).
+        """
         turned = reference + (q - reference + np.pi) % (2 * np.pi) - np.pi
         return np.where(self.continuous, turned, q)
 
     def random(self, generator: np.random.Generator, count: int) -> np.ndarray:
-        """(count, n) joint positions, uniform within the limits (continuous joints: within a turn)."""
+        """(count, n) joint positions, uniform within the limits.
+
+        Continuous joints are drawn within a turn.
+        """
         lower = np.where(self.continuous, -np.pi, self.lower)
         upper = np.where(self.continuous, np.pi, self.upper)
         return generator.uniform(lower, upper, (count, len(self.names)))
 
-    def inverse(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator] = None,
-                restarts: int = 15, iterations: int = 50) -> Optional[np.ndarray]:
+    def inverse(self, pose: np.ndarray, seed: np.ndarray,
+                generator: Optional[np.random.Generator] = None, restarts: int = 15,
+                iterations: int = 50) -> Optional[np.ndarray]:
         """Joint positions that take the tip to `pose`, within the limits.
 
         :param pose: 4x4, root from tip; reached to 1 mm and 0.3 degrees.
         :param seed: (n,), where to start; continuous joints end within half a turn of it.
-        :param generator: draws further starts, tried at the same time; None: the seed alone, so that the solution is
-            the one next to it.
-        :returns: (n,), the solution found first (the one nearest to the seed, where several were); None where there
-            was none.
+        :param generator: draws further starts, tried at the same time; None: the seed alone, so
+            that the solution is the one next to it.
+        :returns: (n,), the solution found first (the one nearest to the seed, where several were);
+            None where there was none.
         :raises ValueError: for a pose or seed that is not finite.
         """
         found = self._solve(pose, seed, generator, restarts, iterations, first=True)
         return found[0] if len(found) else None
 
-    def solutions(self, pose: np.ndarray, seed: np.ndarray, generator: np.random.Generator, restarts: int = 15,
-                  iterations: int = 50) -> np.ndarray:
-        """All solutions (m, n) found from the seed and the restarts, as for inverse(), nearest to the seed first.
+    def solutions(self, pose: np.ndarray, seed: np.ndarray, generator: np.random.Generator,
+                  restarts: int = 15, iterations: int = 50) -> np.ndarray:
+        """All solutions found from the seed and the restarts, nearest to the seed first.
 
+        Parameters are as for inverse().
+
+        :returns: (m, n).
         :raises ValueError: for a pose or seed that is not finite.
         """
         return self._solve(pose, seed, generator, restarts, iterations, first=False)
 
-    def _solve(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator], restarts: int,
-               iterations: int, first: bool) -> np.ndarray:
+    def _solve(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator],
+               restarts: int, iterations: int, first: bool) -> np.ndarray:
         seed = np.asarray(seed, dtype=float)
         if not (np.isfinite(pose).all() and np.isfinite(seed).all()):
             raise ValueError('inverse kinematics: the pose or the seed is not finite')
@@ -181,9 +163,11 @@ class Chain:
         return np.concatenate(arrived) if arrived else np.zeros((0, len(self.names)))
 
     def _frames(self, q: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Frames of the joints after their motion (k, n, 4, 4) and of the tip (k, 4, 4), for positions (k, n)."""
-        sine = np.where(self._turning, np.sin(q), q)[..., None, None]
-        local = self._still + sine * self._sine + np.cos(q)[..., None, None] * self._cosine
+        """Frames of the joints after their motion (k, n, 4, 4), and of the tip (k, 4, 4).
+
+        :param q: (k, n).
+        """
+        local = moved(self._parts, self._turning, q)
         frames = np.empty_like(local)
         frames[:, 0] = local[:, 0]
         for k in range(1, len(self.names)):
@@ -198,45 +182,12 @@ class Chain:
         return np.concatenate([linear, np.where(turning, axes, 0.0)], axis=2).transpose(0, 2, 1)
 
 
-def _joint(element: ElementTree.Element) -> Joint:
-    origin, axis, limit = element.find('origin'), element.find('axis'), element.find('limit')
-    xyz, rpy = _numbers(origin, 'xyz'), _numbers(origin, 'rpy')
-    direction = np.array(_numbers(axis, 'xyz')) if axis is not None else np.array([1.0, 0.0, 0.0])
-    kind = element.get('type', '')
-    lower, upper = (float(limit.get(end, 0.0)) if limit is not None else 0.0 for end in ('lower', 'upper'))
-    velocity = float(limit.get('velocity', np.inf)) if limit is not None else np.inf
-    if kind == 'continuous':
-        lower, upper = -np.inf, np.inf
-    return Joint(element.get('name', ''), kind, element.find('parent').get('link'), element.find('child').get('link'),
-                 from_rpy(xyz, *rpy), direction / max(np.linalg.norm(direction), 1e-12), lower, upper, velocity)
-
-
-def _numbers(element: Optional[ElementTree.Element], name: str) -> List[float]:
-    text = element.get(name) if element is not None else None
-    numbers = [float(word) for word in text.split()] if text else [0.0, 0.0, 0.0]
-    if len(numbers) != 3:
-        raise ValueError('{}="{}" has not three numbers'.format(name, text))
-    return numbers
-
-
-def _motion(joint: Joint) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parts (4x4) of the joint's motion: still + sin q * sine + cos q * cosine; prismatic: still + q * sine."""
-    x, y, z = joint.axis
-    still, sine, cosine = np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))
-    if joint.kind == 'prismatic':
-        sine[:3, 3] = joint.axis
-    else:
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        sine[:3, :3] = cross
-        cosine[:3, :3] = -cross @ cross
-        still[:3, :3] += cross @ cross
-    return still, sine, cosine
-
-
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products over the last axis, without the checks of np.cross that cost most of its time."""
-    return np.stack([a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1], a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-                     a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]], axis=-1)
+    """Cross products over the last axis; most of np.cross's time goes into its checks."""
+    return np.stack([
+        a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+        a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2], a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    ], axis=-1)
 
 
 def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
@@ -248,13 +199,17 @@ def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
     angle = np.arctan2(sine, 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
     scale = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
     vector = scale[:, None] * vector
-    for k in np.flatnonzero((sine <= 1e-9) & (angle > 1.0)):  # half a turn: its axis is not in the skew part
+    # half a turn: its axis is not in the skew part
+    for k in np.flatnonzero((sine <= 1e-9) & (angle > 1.0)):
         vector[k] = rotation_vector(turn[k])
     return np.concatenate([pose[:3, 3] - tips[:, :3, 3], vector], axis=1)
 
 
 def _step(jacobians: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """(k, n): damped least squares, with the error clipped so that a far goal does not make a wild step."""
+    """(k, n): a step of damped least squares.
+
+    The error is clipped, so that a far goal does not make a wild step.
+    """
     error = error.copy()
     far = np.linalg.norm(error[:, :3], axis=1, keepdims=True)
     error[:, :3] *= np.minimum(1.0, 0.2 / np.maximum(far, 1e-9))

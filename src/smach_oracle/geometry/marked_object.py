@@ -10,7 +10,7 @@ from .plane import Plane
 CELL = 0.015  # m: points further from each other do not hang together
 
 
-class Body(NamedTuple):
+class MarkedObject(NamedTuple):
     """An object among marked points."""
 
     box: UprightBox
@@ -18,15 +18,20 @@ class Body(NamedTuple):
     surface: Optional[Plane]  # the one it stands on
 
 
-def body_above(points: np.ndarray, surface: Optional[Plane], clearance: float) -> Optional[Body]:
-    """The largest piece that hangs together of points (n, 3), n >= 1, of an object and some of what is behind it.
+def object_above(points: np.ndarray, surface: Optional[Plane],
+                 clearance: float) -> Optional[MarkedObject]:
+    """The object among points (n, 3), n >= 1, some of which show what is behind it.
 
-    :param surface: what it stands on, where that is known; else it reaches down to its lowest points.
+    It is the largest connected piece.
+
+    :param surface: what it stands on, where that is known; else it reaches down to its lowest
+        points.
     :param clearance: m above the surface; lower points belong to that.
     :returns: None where no point is left.
     """
     chosen = np.ones(len(points), bool)
-    if surface is not None and np.mean(surface.height(points) > -clearance) > 0.8:  # else it is not below the object
+    # else it is not below the object
+    if surface is not None and np.mean(surface.height(points) > -clearance) > 0.8:
         chosen = surface.height(points) > clearance
     else:
         surface = None
@@ -36,4 +41,4 @@ def body_above(points: np.ndarray, surface: Optional[Plane], clearance: float) -
     own = points[chosen]
     floor = (surface.z_at(*own[:, :2].mean(axis=0)) if surface is not None
              else float(np.percentile(own[:, 2], 2)))
-    return Body(upright_box(own, floor), chosen, surface)
+    return MarkedObject(upright_box(own, floor), chosen, surface)

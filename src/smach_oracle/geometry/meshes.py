@@ -1,13 +1,15 @@
 """Triangles out of mesh files (STL, Wavefront OBJ, COLLADA), and fewer of them for a quick look.
 
-Files are read as data: sizes are checked before anything is made of them, and whatever is wrong is a MeshError.
+Files are read as data: sizes are checked before anything is made of them, and whatever is wrong is
+a MeshError.
 """
 import xml.etree.ElementTree as ElementTree
 from typing import Callable, Dict, Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
-from .robot_shapes import parsed
+from .transforms import rotation_about
+from .xml_text import read_xml
 
 MOST_BYTES = 100000000  # of a file
 MOST_TEXT = 40000000  # of one that is text: it takes many times its size to read
@@ -19,7 +21,7 @@ _DEEPEST = 60  # nodes of a COLLADA scene within each other
 
 
 class MeshError(ValueError):
-    """A file that holds no mesh that could be used; the text says why, without quoting the file."""
+    """A file without a usable mesh; the text gives the reason and quotes nothing of the file."""
 
 
 class Mesh(NamedTuple):
@@ -36,7 +38,8 @@ def read_mesh(data: bytes, kind: str) -> Mesh:
     """
     reader = _READERS.get(kind)
     if reader is None:
-        raise MeshError('it is of the kind {!r}; readable: {}'.format(kind[:20], ', '.join(sorted(_READERS))))
+        raise MeshError('it is of the kind {!r}; readable: {}'.format(kind[:20],
+                                                                      ', '.join(sorted(_READERS))))
     most = MOST_BYTES if kind == 'stl' else MOST_TEXT
     if len(data) > most:
         raise MeshError('it has {} bytes; allowed: {}'.format(len(data), most))
@@ -49,17 +52,22 @@ def read_mesh(data: bytes, kind: str) -> Mesh:
     if not len(mesh.triangles):
         raise MeshError('it has no triangles')
     if len(mesh.triangles) > MOST_TRIANGLES:
-        raise MeshError('it has {} triangles; allowed: {}'.format(len(mesh.triangles), MOST_TRIANGLES))
+        raise MeshError('it has {} triangles; allowed: {}'.format(len(mesh.triangles),
+                                                                  MOST_TRIANGLES))
     if mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.corners):
         raise MeshError('its triangles have corners that are not there')
     used = mesh.corners[mesh.triangles]
     if not (np.isfinite(used).all() and np.abs(used).max() < FURTHEST):
-        raise MeshError('its corners are not all finite, or further away than {:g}'.format(FURTHEST))
+        raise MeshError(
+            'its corners are not all finite, or further away than {:g}'.format(FURTHEST))
     return mesh
 
 
 def reduced(mesh: Mesh, most: int) -> Mesh:
-    """About the same with at most so many triangles (>= 12): corners within the cells of a grid become one."""
+    """About the same mesh with at most `most` triangles (>= 12).
+
+    Corners within a cell of a grid become one.
+    """
     mesh = _merged(mesh, 0.0)
     if len(mesh.triangles) <= most:
         return mesh
@@ -81,11 +89,17 @@ def reduced(mesh: Mesh, most: int) -> Mesh:
 
 
 def _merged(mesh: Mesh, cell: float) -> Mesh:
-    """Corners in the same cell (0: at the same place) become one, their mean; triangles that collapse are left out."""
+    """The mesh with the corners of each cell made one, their mean.
+
+    Triangles that collapse are left out.
+
+    :param cell: m; 0: corners at the same place.
+    """
     corners = mesh.corners
     low, span = corners.min(axis=0), float(np.ptp(corners, axis=0).max())
     steps = np.round((corners - low) / max(cell, span / _FINEST, 1e-12)).astype(np.int64)
-    _, index = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_inverse=True)
+    _, index = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2],
+                         return_inverse=True)
     index = index.reshape(-1)
     count = np.bincount(index).astype(float)
     merged = np.stack([np.bincount(index, corners[:, axis]) / count for axis in range(3)], axis=1)
@@ -103,22 +117,26 @@ def _merged(mesh: Mesh, cell: float) -> Mesh:
 def _box(mesh: Mesh) -> Mesh:
     """The box around it."""
     low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1)
+                        for z in (0, 1)]) * (high - low) + low
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return Mesh(corners, np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
+    return Mesh(corners,
+                np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
 
 
 def _stl(data: bytes) -> Mesh:
     count = int.from_bytes(data[80:84], 'little')
-    if len(data) >= 84 and len(data) >= 84 + count * _STL.itemsize and not (
-            data[:5] == b'solid' and b'facet' in data[:400]):
+    is_text = data[:5] == b'solid' and b'facet' in data[:400]
+    if len(data) >= 84 and len(data) >= 84 + count * _STL.itemsize and not is_text:
         corners = np.frombuffer(data, _STL, count, 84)['corners'].reshape(-1, 3).astype(np.float64)
     else:
         words = data.split() if len(data) <= MOST_TEXT else []
         if len(words) < 4 or words[0] != b'solid':
-            raise MeshError('it is no STL file, or one of text with more than {} bytes'.format(MOST_TEXT))
-        corners = np.array([words[at + 1:at + 4] for at, word in enumerate(words) if word == b'vertex'],
-                           np.float64).reshape(-1, 3)
+            raise MeshError(
+                'it is no STL file, or one of text with more than {} bytes'.format(MOST_TEXT))
+        corners = np.array(
+            [words[at + 1:at + 4] for at, word in enumerate(words) if word == b'vertex'],
+            np.float64).reshape(-1, 3)
     return Mesh(corners, np.arange(len(corners) // 3 * 3).reshape(-1, 3))
 
 
@@ -137,19 +155,25 @@ def _obj(data: bytes) -> Mesh:
             triangles += [(at[0], one, other) for one, other in zip(at[1:], at[2:])]
             if len(triangles) > MOST_TRIANGLES:
                 raise MeshError('it has more than {} triangles'.format(MOST_TRIANGLES))
-    return Mesh(np.array(corners, float).reshape(-1, 3), np.array(triangles, np.int64).reshape(-1, 3))
+    return Mesh(
+        np.array(corners, float).reshape(-1, 3),
+        np.array(triangles, np.int64).reshape(-1, 3))
 
 
 def _dae(data: bytes) -> Mesh:
     try:
-        root = parsed(data.decode('utf-8'), 'COLLADA', MOST_TEXT)
+        root = read_xml(data.decode('utf-8'), 'COLLADA', MOST_TEXT)
     except ValueError as err:
-        raise MeshError('it is no COLLADA file, or one with a document type or in another encoding') from err
+        raise MeshError(
+            'it is no COLLADA file, or one with a document type or in another encoding') from err
     for element in root.iter():
         element.tag = str(element.tag).rsplit('}', 1)[-1]
     unit = root.find('asset/unit')
     scale = float(unit.get('meter', '1')) if unit is not None else 1.0
-    geometries = {each.get('id', ''): _dae_geometry(each) for each in root.findall('library_geometries/geometry')}
+    geometries = {
+        each.get('id', ''): _dae_geometry(each)
+        for each in root.findall('library_geometries/geometry')
+    }
     parts = list(_placed(root, geometries)) or [(np.eye(4), mesh) for mesh in geometries.values()]
     corners, triangles, before, total = [], [], 0, 0
     for place, mesh in parts:
@@ -164,7 +188,8 @@ def _dae(data: bytes) -> Mesh:
     return Mesh(np.concatenate(corners), np.concatenate(triangles))
 
 
-def _placed(root: ElementTree.Element, geometries: Dict[str, Mesh]) -> Iterator[Tuple[np.ndarray, Mesh]]:
+def _placed(root: ElementTree.Element, geometries: Dict[str,
+                                                        Mesh]) -> Iterator[Tuple[np.ndarray, Mesh]]:
     """The geometries where the scenes have them."""
     waiting = [(node, np.eye(4), 0) for scene in root.findall('library_visual_scenes/visual_scene')
                for node in scene.findall('node')]
@@ -194,10 +219,8 @@ def _dae_transform(element: ElementTree.Element) -> np.ndarray:
     elif element.tag == 'scale':
         result[:3, :3] = np.diag(values)
     else:
-        x, y, z = values[:3] / max(float(np.linalg.norm(values[:3])), 1e-12)
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        angle = np.radians(values[3])
-        result[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        axis = values[:3] / max(float(np.linalg.norm(values[:3])), 1e-12)
+        result[:3, :3] = rotation_about(axis, np.radians(values[3]))
     return result
 
 
@@ -225,17 +248,26 @@ def _faces(element: ElementTree.Element, kind: str) -> np.ndarray:
     """(n, 3) indices of corners."""
     inputs = element.findall('input')
     step = 1 + max((int(each.get('offset', '0')) for each in inputs), default=0)
-    offset = next((int(each.get('offset', '0')) for each in inputs if each.get('semantic') == 'VERTEX'), 0)
+    offset = next(
+        (int(each.get('offset', '0')) for each in inputs if each.get('semantic') == 'VERTEX'), 0)
     if not 0 <= offset < step <= 100:
-        raise MeshError('its triangles say where their corners are in a way that is not allowed')
-    lists = [np.array((each.text or '').split(), np.int64)[offset::step] for each in element.findall('p')]
+        raise MeshError('invalid COLLADA input offset {} for stride {}; allowed: an offset from 0 '
+                        'below the stride, and a stride of at most 100'.format(offset, step))
+    lists = [
+        np.array((each.text or '').split(), np.int64)[offset::step] for each in element.findall('p')
+    ]
     if kind == 'triangles':
-        return np.concatenate([each[:len(each) // 3 * 3].reshape(-1, 3) for each in lists] or [np.zeros((0, 3), int)])
+        return np.concatenate([each[:len(each) // 3 * 3].reshape(-1, 3) for each in lists]
+                              or [np.zeros((0, 3), int)])
     if kind == 'polylist':
         counts = element.find('vcount')
         sides = np.array((counts.text or '').split() if counts is not None else [], np.int64)
-        lists = [part for each in lists for part in np.split(each, np.cumsum(np.clip(sides, 0, 10000)))[:-1]]
-    fans = [(each[0], one, other) for each in lists if len(each) > 2 for one, other in zip(each[1:], each[2:])]
+        lists = [
+            part for each in lists
+            for part in np.split(each, np.cumsum(np.clip(sides, 0, 10000)))[:-1]
+        ]
+    fans = [(each[0], one, other) for each in lists if len(each) > 2
+            for one, other in zip(each[1:], each[2:])]
     return np.array(fans, np.int64).reshape(-1, 3)
 
 

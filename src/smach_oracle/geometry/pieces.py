@@ -1,4 +1,4 @@
-"""Points that hang together: pieces of a cloud, the largest piece of a surface, what stands on it."""
+"""Connected points: pieces of a cloud, the largest piece of a surface, what stands on it."""
 from typing import List, Optional
 
 import numpy as np
@@ -32,16 +32,21 @@ def largest_piece(points: np.ndarray, cell: float) -> np.ndarray:
 
 
 def largest_patch(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 3) of a level surface that belong to its largest connected piece, seen from above.
+    """The points of the largest connected piece of a level surface, seen from above.
 
-    And to others that are not small against it: an arm in front of a table parts what is seen of it.
+    Pieces that are not small against it count as well: an arm in front of a table parts what is
+    seen of the table.
+
+    :param points: (n, 3).
     """
     if not len(points):
         return points
-    cells = np.floor(np.minimum(points[:, :2] - points[:, :2].min(axis=0), FARTHEST) / PATCH_CELL).astype(int)
+    cells = np.floor(np.minimum(points[:, :2] - points[:, :2].min(axis=0), FARTHEST) /
+                     PATCH_CELL).astype(int)
     grid = np.zeros(cells.max(axis=0) + 5, bool)
     grid[tuple(cells.T + 2)] = True
-    labels = ndimage.label(ndimage.binary_closing(grid, iterations=2), np.ones((3, 3)))[0][tuple(cells.T + 2)]
+    labels = ndimage.label(ndimage.binary_closing(grid, iterations=2), np.ones(
+        (3, 3)))[0][tuple(cells.T + 2)]
     sizes = np.bincount(labels)
     sizes[0] = 0
     return points[(sizes >= max(1, PATCH_SHARE * sizes.max()))[labels]]
@@ -49,7 +54,9 @@ def largest_patch(points: np.ndarray) -> np.ndarray:
 
 def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
                 margin: float) -> List[np.ndarray]:
-    """What stands on a surface: for each thing the indices of its points; what has few is taken for noise.
+    """What stands on a surface: for each thing, the indices of its points.
+
+    Few points are taken for noise.
 
     :param points: (n, 3), m, all finite.
     :param patch: (m, 3) points of the surface; things stand within its convex hull.

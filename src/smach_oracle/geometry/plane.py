@@ -18,17 +18,18 @@ class Plane(NamedTuple):
 
     def z_at(self, x: float, y: float) -> float:
         """Its z (m) at a place."""
-        return float(self.point[2] - (self.normal[0] * (x - self.point[0]) + self.normal[1] * (y - self.point[1]))
-                     / self.normal[2])
+        return float(self.point[2] - (self.normal[0] * (x - self.point[0]) + self.normal[1] *
+                                      (y - self.point[1])) / self.normal[2])
 
 
 def find_plane(points: np.ndarray, generator: np.random.Generator, tolerance: float = 0.012,
                max_tilt: float = 0.17, least: int = 500, hypotheses: int = 150) -> Optional[Plane]:
-    """The level plane with the most points, by RANSAC and a least-squares fit; None where no plane has `least` of them.
+    """The level plane with the most points, by RANSAC and a least-squares fit.
 
     :param points: (n, 3), m, all finite.
     :param tolerance: m that a point of the plane may lie off it.
     :param max_tilt: rad that the plane may lean.
+    :returns: None where no plane has `least` points.
     """
     if len(points) < max(3, least):
         return None
@@ -36,7 +37,7 @@ def find_plane(points: np.ndarray, generator: np.random.Generator, tolerance: fl
     best = _best_hypothesis(sample, generator, tolerance, max_tilt, hypotheses)
     if best is None:
         return None
-    plane: Optional[Plane] = best
+    plane = best
     for _ in range(2):  # the second fit sees the points that the first hypothesis missed
         inliers = points[np.abs(plane.height(points)) < tolerance]
         if len(inliers) < least:
@@ -45,8 +46,8 @@ def find_plane(points: np.ndarray, generator: np.random.Generator, tolerance: fl
     return plane if plane.normal[2] >= np.cos(max_tilt) else None
 
 
-def _best_hypothesis(sample: np.ndarray, generator: np.random.Generator, tolerance: float, max_tilt: float,
-                     hypotheses: int) -> Optional[Plane]:
+def _best_hypothesis(sample: np.ndarray, generator: np.random.Generator, tolerance: float,
+                     max_tilt: float, hypotheses: int) -> Optional[Plane]:
     triples = sample[generator.integers(0, len(sample), size=(hypotheses, 3))]
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
     lengths = np.linalg.norm(normals, axis=1)

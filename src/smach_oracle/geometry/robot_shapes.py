@@ -1,7 +1,8 @@
-"""What a robot looks like, out of its URDF: the shapes of its links, and how the links hang together.
+"""What a robot looks like, from its URDF: the shapes of its links, and how the links connect.
 
-A robot description is text that anybody on the robot's network may have set: its size, its number of parts and its
-numbers are checked, document types (and with them entities) are refused, and links that go round in circles as well.
+Anybody on the robot's network may have set a robot description. So its size, its number of parts
+and its numbers are checked, and document types (with them entities) and circles of links are
+refused.
 """
 import math
 import xml.etree.ElementTree as ElementTree
@@ -9,9 +10,9 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from .chain import Joint, read_joints
-from .links import motion_of
+from .joints import Joint, read_joints
 from .transforms import from_rpy
+from .xml_text import read_xml
 
 MOST_CHARACTERS = 8000000
 MOST_LINKS = 2000
@@ -34,7 +35,7 @@ class Shape(NamedTuple):
 
 
 class Mimic(NamedTuple):
-    """A joint that goes with another one: position (rad or m) = multiplier * that of `joint` + offset."""
+    """A joint that follows another one: its position is multiplier * that of `joint` + offset."""
 
     joint: str
     multiplier: float
@@ -49,7 +50,8 @@ class RobotShapes(NamedTuple):
     joints: List[Joint]  # every link's after that of the link that it hangs on
     mimics: Dict[str, Mimic]
     shapes: List[Shape]  # as the robot looks; where a link has no looks, what it collides with
-    collisions: List[Shape]  # of links that have looks: what may stand for a mesh that cannot be had
+    # of links that have looks: what may stand for a mesh that cannot be had
+    collisions: List[Shape]
 
     @property
     def links(self) -> List[str]:
@@ -59,11 +61,13 @@ class RobotShapes(NamedTuple):
     def poses(self, positions: Mapping[str, float]) -> Dict[str, np.ndarray]:
         """4x4 by link: the root from it.
 
-        :param positions: rad or m by joint; joints that are missing stand at zero, or go with those that they mimic.
+        :param positions: rad or m by joint; joints that are missing stand at zero, or go with those
+            that they mimic.
         """
         poses = {self.root: np.eye(4)}
         for joint in self.joints:
-            poses[joint.child] = poses[joint.parent] @ joint.origin @ motion_of(joint, self._position(joint, positions))
+            poses[joint.child] = poses[joint.parent] @ joint.origin @ joint.motion(
+                self._position(joint, positions))
         return poses
 
     def _position(self, joint: Joint, positions: Mapping[str, float]) -> float:
@@ -74,14 +78,17 @@ class RobotShapes(NamedTuple):
 
 
 def read_shapes(urdf: str) -> RobotShapes:
+    """A robot to draw, from its URDF.
+
+    :raises ValueError: for text that is not a URDF, or too large a one, with what is wrong with it.
     """
-    :raises ValueError: for text that is no URDF, or too large a one; says what is wrong with it.
-    """
-    root = parsed(urdf, 'robot description', MOST_CHARACTERS)
+    root = read_xml(urdf, 'robot description', MOST_CHARACTERS)
     elements = root.findall('link')
     if root.tag != 'robot' or not elements:
-        raise ValueError('robot description: a URDF begins with <robot> and has a <link>; this one with <{}> and {} '
-                         'links'.format(root.tag[:40], len(elements)))
+        raise ValueError(
+            'robot description: a URDF begins with <robot> and has a <link>; this one with <{}> '
+            'and {} '
+            'links'.format(root.tag[:40], len(elements)))
     if max(len(elements), len(root.findall('joint'))) > MOST_LINKS:
         raise ValueError('robot description: more than {} links or joints'.format(MOST_LINKS))
     by_child = read_joints(urdf) if root.find('joint') is not None else {}
@@ -96,36 +103,21 @@ def read_shapes(urdf: str) -> RobotShapes:
     return RobotShapes(root.get('name', '')[:200], base, joints, mimics, shapes, collisions)
 
 
-def parsed(text: str, what: str, most: int) -> ElementTree.Element:
-    """The root of an XML document without a document type.
-
-    :param what: it is, for the text of an error.
-    :raises ValueError: for a longer text than `most` characters, one with a document type, or no XML.
-    """
-    if len(text) > most:
-        raise ValueError('{}: {} characters; allowed: {}'.format(what, len(text), most))
-    if '<!doctype' in text.lower() or '<!entity' in text.lower():
-        raise ValueError('{}: it declares a document type or entities; that is not allowed'.format(what))
-    try:
-        return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as err:
-        raise ValueError('{}: not XML: {}'.format(what, str(err)[:200])) from err
-
-
 def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Joint], str]:
     """The joints from the root outwards, and the root."""
     below: Dict[str, List[Joint]] = {}
     for joint in by_child.values():
         if not (np.isfinite(joint.origin).all() and np.isfinite(joint.axis).all()
                 and np.abs(joint.origin).max() < FURTHEST):
-            raise ValueError('robot description: joint {!r} has a place or an axis that is none'.format(
-                joint.name[:100]))
+            raise ValueError(
+                'robot description: joint {!r} has a place or an axis that is none'.format(
+                    joint.name[:100]))
         below.setdefault(joint.parent, []).append(joint)
     roots = [name for name in names if name not in by_child]
     if len(roots) != 1:
         raise ValueError('robot description: {}; exactly one link must hang on no other'.format(
-            'the links go round in a circle' if not roots else '{} links hang on no other: {}'.format(
-                len(roots), ', '.join(roots)[:200])))
+            'the links go round in a circle' if not roots else '{} links hang on no other: {}'.
+            format(len(roots), ', '.join(roots)[:200])))
     ordered: List[Joint] = []
     waiting = list(below.get(roots[0], []))
     while waiting:
@@ -139,7 +131,8 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
     return ordered, roots[0]
 
 
-def _all_shapes(elements: List[ElementTree.Element], known: Mapping[str, Colour]) -> Tuple[List[Shape], List[Shape]]:
+def _all_shapes(elements: List[ElementTree.Element],
+                known: Mapping[str, Colour]) -> Tuple[List[Shape], List[Shape]]:
     looks: List[Shape] = []
     spare: List[Shape] = []
     for link in elements:
@@ -152,13 +145,15 @@ def _all_shapes(elements: List[ElementTree.Element], known: Mapping[str, Colour]
     return looks, spare
 
 
-def _shape(link: ElementTree.Element, element: ElementTree.Element, known: Mapping[str, Colour]) -> Shape:
+def _shape(link: ElementTree.Element, element: ElementTree.Element,
+           known: Mapping[str, Colour]) -> Shape:
     name = link.get('name', '')
     geometry = element.find('geometry')
     kind = next((each.tag for each in geometry), '') if geometry is not None else ''
     where = 'robot description: link {!r}'.format(name[:100])
     if geometry is None or kind not in ('box', 'cylinder', 'sphere', 'mesh', 'capsule'):
-        raise ValueError('{}: a shape is a box, cylinder, sphere or mesh, not {!r}'.format(where, kind[:40]))
+        raise ValueError('{}: a shape is a box, cylinder, sphere or mesh, not {!r}'.format(
+            where, kind[:40]))
     found = geometry[0]
     origin = element.find('origin')
     place = from_rpy(_numbers(where, origin, 'xyz'), *_numbers(where, origin, 'rpy'))
@@ -171,7 +166,8 @@ def _shape(link: ElementTree.Element, element: ElementTree.Element, known: Mappi
         size = [2 * radius] * 3 if kind == 'sphere' else [
             2 * radius, 2 * radius, _numbers(where, found, 'length', count=1)[0]]
     return Shape(name, 'cylinder' if kind == 'capsule' else kind, place, np.array(size),
-                 found.get('filename', '') if kind == 'mesh' else '', _colour(element.find('material'), known))
+                 found.get('filename', '') if kind == 'mesh' else '',
+                 _colour(element.find('material'), known))
 
 
 def _numbers(where: str, element: Optional[ElementTree.Element], name: str, default: str = '0 0 0',
@@ -183,14 +179,15 @@ def _numbers(where: str, element: Optional[ElementTree.Element], name: str, defa
         numbers = []
     if element is not None and name in ('radius', 'length') and not element.get(name):
         numbers = []
-    if len(numbers) != count or not all(math.isfinite(each) and abs(each) < FURTHEST for each in numbers):
+    if len(numbers) != count or not all(
+            math.isfinite(each) and abs(each) < FURTHEST for each in numbers):
         raise ValueError('{}: {}="{}"; it takes {} finite number{}, below {:g}'.format(
             where, name, text[:60], count, 's' * (count > 1), FURTHEST))
     return numbers
 
 
 def _materials(root: ElementTree.Element) -> Dict[str, Colour]:
-    """By name, wherever they are told first."""
+    """Colours by name; the first definition counts."""
     known: Dict[str, Colour] = {}
     for material in root.iter('material'):
         if material.find('color') is not None and material.get('name'):
@@ -201,9 +198,10 @@ def _materials(root: ElementTree.Element) -> Dict[str, Colour]:
 def _colour(material: Optional[ElementTree.Element], known: Mapping[str, Colour]) -> Colour:
     if material is None:
         return GREY
-    told = material.find('color')
+    element = material.find('color')
+    words = element.get('rgba', '').split()[:3] if element is not None else []
     try:
-        levels = [float(word) for word in told.get('rgba', '').split()[:3]] if told is not None else []
+        levels = [float(word) for word in words]
     except ValueError:
         levels = []
     if len(levels) != 3 or not all(math.isfinite(level) for level in levels):

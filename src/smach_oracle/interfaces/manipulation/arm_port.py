@@ -7,14 +7,16 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import GripperCommandAction, GripperCommandGoal
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ..oracle.errors import ConfigError
-from ..ros.goal_link import GoalLink, SentGoal
+from control_msgs.msg import GripperCommandAction, GripperCommandGoal
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.checks import number
+from smach_oracle.ros.goal_link import GoalLink, SentGoal
 
 _FIELDS = ('base', 'tool', 'command', 'gripper')
+_ANGLE = number(-math.inf, math.inf, 'a list of angles, rad')
 
 
 class ArmNames(NamedTuple):
@@ -24,23 +26,27 @@ class ArmNames(NamedTuple):
     tool: str  # link that commands move
     command: str  # topic for trajectory_msgs/JointTrajectory
     gripper: str  # control_msgs/GripperCommand action
-    posture: Sequence[float] = ()  # rad, one for each joint: where the arm is at ease; none: the middle of its ranges
+    # rad, one for each joint: where the arm is at ease; none: the middle of its ranges
+    posture: Sequence[float] = ()
 
     @classmethod
     def parse(cls, key: str, value: object) -> 'ArmNames':
         """From a dictionary.
 
-        :raises ConfigError: naming the key, its value and what is allowed.
+        :raises SettingsError: naming the key, its value and what is allowed.
         """
         if not isinstance(value, Mapping) or set(value) - {'posture'} != set(_FIELDS):
-            raise ConfigError(key, value, 'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)))
+            raise SettingsError(
+                key, value,
+                'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)))
         for field in _FIELDS:
             if not isinstance(value[field], str) or not value[field]:
-                raise ConfigError('{}.{}'.format(key, field), value[field], 'a name')
+                raise SettingsError('{}.{}'.format(key, field), value[field], 'a name')
         posture = value.get('posture', [])
-        if not isinstance(posture, list) or not all(
-                isinstance(each, (int, float)) and math.isfinite(each) for each in posture):
-            raise ConfigError(key + '.posture', posture, 'a list of angles, rad')
+        if not isinstance(posture, list):
+            raise SettingsError(key + '.posture', posture, 'a list of angles, rad')
+        for angle in posture:
+            _ANGLE(key + '.posture', angle)
         return cls(**value)
 
 
@@ -52,7 +58,8 @@ class JointListener:
         self._positions: Dict[str, float] = {}
         self._heard_s: Dict[str, float] = {}  # monotonic
         self._stamp = rospy.Time()
-        self._subscriber = rospy.Subscriber(topic, JointState, self._heard, queue_size=100, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(topic, JointState, self._heard, queue_size=100,
+                                            tcp_nodelay=True)
 
     def now(self) -> Tuple[Dict[str, float], rospy.Time]:
         """Positions by joint (rad or m), and their time."""
@@ -60,16 +67,18 @@ class JointListener:
             return dict(self._positions), self._stamp
 
     def silent_s(self, names: Sequence[str]) -> float:
-        """For how long (wall time) the least heard of these joints has been silent; inf where one never was heard."""
+        """Wall time (s) for which one of these joints has been silent; inf: one never was heard."""
         with self._changed:
             return time.monotonic() - min(self._heard_s.get(name, -math.inf) for name in names)
 
-    def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time, period_s: float,
-                        limit_s: float) -> bool:
-        """Wait until joints are reported a period after `since`, elsewhere than `before` if given; whether they were.
+    def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time,
+                        period_s: float, limit_s: float) -> bool:
+        """Wait until joints are reported a period after `since`; whether they were.
 
-        A world that stands still while nobody commands it repeats its positions to the last bit; a later report of
-        others comes from after the command.
+        Where `before` is given, they must be elsewhere than that.
+
+        A world that stands still while nobody commands it repeats its positions to the last bit; a
+        later report of others comes from after the command.
         """
         after = since + rospy.Duration(0.9 * period_s)
 
@@ -121,7 +130,8 @@ class GripperPort:
     def move(self, position: float, effort: float) -> None:
         """Begin to move to `position` m between the tips, with at most `effort` N.
 
-        The same once more, while it is on its way there, changes nothing; anything else comes in its place.
+        The same once more, while it is on its way there, changes nothing; anything else comes in
+        its place.
         """
         if self.moving and self._wanted == (position, effort):
             return
@@ -141,12 +151,15 @@ class GripperPort:
         if self._sent is None:
             return False
         event = self._sent.poll(timeout_s)
-        gone = event is None and (not self._link.alive() or self._sent.unheard(time.monotonic()))
-        if not gone and (event is None or not event.status):
+        if event is None and self._link.alive() and not self._sent.unheard(time.monotonic()):
+            return False
+        if event is not None and not event.status:
             return False
         self._sent = None
-        if gone or event.result is None or event.status in (GoalStatus.LOST, GoalStatus.REJECTED):
-            self.report = GripperReport(problem='gripper {}: its motion got lost'.format(self._link.name))
+        if (event is None or event.result is None
+                or event.status in (GoalStatus.LOST, GoalStatus.REJECTED)):
+            self.report = GripperReport(
+                problem='gripper {}: its motion got lost'.format(self._link.name))
         else:
             self.report = GripperReport(event.result.position, event.result.stalled)
         return True

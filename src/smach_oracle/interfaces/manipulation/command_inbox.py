@@ -2,15 +2,20 @@
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, List, NamedTuple
+from typing import Deque, List, NamedTuple
+
+from smach_oracle.msg import TeleopCommand
 
 _MOST = 100  # commands that wait; the oldest are lost
 
 
-class Arrived(NamedTuple):
-    """A command, and when it came: one that has waited is no sign of a hand that still holds."""
+class ArrivedCommand(NamedTuple):
+    """A command, and when it came.
 
-    command: Any
+    One that has waited does not show that its sender still holds.
+    """
+
+    command: TeleopCommand
     at_s: float  # monotonic
 
 
@@ -19,15 +24,15 @@ class CommandInbox:
 
     def __init__(self) -> None:
         self._filled = threading.Condition()
-        self._waiting: Deque[Arrived] = deque(maxlen=_MOST)
+        self._waiting: Deque[ArrivedCommand] = deque(maxlen=_MOST)
 
-    def put(self, command: Any) -> None:
-        """One more."""
+    def put(self, command: TeleopCommand) -> None:
+        """Add a command."""
         with self._filled:
-            self._waiting.append(Arrived(command, time.monotonic()))
+            self._waiting.append(ArrivedCommand(command, time.monotonic()))
             self._filled.notify()
 
-    def take_all(self, timeout_s: float) -> List[Arrived]:
+    def take_all(self, timeout_s: float) -> List[ArrivedCommand]:
         """All that have come, the oldest first; none where none comes within the time."""
         with self._filled:
             self._filled.wait_for(lambda: self._waiting, timeout_s)

@@ -1,16 +1,21 @@
-"""Who drives, and whether they still do: a dead-man's handle with a watchdog. Pure; times are monotonic, in s."""
+"""Who drives, and whether they still do: a dead-man's switch with a watchdog.
+
+Pure; times are monotonic, in s.
+"""
 import math
 
-_LET_GO_S = 0.3  # silence that counts as letting go, where the handle was taken from a hand that pressed it
+# silence that counts as letting go, where the handle was taken from a hand that pressed it
+_LET_GO_S = 0.3
 
 
-class DeadMan:
+class DeadManSwitch:
     """Held by one operator at a time, by commands that keep coming."""
 
     def __init__(self, watchdog_s: float, lease_s: float = 0.0) -> None:
-        """Held for `watchdog_s` after each command; others may take it after `lease_s` where that is sooner.
-
-        A holder whom nobody has relieved goes on after that as if nothing had been.
+        """
+        :param watchdog_s: it is held for so long after each command.
+        :param lease_s: others may take it after so long where that is sooner; the holder goes on
+            where nobody has.
         """
         self._watchdog_s = watchdog_s
         self._lease_s = lease_s or watchdog_s
@@ -40,7 +45,7 @@ class DeadMan:
         return ''
 
     def release(self, operator: str) -> None:
-        """The hand has let go; what others hold they keep."""
+        """The operator has let go; others keep hold."""
         self.refuse(operator)
         if operator == self._dropped:
             self._dropped = ''
@@ -51,9 +56,9 @@ class DeadMan:
             self._until_s = -math.inf
 
     def press_for_nothing(self, operator: str, now_s: float) -> None:
-        """Pressed while there is nothing to hold it for: it does not hold what comes next either."""
+        """Pressed while there is nothing to hold it for; the next goal is not held by it either."""
         self.refuse(operator)
-        if math.isfinite(self._watchdog_s):  # without one, silence says nothing
+        if math.isfinite(self._watchdog_s):  # without one, silence means nothing
             self._dropped, self._silent_until_s = operator, now_s + _LET_GO_S
 
     def drop(self, now_s: float) -> None:

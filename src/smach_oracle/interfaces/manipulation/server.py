@@ -1,7 +1,8 @@
-"""The manipulation interface: a person drives the robot's hands, then says that the failed state's work is done.
+"""The manipulation interface: a person drives the robot's arms in place of a failed state.
 
-A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState), `~finish` and `~give_up`; for any
-robot with a robot_description, joint_states, arms that take joint trajectories and grippers of control_msgs.
+A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState), `~finish` and
+`~give_up`; for any robot with a robot_description, joint_states, arms that take joint trajectories
+and grippers of control_msgs.
 """
 import threading
 import time
@@ -12,19 +13,19 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Header
 
 from smach_oracle.msg import CollisionBoxes, SharedAutonomyGoal, TeleopCommand, TeleopState
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.master_watch import start_master_watch
+from smach_oracle.ros.userdata_codec import UserdataCodecError, decode_all
 from smach_oracle.srv import Snapshot
 
-from ..oracle.errors import ConfigError
-from ..ros.command_line import parameters_only
-from ..ros.master_watch import start_master_watch
-from ..ros.userdata_codec import UserdataCodecError, decode_all
-from .command_inbox import Arrived, CommandInbox
-from .dead_man import DeadMan
-from .hand import Hand
-from .interface_goal import NO_GOAL, InterfaceGoal, SettlingServices
+from ..interface_goal import NO_GOAL, FinishServices, InterfaceGoal
+from .cartesian_drive import no_motion
+from .command_inbox import ArrivedCommand, CommandInbox
+from .dead_man_switch import DeadManSwitch
+from .settings import GRASP_POSE, NO_SNAPSHOT, TeleoperationSettings
 from .surroundings import Surroundings
-from .teleoperation import standing
-from .teleoperation_settings import GRASP_POSE, NO_SNAPSHOT, TeleoperationSettings
+from .teleoperated_arm import TeleoperatedArm
 
 _IDLE_S = 0.2  # how often the state is published while a goal is active and nothing moves
 _APPLIED_S = 2.0  # wall time that a world in lock-step has for one period
@@ -34,54 +35,58 @@ _GRIPPER_S = 60.0  # the same, for a motion of the gripper
 class TeleoperationServer:
     """Hosts the interface; one thread carries out the commands, one after the other.
 
-    :raises ConfigError: for a setting or a robot description that cannot be used.
+    :raises SettingsError: for a setting or a robot description that cannot be used.
     """
 
-    def __init__(self, settings: TeleoperationSettings, hands: Dict[str, Hand],
+    def __init__(self, settings: TeleoperationSettings, arms: Dict[str, TeleoperatedArm],
                  surroundings: Optional[Surroundings] = None) -> None:
-        """`hands` by the names of their arms."""
+        """`arms` by name."""
         self._settings = settings
-        self._hands = hands
+        self._arms = arms
         self._surroundings = surroundings
-        self._arm = next(iter(hands))  # the one moved last
-        # in lock-step nothing moves between commands; a slow sender must not change what its commands do, but one that
-        # is dead does not keep the others out
-        self._dead_man = (DeadMan(float('inf'), settings.lease_s) if settings.lock_step
-                          else DeadMan(settings.watchdog_s))
+        self._last_arm = next(iter(arms))  # the one moved last
+        # in lock-step nothing moves between commands; a slow sender must not change what its
+        # commands do, but one that is dead does not keep the others out
+        self._dead_man = (DeadManSwitch(float('inf'), settings.lease_s) if settings.lock_step
+                          else DeadManSwitch(settings.watchdog_s))
         self._held: Optional[TeleopCommand] = None
-        self._gripped: Optional[Tuple[float, float]] = None  # m and N, told to the gripper since it is held
+        # m and N, sent to the gripper since it is held
+        self._gripped: Optional[Tuple[float, float]] = None
         self._commands = CommandInbox()
-        self._told_s, self._told_query = 0.0, ''
+        self._published_s, self._published_question = 0.0, ''
         self._unsure = True  # whether others may have moved the robot since our last command
         self._snapshot = (rospy.ServiceProxy(settings.snapshot, Snapshot)
                           if settings.lock_step and settings.snapshot != NO_SNAPSHOT else None)
-        self._seq, self._sender, self._refused, self._step = 0, '', '', standing()
-        self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True, tcp_nodelay=True)
+        self._seq, self._sender, self._refused, self._step = 0, '', '', no_motion()
+        self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True,
+                                      tcp_nodelay=True)
         self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
-        self._services = SettlingServices(self._goal, self.outputs)
-        self._boxes = rospy.Subscriber('collision_map', CollisionBoxes, self._on_boxes, queue_size=1)
-        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._commands.put, queue_size=10,
-                                            tcp_nodelay=True)
+        self._services = FinishServices(self._goal, self.outputs)
+        self._boxes = rospy.Subscriber('collision_map', CollisionBoxes, self._on_boxes,
+                                       queue_size=1)
+        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._commands.put,
+                                            queue_size=10, tcp_nodelay=True)
         self._thread = threading.Thread(target=self._run, name='teleoperation', daemon=True)
         self._thread.start()
 
     def outputs(self, outcome: str, _given: Collection[str] = ()) -> Mapping[str, Any]:
-        """What the interface can tell of the active state's outputs, as its settings for the state say."""
+        """The outputs of the active state that the settings for this state list."""
         goal = self._goal.goal
         known: Dict[str, Any] = {}
         if goal is None or outcome not in self._settings.success:
             return known
-        hand = self._hands[self._arm]
-        for key, what in self._settings.outputs_of(goal.state).items():
-            known[key] = hand.grasp if what == GRASP_POSE and hand.grasp is not None else hand.tool_pose()
+        arm = self._arms[self._last_arm]
+        for key, pose in self._settings.outputs_of(goal.state).items():
+            grasped = pose == GRASP_POSE and arm.grasp is not None
+            known[key] = arm.grasp if grasped else arm.tool_pose()
         return known
 
     def _begun(self, goal: SharedAutonomyGoal) -> None:
-        self._seq, self._sender, self._refused, self._step = 0, '', '', standing()
-        self._arm = self._settings.arm_of(goal.state, self._named(goal), self._arm)
+        self._seq, self._sender, self._refused, self._step = 0, '', '', no_motion()
+        self._last_arm = self._settings.arm_of(goal.state, self._named(goal), self._last_arm)
         self._unsure = True
-        for hand in self._hands.values():
-            hand.forget()
+        for arm in self._arms.values():
+            arm.forget()
 
     def _named(self, goal: SharedAutonomyGoal) -> Dict[str, Any]:
         """The input userdata that may name an arm."""
@@ -94,8 +99,8 @@ class TeleoperationServer:
 
     def _ended(self) -> None:
         self._dead_man.drop(time.monotonic())
-        for hand in self._hands.values():
-            hand.gripper.stop()
+        for arm in self._arms.values():
+            arm.gripper.stop()
 
     def _on_boxes(self, message: CollisionBoxes) -> None:
         if self._surroundings is not None:
@@ -113,14 +118,18 @@ class TeleoperationServer:
                 self._fail(err)
 
     def _fail(self, err: Exception) -> None:
-        """Whatever it was: hand and gripper stand, and the next command is heard."""
+        """After any error: arm and gripper stop, and the next command is taken."""
         self._dead_man.refuse(self._dead_man.holder(time.monotonic()))
-        self._held, self._gripped, self._step, self._refused = None, None, standing(), 'error: {}'.format(err)
-        for hand in self._hands.values():
-            hand.gripper.stop()
+        self._held, self._gripped, self._step, self._refused = None, None, no_motion(
+        ), 'error: {}'.format(err)
+        for arm in self._arms.values():
+            arm.gripper.stop()
 
     def _work(self, due_s: float) -> float:
-        """Take the commands that have come, and move on by a period where it is time; when the next one is due."""
+        """Take the commands that have come, and move on by a period where it is time.
+
+        :returns: when the next period is due, monotonic s.
+        """
         wait_s = max(0.0, due_s - time.monotonic()) if self._held is not None else _IDLE_S
         for arrived in self._commands.take_all(wait_s):
             self._take(arrived)
@@ -135,48 +144,50 @@ class TeleoperationServer:
         return max(due_s + self._settings.period_s, now_s)
 
     def _driver(self) -> str:
-        """Who moves the hand, '' for nobody: the dead-man holds no longer than the goal."""
+        """Who moves the arm, '' for nobody: the dead-man holds no longer than the goal."""
         return self._dead_man.holder(time.monotonic()) if self._goal.goal is not None else ''
 
-    def _take(self, arrived: Arrived) -> None:
-        """Carry out a command, or say why not; a bad one of the person who drives stops the arm."""
+    def _take(self, arrived: ArrivedCommand) -> None:
+        """Carry out a command, or refuse it; a bad one of the driver stops the arm."""
         command = arrived.command
         self._seq, self._sender = command.seq, command.operator
         self._refused = self._why_not(arrived)
         if self._refused or not command.dead_man:
             self._let_go(arrived)
-            self._tell()
+            self._publish_state()
         else:
             self._hold(command)
 
-    def _why_not(self, arrived: Arrived) -> str:
+    def _why_not(self, arrived: ArrivedCommand) -> str:
         command = arrived.command
         if self._goal.goal is None:
             return NO_GOAL
-        if command.arm not in self._hands:
-            return 'unknown arm {!r}; allowed: {}'.format(command.arm, ', '.join(sorted(self._hands)))
+        if command.arm not in self._arms:
+            return 'unknown arm {!r}; allowed: {}'.format(command.arm,
+                                                          ', '.join(sorted(self._arms)))
         if not command.operator:
             return 'a command needs the name of its operator'
         if not command.dead_man:
             return ''
-        hand = self._hands[command.arm]
-        goes_on = self._dead_man.holder(arrived.at_s) == command.operator and command.arm == self._arm
-        why = (hand.why_not(command, self._settings.lock_step)
+        arm = self._arms[command.arm]
+        goes_on = self._dead_man.holder(
+            arrived.at_s) == command.operator and command.arm == self._last_arm
+        why = (arm.why_not(command, self._settings.lock_step)
                or self._dead_man.press(command.operator, arrived.at_s))
         if why:
             return why
         if self._driver() != command.operator:
             return 'it came too late to be carried out'
         if not goes_on:
-            self._stand()
-            hand.begin()
+            self._stop_moving()
+            arm.begin()
         return ''
 
-    def _let_go(self, arrived: Arrived) -> None:
+    def _let_go(self, arrived: ArrivedCommand) -> None:
         """The operator lets go, or is refused."""
         operator = arrived.command.operator
         if operator in (self._driver(), self._held.operator if self._held is not None else ''):
-            self._stand()
+            self._stop_moving()
         if not arrived.command.dead_man:
             self._dead_man.release(operator)
         elif self._goal.goal is None:
@@ -184,47 +195,50 @@ class TeleoperationServer:
         else:
             self._dead_man.refuse(operator)
 
-    def _stand(self) -> None:
-        """Nobody moves anything any more."""
-        self._held, self._gripped, self._step = None, None, standing()
-        for hand in self._hands.values():
-            hand.gripper.stop()
-        if self._goal.goal is not None and not self._settings.lock_step:  # after it, the arm is others' to move
-            self._hands[self._arm].rest(self._settings.period_s)
+    def _stop_moving(self) -> None:
+        """Nobody moves the arms any more."""
+        self._held, self._gripped, self._step = None, None, no_motion()
+        for arm in self._arms.values():
+            arm.gripper.stop()
+        # after it, the arm is others' to move
+        if self._goal.goal is not None and not self._settings.lock_step:
+            self._arms[self._last_arm].rest(self._settings.period_s)
 
     def _hold(self, command: TeleopCommand) -> None:
-        self._arm = command.arm
-        hand = self._hands[command.arm]
-        wish = (command.gripper, command.gripper_effort or self._settings.gripper_effort)
-        # a front end may repeat it for as long as it is held, so that none is lost; what is done is not done again
-        if command.move_gripper and (self._settings.lock_step or wish != self._gripped):
-            hand.gripper.move(*wish)
-        self._gripped = wish if command.move_gripper else None
+        self._last_arm = command.arm
+        arm = self._arms[command.arm]
+        motion = (command.gripper, command.gripper_effort or self._settings.gripper_effort)
+        # a front end may repeat it for as long as it is held, so that none is lost; what is done is
+        # not done again
+        if command.move_gripper and (self._settings.lock_step or motion != self._gripped):
+            arm.gripper.move(*motion)
+        self._gripped = motion if command.move_gripper else None
         if self._settings.lock_step:
-            self._in_lock_step(command, hand)
+            self._in_lock_step(command, arm)
         else:
             self._held = command
 
-    def _in_lock_step(self, command: TeleopCommand, hand: Hand) -> None:
-        """Carry the command out for one period, and tell when the world has done it."""
+    def _in_lock_step(self, command: TeleopCommand, arm: TeleoperatedArm) -> None:
+        """Carry the command out for one period, and publish when the world has done it."""
         until_s = time.monotonic() + _GRIPPER_S
-        while hand.gripper.moving and time.monotonic() < until_s and self._driver() and not rospy.is_shutdown():
-            self._poll_gripper(hand, 0.02)
+        while arm.gripper.moving and time.monotonic() < until_s and self._driver(
+        ) and not rospy.is_shutdown():
+            self._poll_gripper(arm, 0.02)
         if not self._driver():
             self._refused = NO_GOAL
-            self._tell()
+            self._publish_state()
             return
         if self._unsure or command.move_gripper:
-            self._catch_up(hand)
+            self._catch_up(arm)
         if self._surroundings is not None:
             self._surroundings.update()
-        self._step, done = hand.move_and_wait(command, self._settings.period_s, _APPLIED_S)
+        self._step, done = arm.move_and_wait(command, self._settings.period_s, _APPLIED_S)
         if not done:
             self._refused = 'the world has not carried it out within {:g} s'.format(_APPLIED_S)
-        self._tell()
+        self._publish_state()
 
-    def _catch_up(self, hand: Hand) -> None:
-        """Others have moved the world, or the gripper has: make sure that it is known where everything is now."""
+    def _catch_up(self, arm: TeleoperatedArm) -> None:
+        """Get the joints as they are now: others may have moved the world, or the gripper has."""
         self._unsure = False
         if self._snapshot is None:
             return
@@ -233,68 +247,72 @@ class TeleoperationServer:
         except (rospy.ServiceException, rospy.ROSException, OSError) as err:
             rospy.logwarn('%s: %s', self._settings.snapshot, err)
             return
-        if not hand.catch_up(stamp, _APPLIED_S):
+        if not arm.catch_up(stamp, _APPLIED_S):
             rospy.logwarn('joint_states of %s did not come', stamp)
 
     def _move_on(self) -> None:
         """One period of a command that is held."""
         command = self._held
         if command is None or self._driver() != command.operator:
-            self._stand()
+            self._stop_moving()
         else:
-            hand = self._hands[command.arm]
+            operator = command.operator
+            arm = self._arms[command.arm]
             if self._surroundings is not None:
                 self._surroundings.update()
-            self._step = hand.move(command, self._settings.period_s, lambda: self._driver() == command.operator)
-        for each in self._hands.values():
+            self._step = arm.move(command, self._settings.period_s,
+                                  lambda: self._driver() == operator)
+        for each in self._arms.values():
             self._poll_gripper(each, 0.0)
-        self._tell()
+        self._publish_state()
 
-    def _poll_gripper(self, hand: Hand, timeout_s: float) -> None:
-        if hand.gripper.poll(timeout_s):
-            hand.note_gripper()
+    def _poll_gripper(self, arm: TeleoperatedArm, timeout_s: float) -> None:
+        if arm.gripper.poll(timeout_s):
+            arm.note_gripper()
 
     def _idle(self, now_s: float) -> None:
-        for hand in self._hands.values():
-            self._poll_gripper(hand, 0.0)
-        query = self._query()
-        if query != self._told_query or (query and now_s - self._told_s >= _IDLE_S):
-            self._tell()
+        for arm in self._arms.values():
+            self._poll_gripper(arm, 0.0)
+        question_id = self._question_id()
+        if question_id != self._published_question or (question_id
+                                                       and now_s - self._published_s >= _IDLE_S):
+            self._publish_state()
 
-    def _query(self) -> str:
+    def _question_id(self) -> str:
         goal = self._goal.goal
         return goal.query_id if goal is not None else ''
 
-    def _tell(self) -> None:
-        hand = self._hands[self._arm]
-        self._told_s, self._told_query = time.monotonic(), self._query()
-        state = TeleopState(query_id=self._told_query, arm=self._arm, seq=self._seq, sender=self._sender,
-                            operator='' if self._dead_man.lapsed(self._told_s) else self._driver(),
-                            refused=self._refused, moving=bool(self._step.velocities.any()),
-                            speed=self._step.speed,
-                            limit=self._step.limit or hand.gripper.report.problem, clearance=self._step.clearance,
-                            gripper=hand.gripper.report.position, gripper_stalled=hand.gripper.report.stalled,
-                            gripper_moving=hand.gripper.moving)
-        pose = hand.tool_pose()
+    def _publish_state(self) -> None:
+        arm = self._arms[self._last_arm]
+        self._published_s, self._published_question = time.monotonic(), self._question_id()
+        state = TeleopState(
+            query_id=self._published_question, arm=self._last_arm, seq=self._seq,
+            sender=self._sender,
+            operator='' if self._dead_man.lapsed(self._published_s) else self._driver(),
+            refused=self._refused, moving=bool(self._step.velocities.any()), speed=self._step.speed,
+            limit=self._step.limit or arm.gripper.report.problem, clearance=self._step.clearance,
+            gripper=arm.gripper.report.position, gripper_stalled=arm.gripper.report.stalled,
+            gripper_moving=arm.gripper.moving)
+        pose = arm.tool_pose()
         state.header = Header(frame_id=pose.header.frame_id, stamp=pose.header.stamp)
         state.tool_pose = pose.pose
-        state.achieved = hand.in_base(self._step.twist) if state.moving else Twist()
+        state.achieved = arm.in_base(self._step.twist) if state.moving else Twist()
         if not rospy.is_shutdown():
             self._state.publish(state)
 
 
 def main() -> None:
     """Entry point of the node `manipulation_interface`."""
-    parameters_only('Node: a person drives the robot\'s hands in place of a failed state. '
+    parameters_only('Node: a person drives the robot\'s arms in place of a failed state. '
                     'Parameters: ~arms, ~states, ~limits and more; see doc/shared_autonomy.md.')
     rospy.init_node('manipulation_interface')
     start_master_watch()
     try:
         settings = TeleoperationSettings.from_parameters()
-        hands, surroundings = settings.build()
-    except (ConfigError, ValueError) as err:
+        arms, surroundings = settings.build()
+    except (SettingsError, ValueError) as err:
         rospy.logfatal('manipulation_interface: %s', err)
         raise SystemExit(2) from err
-    TeleoperationServer(settings, hands, surroundings)
-    rospy.loginfo('manipulation_interface: arms %s', ', '.join(sorted(hands)))
+    TeleoperationServer(settings, arms, surroundings)
+    rospy.loginfo('manipulation_interface: arms %s', ', '.join(sorted(arms)))
     rospy.spin()

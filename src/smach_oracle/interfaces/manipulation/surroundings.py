@@ -1,4 +1,4 @@
-"""What a driven arm could hit, kept up to date from joint_states and the collision map that the robot publishes."""
+"""The surroundings of a driven arm, kept up to date from joint_states and the collision map."""
 import math
 import re
 import threading
@@ -7,19 +7,22 @@ from typing import List, Optional
 import rospkg
 import rospy
 
+from smach_oracle.geometry.joints import read_joints
+from smach_oracle.geometry.links import link_pose
+from smach_oracle.geometry.transforms import from_quaternion
 from smach_oracle.msg import CollisionBoxes
 
-from ..geometry.chain import read_joints
-from ..geometry.links import link_pose
-from ..geometry.transforms import from_quaternion
-from .clearance import Box, ClearanceError, ClearanceModel
-from .hand import Hand, Robot
+from .clearance import ClearanceError, ClearanceModel, CollisionBox
+from .teleoperated_arm import DescribedRobot, TeleoperatedArm
 
 
 class Surroundings:
-    """The robot's model and the boxes around it; `update` and the arms' questions come from one thread."""
+    """The robot's model and the boxes around it.
 
-    def __init__(self, robot: Robot, within: float) -> None:
+    `update` and the arms' questions come from one thread.
+    """
+
+    def __init__(self, robot: DescribedRobot, within: float) -> None:
         """`within`: m beyond which nothing is near.
 
         :raises ClearanceError: where the robot's model cannot be used.
@@ -29,14 +32,14 @@ class Surroundings:
         self._tree = read_joints(robot.urdf)
         self._model = ClearanceModel(openable(robot.urdf), robot.base)
         self._lock = threading.Lock()
-        self._news: Optional[List[Box]] = None
+        self._news: Optional[List[CollisionBox]] = None
 
-    def watch_over(self, hand: Hand) -> None:
+    def watch_over(self, arm: TeleoperatedArm) -> None:
         """Let an arm slow down near itself and the boxes."""
-        hand.watch(self._model.arm(hand.chain, self._within))
+        arm.watch(self._model.arm(arm.chain, self._within))
 
     def replace(self, message: CollisionBoxes) -> None:
-        """Take over a new map; one in a frame that is no part of the robot is left aside with a warning."""
+        """Take over a new map; warn of one in a frame that the robot does not have."""
         try:
             boxes = self._boxes(message)
         except ValueError as err:
@@ -53,7 +56,7 @@ class Surroundings:
         if news is not None:
             self._model.set_boxes(news)
 
-    def _boxes(self, message: CollisionBoxes) -> List[Box]:
+    def _boxes(self, message: CollisionBoxes) -> List[CollisionBox]:
         if not len(message.names) == len(message.poses) == len(message.sizes):
             raise ValueError('{} names, {} poses, {} sizes'.format(
                 len(message.names), len(message.poses), len(message.sizes)))
@@ -65,7 +68,7 @@ class Surroundings:
             centre = from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
             if not all(0.0 < side < math.inf for side in (size.x, size.y, size.z)):
                 raise ValueError('size of {!r}: {}'.format(name, (size.x, size.y, size.z)))
-            boxes.append(Box(name, base_from_map @ centre, (size.x, size.y, size.z)))
+            boxes.append(CollisionBox(name, base_from_map @ centre, (size.x, size.y, size.z)))
         return boxes
 
 
@@ -76,7 +79,8 @@ def openable(urdf: str) -> str:
     """
     packs = rospkg.RosPack()
     try:
-        named = re.sub(r'package://([^/"]+)', lambda match: str(packs.get_path(match.group(1))), urdf)
+        named = re.sub(r'package://([^/"]+)', lambda match: str(packs.get_path(match.group(1))),
+                       urdf)
     except rospkg.ResourceNotFound as err:
         raise ClearanceError('robot description: no package {}'.format(err)) from err
     return named.replace('file://', '')

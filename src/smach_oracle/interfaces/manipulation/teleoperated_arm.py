@@ -1,4 +1,4 @@
-"""One arm that a person drives: commands in, one control period of motion out, and what is known of its tool."""
+"""One arm that a person drives: commands in, one control period of motion out."""
 from typing import Callable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -6,19 +6,27 @@ import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
+from smach_oracle.geometry.chain import JointChain
+from smach_oracle.geometry.joints import read_joints
+from smach_oracle.geometry.links import joints_between, link_pose
+from smach_oracle.geometry.transforms import quaternion
 from smach_oracle.msg import TeleopCommand
 
-from ..geometry.chain import Chain, read_joints
-from ..geometry.links import joints_between, link_pose
-from ..geometry.transforms import quaternion
 from .arm_port import ArmNames, ArmPort, GripperPort, JointListener
-from .teleoperation import CartesianDrive, DriveLimits, Near, Step, pulled_back, standing
+from .cartesian_drive import (
+    CartesianDrive,
+    ClearanceProbe,
+    DriveLimits,
+    DriveStep,
+    no_motion,
+    pulled_back,
+)
 
-_SILENT_S = 1.0  # wall time after which joints that say nothing are not known any more
+_SILENT_S = 1.0  # wall time after which joints without a message are not known any more
 _REST_LEAD = 0.05  # rad by which targets may stay ahead of the joints when nobody moves the arm
 
 
-class Robot(NamedTuple):
+class DescribedRobot(NamedTuple):
     """What all arms share."""
 
     urdf: str
@@ -26,10 +34,11 @@ class Robot(NamedTuple):
     listener: JointListener
 
 
-class Hand:
+class TeleoperatedArm:
     """One arm. Only one thread may move it."""
 
-    def __init__(self, robot: Robot, names: ArmNames, limits: DriveLimits, lead: float) -> None:
+    def __init__(self, robot: DescribedRobot, names: ArmNames, limits: DriveLimits,
+                 lead: float) -> None:
         """`lead`: rad by which the targets may be ahead of the measured joints.
 
         :raises ValueError: where the arm's links are not in the robot description.
@@ -37,7 +46,7 @@ class Hand:
         self._robot = robot
         self._names = names
         self._tree = read_joints(robot.urdf)
-        self.chain = Chain.from_urdf(robot.urdf, names.base, names.tool)
+        self.chain = JointChain.from_urdf(robot.urdf, names.base, names.tool)
         self._limits = limits
         if len(names.posture) not in (0, len(self.chain.names)):
             raise ValueError('posture of {}: {} angles for {} joints'.format(
@@ -47,19 +56,20 @@ class Hand:
         self.gripper = GripperPort(names.gripper)
         self._lead = lead
         self._targets: Optional[np.ndarray] = None
-        self.grasp: Optional[PoseStamped] = None  # of the tool, when the gripper last closed on something
+        # of the tool, when the gripper last closed on something
+        self.grasp: Optional[PoseStamped] = None
         link_pose(self._tree, robot.base, names.tool, {})
 
-    def watch(self, near: Near) -> None:
-        """Slow down near what `near` tells."""
+    def watch(self, near: ClearanceProbe) -> None:
+        """Slow down near the things that `near` returns."""
         self._drive = self._driven(near)
 
-    def _driven(self, near: Optional[Near]) -> CartesianDrive:
+    def _driven(self, near: Optional[ClearanceProbe]) -> CartesianDrive:
         posture = np.array(self._names.posture) if self._names.posture else None
         return CartesianDrive(self.chain, self._limits, near, posture)
 
     def forget(self) -> None:
-        """A new goal begins: what was grasped for another one does not count."""
+        """A new goal begins: forget what was grasped for another one."""
         self.grasp = None
 
     def begin(self) -> None:
@@ -77,12 +87,13 @@ class Hand:
     def why_not(self, command: TeleopCommand, frozen: bool) -> str:
         """Why the command cannot be carried out, or ''.
 
-        :param frozen: whether the world stands still, and says nothing, between two commands.
+        :param frozen: whether the world stands still, and publishes nothing, between two commands.
         """
         twist = _array(command.twist)
         if not np.isfinite(twist).all():
             return 'twist {} is not finite'.format(twist.tolist())
-        if command.move_gripper and not (0.0 <= command.gripper < np.inf and 0.0 <= command.gripper_effort < np.inf):
+        if command.move_gripper and not (0.0 <= command.gripper < np.inf
+                                         and 0.0 <= command.gripper_effort < np.inf):
             return 'gripper {} m with {} N: both must be finite and 0 or more'.format(
                 command.gripper, command.gripper_effort)
         try:
@@ -94,7 +105,7 @@ class Hand:
                 or (self.gripper.why_not() if command.move_gripper else ''))
 
     def _unknown(self, more: Sequence[str], frozen: bool) -> str:
-        """Which joints of the arm, or of `more`, are not where joint_states last said they were; '' : none."""
+        """Why the positions of the arm's joints, or of `more`, are not known; '' where they are."""
         needed = joints_between(self._tree, self._robot.base, self._names.tool)[::-1]
         needed += [name for name in more if name not in needed]
         positions, _ = self._robot.listener.now()
@@ -105,29 +116,36 @@ class Hand:
         if odd:
             return 'joint_states of {} are not finite'.format(', '.join(odd))
         silent_s = self._robot.listener.silent_s(needed)
-        return '' if frozen or silent_s < _SILENT_S else 'no joint_states for {:.1f} s'.format(silent_s)
+        return '' if frozen or silent_s < _SILENT_S else 'no joint_states for {:.1f} s'.format(
+            silent_s)
 
-    def move(self, command: TeleopCommand, period_s: float, held: Callable[[], bool]) -> Step:
+    def move(self, command: TeleopCommand, period_s: float, held: Callable[[], bool]) -> DriveStep:
         """Send the joints where the tool is one period later, if it moves as commanded.
 
         :param held: whether the dead-man still is, asked right before.
         """
         positions, _ = self._robot.listener.now()
         measured = self.measured(positions)
-        targets = measured if self._targets is None else pulled_back(self._targets, measured, self._lead)
+        targets = measured if self._targets is None else pulled_back(self._targets, measured,
+                                                                     self._lead)
         twist = _array(command.twist)
-        axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id, positions)
-        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]), period_s,
-                                command.turn_freely)
+        axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id,
+                                                                      positions)
+        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]),
+                                period_s, command.turn_freely)
         if not held():
-            return standing()
+            return no_motion()
         if step.velocities.any():
             self._port.send(step.joints, step.velocities, period_s)
         self._targets = step.joints
         return step
 
-    def move_and_wait(self, command: TeleopCommand, period_s: float, limit_s: float) -> Tuple[Step, bool]:
-        """Move in lock-step with a world that stands still between commands; whether it has carried that out."""
+    def move_and_wait(self, command: TeleopCommand, period_s: float,
+                      limit_s: float) -> Tuple[DriveStep, bool]:
+        """Move in lock-step with a world that stands still between commands.
+
+        :returns: the step, and whether the world has carried it out.
+        """
         positions, since = self._robot.listener.now()
         before = {name: positions[name] for name in self.chain.names}
         step = self.move(command, period_s, lambda: True)
@@ -152,7 +170,7 @@ class Hand:
                            Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
 
     def in_base(self, twist: np.ndarray) -> Twist:
-        """A twist (6,), m/s and rad/s, along the axes of the arm's own base, along those of the robot's."""
+        """A twist (6,), m/s and rad/s, from the axes of the arm's base to those of the robot's."""
         axes = self._axes(self._names.base, self._robot.listener.now()[0])
         return Twist(Vector3(*(axes @ twist[:3])), Vector3(*(axes @ twist[3:])))
 
@@ -169,4 +187,3 @@ class Hand:
 def _array(twist: Twist) -> np.ndarray:
     return np.array([twist.linear.x, twist.linear.y, twist.linear.z,
                      twist.angular.x, twist.angular.y, twist.angular.z])
-

@@ -1,13 +1,15 @@
-"""What is around a marked object in its frame: the surface that it stands on, and the other things there."""
+"""The surface that a marked object stands on, and the other things there."""
 from typing import List, NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
-from ..geometry.box import UprightBox, upright_box
-from ..geometry.depth import points_of
-from ..geometry.pieces import largest_patch, standing_on
-from .segmentation import Cutting, Picture
+from smach_oracle.geometry.box import UprightBox, upright_box
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.pieces import largest_patch, standing_on
+
+from .segmentation import SegmentedObject
 
 STRIDE = 2
 OFF_SURFACE = 0.012  # m that a point of the surface may seem to lie off it
@@ -19,7 +21,7 @@ GROWN = 3  # px around the mask that belong to nothing
 MARGIN = 0.01  # m from the surface's edge
 
 
-class SceneError(Exception):
+class MarkedSceneError(Exception):
     """The surface cannot be made out; the text says why."""
 
 
@@ -30,21 +32,23 @@ class MarkedScene(NamedTuple):
     others: List[UprightBox]  # other things on it, nearest to the base first
 
 
-def scene_of(picture: Picture, cutting: Cutting) -> MarkedScene:
-    """What is around the object of a cutting.
+def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
+    """What is around an object.
 
-    :raises SceneError: where the surface below it is not seen.
+    :raises MarkedSceneError: where the surface below it is not seen.
     """
-    plane = cutting.surface
+    plane = segmented.surface
     if plane is None:
-        raise SceneError('what the object stands on cannot be made out around it')
-    depth = picture.depth[::STRIDE, ::STRIDE].copy()
-    depth[ndimage.binary_dilation(cutting.mask, iterations=GROWN)[::STRIDE, ::STRIDE] | (depth > REACH)] = np.nan
-    points = points_of(depth, picture.intrinsics, picture.base_from_camera, stride=STRIDE).reshape(-1, 3)
+        raise MarkedSceneError('what the object stands on cannot be made out around it')
+    depth = image.depth[::STRIDE, ::STRIDE].copy()
+    depth[ndimage.binary_dilation(segmented.mask, iterations=GROWN)[::STRIDE, ::STRIDE] |
+          (depth > REACH)] = np.nan
+    points = points_of(depth, image.intrinsics, image.base_from_camera,
+                       stride=STRIDE).reshape(-1, 3)
     points = points[np.isfinite(points[:, 2])]
     patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SURFACE])
     if len(patch) < 3:
-        raise SceneError('too little is seen of what the object stands on')
+        raise MarkedSceneError('too little is seen of what the object stands on')
     others = []
     for chosen in standing_on(points, plane, patch, LOWEST, HIGHEST, MARGIN):
         own = points[chosen]

@@ -1,10 +1,10 @@
-"""What accepting a marked object hands over, per state: its output keys, and what of the marking goes there."""
-from typing import Any, Dict, Mapping, NamedTuple
+"""Which outputs a marked object gives, per state: output keys, each with a part of the marking."""
+from typing import Dict, Mapping, NamedTuple
 
-from ..oracle.errors import ConfigError
+from smach_oracle.oracle.errors import SettingsError
 
-# what a template may name, and what becomes of it
-INGREDIENTS = {
+# the parts of a marking that a template may name
+OUTPUT_PARTS = {
     'object': 'pose of the marked object',
     'size': 'extents of the marked object',
     'objects': 'poses of all objects on its surface, the marked one first',
@@ -19,31 +19,40 @@ class StateTemplate(NamedTuple):
     """Of one state."""
 
     outcome: str  # the one that comes with outputs: its success
-    outputs: Dict[str, str]  # output key: ingredient
+    outputs: Dict[str, str]  # output key: one of OUTPUT_PARTS
 
 
-def templates_from(settings: Any) -> Dict[str, StateTemplate]:
+def templates_from(settings: object) -> Dict[str, StateTemplate]:
     """By state, from a dictionary such as {'DETECT_DRINK': {'outputs': {'drink': 'object'}}}.
 
-    :raises ConfigError: naming the setting, its value and what is allowed.
+    :raises SettingsError: naming the setting, its value and what is allowed.
     """
     if not isinstance(settings, Mapping) or not settings:
-        raise ConfigError('states', settings, 'a dictionary with one state or more')
-    return {str(state): _template('states.{}'.format(state), value) for state, value in settings.items()}
+        raise SettingsError('states', settings, 'a dictionary with one state or more')
+    return {
+        str(state): _template('states.{}'.format(state), value)
+        for state, value in settings.items()
+    }
 
 
-def _template(where: str, value: Any) -> StateTemplate:
+def _template(where: str, value: object) -> StateTemplate:
     if not isinstance(value, Mapping):
-        raise ConfigError(where, value, 'a dictionary with outputs and, where it is not succeeded, outcome')
+        raise SettingsError(where, value,
+                          'a dictionary with outputs and, where it is not succeeded, outcome')
     unknown = sorted(set(map(str, value)) - {'outcome', 'outputs'})
     if unknown:
-        raise ConfigError('{}.{}'.format(where, unknown[0]), value[unknown[0]], 'only outcome and outputs')
+        raise SettingsError('{}.{}'.format(where, unknown[0]), value[unknown[0]],
+                          'only outcome and outputs')
     outcome, outputs = value.get('outcome', 'succeeded'), value.get('outputs')
     if not isinstance(outcome, str) or not outcome:
-        raise ConfigError(where + '.outcome', outcome, 'the name of an outcome')
+        raise SettingsError(where + '.outcome', outcome, 'the name of an outcome')
     if not isinstance(outputs, Mapping) or not outputs:
-        raise ConfigError(where + '.outputs', outputs, 'a dictionary from output keys to ' + ', '.join(INGREDIENTS))
-    for key, ingredient in outputs.items():
-        if not isinstance(ingredient, str) or ingredient not in INGREDIENTS:
-            raise ConfigError('{}.outputs.{}'.format(where, key), ingredient, 'one of ' + ', '.join(INGREDIENTS))
-    return StateTemplate(outcome, {str(key): str(ingredient) for key, ingredient in outputs.items()})
+        raise SettingsError(where + '.outputs', outputs,
+                          'a dictionary from output keys to ' + ', '.join(OUTPUT_PARTS))
+    for key, part in outputs.items():
+        if not isinstance(part, str) or part not in OUTPUT_PARTS:
+            raise SettingsError('{}.outputs.{}'.format(where, key), part,
+                              'one of ' + ', '.join(OUTPUT_PARTS))
+    return StateTemplate(outcome,
+                         {str(key): str(part)
+                          for key, part in outputs.items()})

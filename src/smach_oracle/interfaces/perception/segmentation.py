@@ -1,27 +1,31 @@
-"""From what a person draws on a camera frame to the object: GrabCut gives a mask, depth gives it a place and a size.
+"""From a drawing on a camera image to the object: GrabCut gives a mask, depth place and size.
 
-Works on any frame that has colour, depth, intrinsics and the camera's pose; knows no ROS. The same frame and drawing
-give the same object. The segmentation interface of the paper, section V-A.
+Works on any image that has colour, depth, intrinsics and the camera's pose; knows no ROS. The same
+image and drawing give the same object. The segmentation interface of the paper, section V-A.
 """
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
 
-from ..geometry.box import UprightBox
-from ..geometry.body import body_above
-from ..geometry.depth import points_of
-from ..geometry.plane import Plane, find_plane
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.marked_object import object_above
+from smach_oracle.geometry.plane import Plane, find_plane
 
 LEAST_SIDE = 4  # px of a region
 LEAST_MASK = 40  # px
 LEAST_SHARE = 0.03  # of the region's area that a mask must have
 LEAST_DEPTH = 30  # pixels of the mask with a depth
 LEAST_DEPTH_SHARE = 0.15
-WORK_AREA = 26000  # px that GrabCut sees; a larger crop is scaled down, so that the answer stays quick
+# px that GrabCut sees; a larger crop is scaled down, so that the answer stays quick
+WORK_AREA = 26000
 ITERATIONS = 4
 STROKE_WIDTH = 5.0  # px
 ON_SURFACE = 0.008  # m: a point no further from the surface belongs to that, not to the object
+
+_NO_RECTANGLE = (0, 0, 0, 0)  # of GrabCut, which begins from a mask
 
 Corners = Tuple[int, int, int, int]  # left, top, right, bottom; the last two excluded
 
@@ -37,70 +41,66 @@ class SegmentationError(Exception):
         self.mask = mask
 
 
-class Picture(NamedTuple):
-    """A camera frame."""
-
-    stamp: float  # s
-    colour: np.ndarray  # (h, w, 3) uint8 RGB
-    depth: np.ndarray  # (h, w) m along the optical axis, registered to colour; NaN where nothing was measured
-    intrinsics: np.ndarray  # (3, 3)
-    base_from_camera: np.ndarray  # 4x4; z of the base points up
-
-
 class Stroke(NamedTuple):
-    """A line drawn on the frame."""
+    """A line drawn on the image."""
 
     foreground: bool  # it lies on the object
     points: np.ndarray  # (n, 2) px: right, down
     width: float = STROKE_WIDTH  # px
 
 
-class Cutting(NamedTuple):
-    """The object."""
+class SegmentedObject(NamedTuple):
+    """An object cut out of an image."""
 
     mask: np.ndarray  # (h, w) bool
     box: UprightBox  # in the frame of the base
     points: np.ndarray  # (n, 3) m, in the frame of the base
     colours: np.ndarray  # (n, 3) uint8
-    surface: Optional[Plane]  # what it stands on; None where that cannot be told from the frame
+    surface: Optional[Plane]  # what it stands on; None where the image does not show it
 
 
 def rectangle(left: float, top: float, width: float, height: float) -> np.ndarray:
     """(4, 2) px: a rectangle as a region."""
-    return np.array([[left, top], [left + width, top], [left + width, top + height], [left, top + height]], float)
+    return np.array(
+        [[left, top], [left + width, top], [left + width, top + height], [left, top + height]],
+        float)
 
 
-def segment(picture: Picture, region: np.ndarray, strokes: Sequence[Stroke] = ()) -> Cutting:
+def segment(image: CameraImage, region: np.ndarray,
+            strokes: Sequence[Stroke] = ()) -> SegmentedObject:
     """Cut out the object.
 
     :param region: (n, 2) px, corners of a polygon that holds the whole object, n >= 3.
-    :raises SegmentationError: for a region that is none, a mask that collapses, or too little depth under it.
+    :raises SegmentationError: for a region that cannot be used, a mask that collapses, or too
+        little depth under it.
     """
-    inside = _filled(picture, region)
+    inside = _filled(image, region)
     crop, surroundings = _around(inside, 0.35, 12), _around(inside, 0.8, 40)
-    surface = _surface(picture, inside, surroundings)
-    mask = _grab_cut(picture, inside, crop, strokes, surface)
-    return _with_depth(picture, mask, surface)
+    surface = _surface(image, inside, surroundings)
+    mask = _grab_cut(image, inside, crop, strokes, surface)
+    return _with_depth(image, mask, surface)
 
 
-def _filled(picture: Picture, region: np.ndarray) -> np.ndarray:
+def _filled(image: CameraImage, region: np.ndarray) -> np.ndarray:
     """(h, w) bool: the region's part of the image."""
     region = np.asarray(region, float)
-    height, width = picture.depth.shape
+    height, width = image.depth.shape
     if region.ndim != 2 or region.shape[1] != 2 or len(region) < 3:
         raise SegmentationError('the region needs 3 corners or more, each with x and y')
     if not np.isfinite(region).all():
         raise SegmentationError('the region has corners that are no finite numbers')
     low, high = region.min(axis=0), region.max(axis=0)
     if low[0] >= width or low[1] >= height or high[0] <= 0 or high[1] <= 0:
-        raise SegmentationError('the region lies outside the image: x {:.0f} to {:.0f}, y {:.0f} to {:.0f}; the image '
-                                'is {} x {}'.format(low[0], high[0], low[1], high[1], width, height))
+        raise SegmentationError(
+            'the region lies outside the image: x {:.0f} to {:.0f}, y {:.0f} to {:.0f}; the image '
+            'is {} x {}'.format(low[0], high[0], low[1], high[1], width, height))
     inside = np.zeros((height, width), np.uint8)
-    cv2.fillPoly(inside, [_pixels(np.clip(region, -1e4, 1e4))], 1)
+    cv2.fillPoly(inside, _polygon(np.clip(region, -1e4, 1e4)), (1.0,))
     columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
     if len(columns) < LEAST_SIDE or len(rows) < LEAST_SIDE:
-        raise SegmentationError('the region is too small: {} x {} px inside the image; it needs {} x {}'.format(
-            len(columns), len(rows), LEAST_SIDE, LEAST_SIDE))
+        raise SegmentationError(
+            'the region is too small: {} x {} px inside the image; it needs {} x {}'.format(
+                len(columns), len(rows), LEAST_SIDE, LEAST_SIDE))
     return inside.astype(bool)
 
 
@@ -110,42 +110,48 @@ def _around(inside: np.ndarray, share: float, least: int) -> Corners:
     across = max(least, int(share * len(columns)))
     down = max(least, int(share * len(rows)))
     return (max(0, columns[0] - across), max(0, rows[0] - down),
-            min(inside.shape[1], columns[-1] + 1 + across), min(inside.shape[0], rows[-1] + 1 + down))
+            min(inside.shape[1], columns[-1] + 1 + across), min(inside.shape[0],
+                                                                rows[-1] + 1 + down))
 
 
-def _points(picture: Picture, crop: Corners) -> np.ndarray:
+def _points(image: CameraImage, crop: Corners) -> np.ndarray:
     left, top, right, bottom = crop
-    return points_of(picture.depth[top:bottom, left:right], picture.intrinsics, picture.base_from_camera, (left, top))
+    return points_of(image.depth[top:bottom, left:right], image.intrinsics,
+                     image.base_from_camera, (left, top))
 
 
-def _surface(picture: Picture, inside: np.ndarray, crop: Corners) -> Optional[Plane]:
-    """What the object stands on, where enough of it is seen around the region; inside, its own top may be level too."""
+def _surface(image: CameraImage, inside: np.ndarray, crop: Corners) -> Optional[Plane]:
+    """The surface that the object stands on, where enough of it is seen around the region.
+
+    Inside the region, the top of the object may be level too.
+    """
     left, top, right, bottom = crop
-    points = _points(picture, crop)[~inside[top:bottom, left:right]]
+    points = _points(image, crop)[~inside[top:bottom, left:right]]
     points = points[np.isfinite(points[:, 2])]
     return find_plane(points, np.random.default_rng(1), least=max(150, len(points) // 12))
 
 
-def _grab_cut(picture: Picture, inside: np.ndarray, crop: Corners, strokes: Sequence[Stroke],
+def _grab_cut(image: CameraImage, inside: np.ndarray, crop: Corners, strokes: Sequence[Stroke],
               surface: Optional[Plane]) -> np.ndarray:
     """(h, w) bool."""
     left, top, right, bottom = crop
     known = np.where(inside, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
     if surface is not None:
-        height = surface.height(_points(picture, crop))
+        height = surface.height(_points(image, crop))
         below = np.zeros(inside.shape, bool)
         below[top:bottom, left:right] = height < ON_SURFACE  # False where it is not known
         known[inside & below] = cv2.GC_PR_BGD
     for stroke in strokes:
         _draw(known, stroke)
     labels = known[top:bottom, left:right].copy()
-    colour = np.ascontiguousarray(picture.colour[top:bottom, left:right, ::-1])
+    colour = np.ascontiguousarray(image.colour[top:bottom, left:right, ::-1])
     mask = np.zeros(inside.shape, bool)
     mask[top:bottom, left:right] = _labelled(colour, labels)
     area, least = int(inside.sum()), int(max(LEAST_MASK, LEAST_SHARE * inside.sum()))
     if mask.sum() < least:
-        raise SegmentationError('the mask collapsed to {} of the {} px of the region, {} are needed: draw a stroke '
-                                'on the object, or the region closer around it'.format(int(mask.sum()), area, least))
+        raise SegmentationError(
+            'the mask collapsed to {} of the {} px of the region, {} are needed: draw a stroke '
+            'on the object, or the region closer around it'.format(int(mask.sum()), area, least))
     return mask
 
 
@@ -162,9 +168,12 @@ def _labelled(colour: np.ndarray, labels: np.ndarray) -> np.ndarray:
         return cv2.resize(object_there.astype(np.uint8), (width, height)).astype(bool)
     cv2.setNumThreads(1)
     cv2.setRNGSeed(1)
-    cv2.grabCut(colour, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), ITERATIONS, cv2.GC_INIT_WITH_MASK)
+    cv2.grabCut(colour, labels, _NO_RECTANGLE, np.zeros((1, 65)), np.zeros((1, 65)), ITERATIONS,
+                cv2.GC_INIT_WITH_MASK)
     found = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.float32)
-    return cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR) > 0.5 if scale < 1.0 else found > 0.5
+    if scale < 1.0:
+        found = np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR))
+    return found > 0.5
 
 
 def _draw(known: np.ndarray, stroke: Stroke) -> None:
@@ -172,30 +181,34 @@ def _draw(known: np.ndarray, stroke: Stroke) -> None:
     if points.ndim != 2 or points.shape[1] != 2 or not len(points) or not np.isfinite(points).all():
         raise SegmentationError('a stroke needs one point or more, each with a finite x and y')
     if not (np.isfinite(stroke.width) and 0 <= stroke.width <= 1000):
-        raise SegmentationError('a stroke has a width of {} px; allowed: 0 to 1000'.format(stroke.width))
+        raise SegmentationError('a stroke has a width of {} px; allowed: 0 to 1000'.format(
+            stroke.width))
     value = cv2.GC_FGD if stroke.foreground else cv2.GC_BGD
     width = max(1, int(round(stroke.width or STROKE_WIDTH)))
-    line = _pixels(np.clip(points, -1e4, 1e4))
-    if len(line) == 1:
-        line = np.repeat(line, 2, axis=0)
-    cv2.polylines(known, [line], False, int(value), width)
+    if len(points) == 1:
+        points = np.repeat(points, 2, axis=0)
+    cv2.polylines(known, _polygon(np.clip(points, -1e4, 1e4)), False, (float(value),), width)
 
 
-def _with_depth(picture: Picture, mask: np.ndarray, surface: Optional[Plane]) -> Cutting:
+def _with_depth(image: CameraImage, mask: np.ndarray, surface: Optional[Plane]) -> SegmentedObject:
     crop = _around(mask, 0.0, 1)
     left, top, right, bottom = crop
-    points = _points(picture, crop)
+    points = _points(image, crop)
     chosen = mask[top:bottom, left:right] & np.isfinite(points[..., 2])
     known, total = int(chosen.sum()), int(mask.sum())
     if known < LEAST_DEPTH or known < LEAST_DEPTH_SHARE * total:
-        raise SegmentationError('too little depth on the object: {} of its {} px have one, {} are needed'.format(
-            known, total, max(LEAST_DEPTH, int(np.ceil(LEAST_DEPTH_SHARE * total)))), mask)
-    found = body_above(points[chosen], surface, ON_SURFACE)
+        raise SegmentationError(
+            'too little depth on the object: {} of its {} px have one, {} are needed'.format(
+                known, total, max(LEAST_DEPTH, int(np.ceil(LEAST_DEPTH_SHARE * total)))), mask)
+    found = object_above(points[chosen], surface, ON_SURFACE)
     if found is None or int(found.chosen.sum()) < LEAST_DEPTH:
-        raise SegmentationError('nothing under the mask stands out from the surface around it', mask)
-    return Cutting(mask, found.box, points[chosen][found.chosen],
-                   picture.colour[top:bottom, left:right][chosen][found.chosen], found.surface)
+        raise SegmentationError('nothing under the mask stands out from the surface around it',
+                                mask)
+    return SegmentedObject(mask, found.box, points[chosen][found.chosen],
+                           image.colour[top:bottom,
+                                        left:right][chosen][found.chosen], found.surface)
 
 
-def _pixels(points: np.ndarray) -> np.ndarray:
-    return np.round(points).astype(np.int32).reshape(-1, 1, 2)
+def _polygon(points: np.ndarray) -> List[Any]:
+    """Points (n, 2) px as OpenCV draws them: a list of one array (n, 1, 2)."""
+    return [np.round(points).astype(np.int32).reshape(-1, 1, 2)]

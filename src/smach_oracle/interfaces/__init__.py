@@ -1,0 +1,1 @@
+"""Shared-autonomy interfaces (paper, section V-A): a person does the failed state's work."""

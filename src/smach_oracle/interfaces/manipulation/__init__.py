@@ -1,0 +1,1 @@
+"""A person drives the arm in six degrees of freedom."""
