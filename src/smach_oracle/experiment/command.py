@@ -1,8 +1,8 @@
-"""Run an experiment: the same seeds with and without the oracle, every trial recorded, counted at the end.
+"""Run an experiment: the same seeds with and without the oracle, all recorded and counted.
 
-Each job is a replicate of an arm, and has its own ROS master on a free port, its own world and its own learned rates.
-What is started is stopped, also on Ctrl-C, pressed once or often. Started again with the same --output, an experiment
-goes on where it was.
+Each job is a replicate of a variant, and has its own ROS master on a free port, its own world and
+its own learned rates. What is started is stopped, also on Ctrl-C, pressed once or often. Started
+again with the same --output, an experiment goes on where it was.
 """
 import argparse
 import fcntl
@@ -15,49 +15,57 @@ from pathlib import Path
 from typing import Any, Dict, Iterator, List, Optional, Sequence
 
 from smach_oracle.analysis import bag_statistics
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.failure_rate import ESTIMATORS
-from smach_oracle.oracle.packages import lacking
-from smach_oracle.oracle.paths import path_of
-from smach_oracle.oracle.policy import POLICIES
+from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
+from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.checks import number, whole
+from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.packages import lacking
 
-from .interrupts import Interrupted, Interrupts
-from .job import Job
-from .plan import CONFIGURED, TASKS, ExperimentError, Plan, enter_folder, make_arms
+from .job import ExperimentJob
+from .plan import CONFIGURED, TASKS, ExperimentError, ExperimentPlan, enter_folder, make_variants
 from .progress import ProgressLine
+from .stop_signals import StopRequested, StopSignals
 
 POLL_S = 0.5
 FAILED, LACKING, LOST = 1, 2, 3  # exit codes
 LONGEST_DELAY = 3600.0  # s, of the operator
-# Settings of the oracle that go over those of the task: option, type, what it is.
+COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
+DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
+BOTH = ('both', 'with', 'without')  # the oracle
+# Settings of the oracle that override those of the task: option, type, what it is.
 OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
              ('high_from', float, 'failure rate from which a state is HIGH'),
              ('prior', float, 'failure rate that a state starts with'),
              ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'))
 
 
-def run(plan: Plan, output: Path, at_a_time: int, hung_after_s: float) -> List[Job]:
+def run(plan: ExperimentPlan, output: Path, at_a_time: int,
+        hung_after_s: float) -> List[ExperimentJob]:
     """Run the jobs that are not over, some at a time; returns them all.
 
     :raises ExperimentError: naming the job and its folder.
-    :raises Interrupted: by Ctrl-C and the like, once everything is stopped.
+    :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
     """
-    jobs: List[Job] = []
+    jobs: List[ExperimentJob] = []
     progress = ProgressLine(sys.stdout)
-    with Interrupts() as interrupts:
+    with StopSignals() as signals:
         try:
             for replicate in range(plan.replicates):
-                jobs += [Job(plan, arm, replicate, output, hung_after_s) for arm in plan.arms]
-            run_jobs(jobs, at_a_time, interrupts, progress)
+                jobs += [
+                    ExperimentJob(plan, variant, replicate, output, hung_after_s)
+                    for variant in plan.variants
+                ]
+            run_jobs(jobs, at_a_time, signals, progress)
         finally:
             progress.end()
             stop_all(jobs)
     return jobs
 
 
-def stop_all(jobs: Sequence[Job]) -> None:
-    """End what runs of every job, whatever may go wrong with one: of several errors the first is raised."""
+def stop_all(jobs: Sequence[ExperimentJob]) -> None:
+    """End the processes of every job; of several errors the first is raised, after all."""
     for job in jobs:
         job.request_stop()
     errors: List[Exception] = []
@@ -70,17 +78,18 @@ def stop_all(jobs: Sequence[Job]) -> None:
         raise errors[0]
 
 
-def run_jobs(jobs: Sequence[Job], at_a_time: int, interrupts: Interrupts, progress: ProgressLine) -> None:
+def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals,
+             progress: ProgressLine) -> None:
     """Start the jobs one after the other and wait for their ends."""
     waiting = [job for job in jobs if not job.over]
-    active: List[Job] = []
+    active: List[ExperimentJob] = []
     progress.show(jobs)
     while waiting or active:
         while waiting and len(active) < at_a_time:
             active.append(waiting.pop(0))
             active[-1].start()
         time.sleep(POLL_S)
-        interrupts.check()
+        signals.check()
         for job in active:
             job.watch()
         active = [job for job in active if not job.over]
@@ -89,7 +98,10 @@ def run_jobs(jobs: Sequence[Job], at_a_time: int, interrupts: Interrupts, progre
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Keep a second run out of the folder. Raises ExperimentError."""
+    """Keep a second experiment out of the folder.
+
+    :raises ExperimentError: where one is at work there.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / '.lock').open('w') as lock:
         try:
@@ -99,61 +111,93 @@ def alone_in(folder: Path) -> Iterator[None]:
         yield
 
 
+class _RenamedOption(argparse.Action):
+    """An option under its older name, which still works but warns on standard error."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
+                 values: object, option_string: Optional[str] = None) -> None:
+        """Warn, and take the value."""
+        print('{}: {} is now called --{}'.format(parser.prog, option_string, self.dest),
+              file=sys.stderr)
+        setattr(namespace, self.dest, values)
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)')
-    parser.add_argument('--trials', type=int, help='per arm and replicate (default: as in the paper, {})'.format(
-        ', '.join('{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items()))))
-    parser.add_argument('--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)')
-    parser.add_argument('--replicates', type=int, default=1,
-                        help='complete repetitions on further seeds, each learning anew (default: 1)')
-    parser.add_argument('--jobs', type=int, default=2, help='replicates of arms at a time (default: %(default)s)')
-    parser.add_argument('--arms', choices=['both', 'with', 'without'], default='both', help='(default: %(default)s)')
-    parser.add_argument('--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
-                        help="instead of the task's own, which is as configured (default); one arm for each")
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
+                        help='(default: %(default)s)')
+    parser.add_argument(
+        '--trials', type=int,
+        help='per variant and replicate (default: as in the paper, {})'.format(', '.join(
+            '{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items()))))
+    parser.add_argument('--seed', type=int, default=1,
+                        help='of the first trial; the next has the next (default: 1)')
+    parser.add_argument(
+        '--replicates', type=int, default=1,
+        help='complete repetitions on further seeds, each learning anew (default: 1)')
+    parser.add_argument('--jobs', type=int, default=2,
+                        help='replicates of variants at a time (default: %(default)s)')
+    parser.add_argument('--variants', choices=BOTH, default='both', help='(default: %(default)s)')
+    parser.add_argument('--arms', dest='variants', choices=BOTH, default=argparse.SUPPRESS,
+                        action=_RenamedOption, help='the older name of --variants')
+    parser.add_argument(
+        '--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
+        help="instead of the task's own, which is as configured (default); one variant for each")
     parser.add_argument('--memory', nargs='+', type=int, metavar='N',
-                        help="how many of a state's latest results count; one arm for each")
+                        help="how many of a state's latest results count; one variant for each")
     parser.add_argument('--estimator', choices=sorted(ESTIMATORS), help='of failure rates')
     for name, kind, what in OVERRIDES:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
-    parser.add_argument('--answer-delay', type=float, default=15.0,
-                        help='s of simulated time that the scripted operator takes, in the median (default: 15)')
+    parser.add_argument(
+        '--answer-delay', type=float, default=15.0,
+        help='s of simulated time that the scripted operator takes, in the median (default: 15)')
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
-    parser.add_argument('--hung-after', type=float, default=300.0, metavar='S',
-                        help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
-                        'before it is run anew (default: 300)')
-    parser.add_argument('--output', type=lambda text: Path(path_of(text)),
-                        help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
+    parser.add_argument(
+        '--hung-after', type=float, default=300.0, metavar='S',
+        help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
+        'before it is run anew (default: 300)')
+    parser.add_argument(
+        '--output', type=lambda text: Path(path_of(text)),
+        help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
     return parser
 
 
 def parse(argv: Optional[List[str]]) -> argparse.Namespace:
-    """Understand the command line; `args.plan` is the experiment. Ends the process where it is wrong."""
+    """Parse the command line; `args.plan` is the experiment. A wrong one ends the process."""
     parser = make_parser()
     args = parser.parse_args(argv)
     trials = TASKS[args.task][1] if args.trials is None else args.trials
-    if min(trials, args.jobs, args.replicates) < 1 or args.seed < 0:
-        parser.error('--trials, --jobs and --replicates must be 1 or more, --seed 0 or more')
-    if not 0.0 <= args.answer_delay <= LONGEST_DELAY:
-        parser.error('--answer-delay must be from 0 to {:g}'.format(LONGEST_DELAY))
+    for check, option, value in ((COUNT, '--trials', trials), (COUNT, '--jobs', args.jobs),
+                                 (COUNT, '--replicates', args.replicates),
+                                 (SEED, '--seed', args.seed),
+                                 (DELAY, '--answer-delay', args.answer_delay)):
+        try:
+            check(option, value)
+        except SettingsError as err:
+            parser.error('{} must be {}'.format(err.key, err.allowed))
     if not args.hung_after > 0:
         parser.error('--hung-after must be more than 0')
-    settings = {name: getattr(args, name) for name in ['estimator'] + [name for name, _, _ in OVERRIDES]
-                if getattr(args, name) is not None}
+    settings = {
+        name: getattr(args, name)
+        for name in ['estimator'] + [name for name, _, _ in OVERRIDES]
+        if getattr(args, name) is not None
+    }
     varied = varied_settings(args)
-    arms = make_arms(args.arms, settings, varied)
-    for arm in arms:
+    variants = make_variants(args.variants, settings, varied)
+    for variant in variants:
         try:
-            Settings.from_dict(dict(arm.settings))
-        except ConfigError as err:
+            Settings.from_dict(dict(variant.settings))
+        except SettingsError as err:
             parser.error(str(err))
-    args.plan = Plan(args.task, trials, args.seed, args.replicates, arms, args.answer_delay, args.benign)
+    args.plan = ExperimentPlan(args.task, trials, args.seed, args.replicates, variants,
+                               args.answer_delay, args.benign)
     return args
 
 
 def varied_settings(args: argparse.Namespace) -> Dict[str, Sequence[Any]]:
-    """The settings of which each value has an arm of its own."""
+    """The settings of which each value has a variant of its own."""
     varied: Dict[str, Sequence[Any]] = {}
     if args.policy != [CONFIGURED]:
         varied['policy'] = list(dict.fromkeys(args.policy))
@@ -165,8 +209,8 @@ def varied_settings(args: argparse.Namespace) -> Dict[str, Sequence[Any]]:
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point.
 
-    :returns: 0, or 1 where a job failed, 3 where trials were lost, or 128 and the signal's number where one stopped
-        it: 130 on Ctrl-C.
+    :returns: 0, or 1 where a job failed, 3 where trials were lost, or 128 and the signal's number
+        where one stopped it: 130 on Ctrl-C.
     """
     args = parse(argv)
     output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
@@ -183,19 +227,28 @@ def main(argv: Optional[List[str]] = None) -> int:
     except (ExperimentError, OSError) as err:
         print('run_trials: {}'.format(err), file=sys.stderr)
         return FAILED
-    except Interrupted as err:
-        print('run_trials: stopped by {}; what was recorded stays in {}, and the same command with --output goes on '
-              'there'.format(err, output), file=sys.stderr)
+    except StopRequested as err:
+        print(
+            'run_trials: stopped by {}; what was recorded stays in {}, and the same command with '
+            '--output goes on '
+            'there'.format(err, output), file=sys.stderr)
         return 128 + err.signum
     return report(jobs, output)
 
 
-def report(jobs: Sequence[Job], output: Path) -> int:
+def report(jobs: Sequence[ExperimentJob], output: Path) -> int:
     """Print the tables, draw the figures, name what was lost; returns the exit code."""
-    places = [str(output / name) for name in dict.fromkeys(job.arm.name for job in jobs)]
-    code = bag_statistics.main(places + ['--figure', str(output / 'time_series'), '--csv', str(output / 'trials.csv'),
-                                         '--json', str(output / 'statistics.json')])
-    lost = ['{}: seed {}: {}'.format(job.name, seed, why) for job in jobs for seed, why in sorted(job.lost.items())]
+    places = [str(output / name) for name in dict.fromkeys(job.variant.name for job in jobs)]
+    code = bag_statistics.main(places + [
+        '--figure',
+        str(output / 'time_series'), '--csv',
+        str(output / 'trials.csv'), '--json',
+        str(output / 'statistics.json')
+    ])
+    lost = [
+        '{}: seed {}: {}'.format(job.name, seed, why) for job in jobs
+        for seed, why in sorted(job.lost.items())
+    ]
     if lost:
         print('Lost trials:\n  {}'.format('\n  '.join(lost)))
     print('Bags, logs and figures: {}'.format(os.fspath(output)))

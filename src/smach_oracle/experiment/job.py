@@ -1,4 +1,7 @@
-"""One job: the trials of one replicate of one arm, in order, with a master, a world and learned rates of its own."""
+"""One job: the trials of one replicate of one variant, in order.
+
+It has a master, a world and learned rates of its own.
+"""
 import json
 import time
 from pathlib import Path
@@ -7,37 +10,46 @@ from typing import Any, Dict, List, Optional
 from smach_oracle.analysis.trials import TrialSummary
 
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
-from .plan import TASKS, Arm, ExperimentError, Plan
-from .records import JobRecords
+from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
+from .records import ReplicateRecords
 
-LEFTOVER_GRACE_S = 15.0  # for what an earlier run left running
+LEFTOVER_GRACE_S = 15.0  # for processes that an earlier job left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
 LONGEST = 5  # times the time without a sign of life: what a trial may take that goes on and on
 LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a trial
 
 
-class Job:
-    """Runs until all its trials are complete or lost; a trial that fails is no failure of the job."""
+class ExperimentJob:
+    """Runs until all its trials are complete or lost; a trial may fail without failing the job."""
 
-    def __init__(self, plan: Plan, arm: Arm, replicate: int, output: Path, hung_after_s: float) -> None:
-        """Look at what is there already. Raises ExperimentError and OSError."""
-        self.arm = arm
-        self.name = '{}/replicate_{}'.format(arm.name, replicate)
+    def __init__(self, plan: ExperimentPlan, variant: Variant, replicate: int, output: Path,
+                 hung_after_s: float) -> None:
+        """Look through the folder.
+
+        :raises ExperimentError: where the folder cannot be gone on with.
+        :raises OSError: where it cannot be read or written.
+        """
+        self.variant = variant
+        self.name = '{}/replicate_{}'.format(variant.name, replicate)
         self.trials = plan.trials
-        self.summaries: Dict[str, TrialSummary] = {}  # of the trials that are over, by the path of their bags
-        self.messages: List[str] = []  # what somebody should be told
+        # of the trials that are over, by the path of their bags
+        self.summaries: Dict[str, TrialSummary] = {}
+        self.messages: List[str] = []  # for the person at the terminal
         self._plan = plan
         self._seed = plan.first_seed(replicate)
         self._hung_after_s = hung_after_s
-        self._records = JobRecords(output / arm.name / 'replicate_{}'.format(replicate), self._seed, plan.trials)
+        self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
+                                         self._seed, plan.trials)
         self._launch: Optional[Launch] = None
         self._attempts: Dict[int, int] = {}
-        self._ended_at = self._sign_at = 0.0  # the latest trial's end, the latest line that the log grew by
+        # the latest trial's end, the latest line that the log grew by
+        self._ended_at = self._sign_at = 0.0
         self._logged = 0  # bytes
         left = end_marked(str(self._records.folder), LEFTOVER_GRACE_S)
         if left:
-            self.messages.append('{}: ended {} processes that an earlier run had left'.format(self.name, left))
-        self._settle()
+            self.messages.append('{}: ended {} processes that an earlier run had left'.format(
+                self.name, left))
+        self._look_through()
 
     @property
     def over(self) -> bool:
@@ -54,27 +66,34 @@ class Job:
         """How many trials are over, lost ones among them."""
         return min(self.trials, len(self.summaries) + len(self._lost))
 
-    def _settle(self) -> None:
-        progress = self._records.settle()
+    def _look_through(self) -> None:
+        progress = self._records.tidy_up()
         self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
         self._next, self._lost = progress.next_trial, progress.lost
         if progress.dropped:
-            self.messages.append('{}: trial {} was interrupted and is run anew'.format(self.name, self._next + 1))
+            self.messages.append('{}: trial {} was interrupted and is run anew'.format(
+                self.name, self._next + 1))
 
     def start(self) -> None:
-        """Launch the trials that are missing. Raises OSError."""
+        """Launch the trials that are missing.
+
+        :raises OSError: where that cannot be done.
+        """
         self._ended_at = self._sign_at = time.monotonic()
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
-        settings = dict(self.arm.settings, rates_file=str(self._records.rates))
-        return {'trials': self.trials - self._next, 'seed': self._seed + self._next, 'record': self._records.folder,
-                'truth': self._records.truth, 'with_oracle': str(self.arm.recovers).lower(),
-                'answer_delay': self._plan.answer_delay, 'benign': str(self._plan.benign).lower(),
-                'oracle': json.dumps(settings)}
+        settings = dict(self.variant.settings, rates_file=str(self._records.rates))
+        return {
+            'trials': self.trials - self._next, 'seed': self._seed + self._next,
+            'record': self._records.folder, 'truth': self._records.truth,
+            'with_oracle': str(self.variant.recovers).lower(),
+            'answer_delay': self._plan.answer_delay, 'benign': str(self._plan.benign).lower(),
+            'oracle': json.dumps(settings)
+        }
 
     def watch(self) -> None:
-        """See how it goes: take in new trials, start again after a trial in which something hung or died.
+        """Take in new trials; start again after a trial in which something hung or died.
 
         :raises ExperimentError: where this does not help.
         """
@@ -89,7 +108,10 @@ class Job:
             self._again('it ended before its trials were over')
 
     def _hung(self) -> str:
-        """Why what runs is taken for hung; '' where it is not. A trial may take long on a machine with much to do."""
+        """Why the processes are taken for hung, or ''.
+
+        A trial may take long on a machine with much to do.
+        """
         logged, now = size_of(self._records.folder / LOG_FILE), time.monotonic()
         if logged != self._logged:
             self._logged, self._sign_at = logged, now
@@ -113,31 +135,36 @@ class Job:
             return
         number = self._next
         self._attempts[number] = self._attempts.get(number, 0) + 1
-        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why, self._records.folder / LOG_FILE)
+        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why,
+                                                self._records.folder / LOG_FILE)
         if self._attempts[number] >= ATTEMPTS:
-            self._lose(number, why, text)
+            self._give_up_trial(number, why, text)
         else:
             self.messages.append(text + '; started again')
         if not self.over:
             self.start()
 
-    def _lose(self, number: int, why: str, text: str) -> None:
+    def _give_up_trial(self, number: int, why: str, text: str) -> None:
         before = set(range(number - LOST_IN_A_ROW + 1, number))
         if not self.summaries or before <= set(self._lost) and len(before) < number:
             raise ExperimentError(text + last_words(self._records.folder / LOG_FILE))
-        self._records.lose(number, why)
+        self._records.mark_lost(number, why)
         self.messages.append(text + '; LOST')
-        self._settle()
+        self._look_through()
 
     def request_stop(self) -> None:
-        """Ask what runs to end."""
+        """Ask the processes to end."""
         if self._launch is not None:
             self._launch.request_stop()
 
     def stop(self) -> None:
-        """End what runs, and keep what is complete. Raises ExperimentError and OSError."""
+        """End the processes, and keep what is complete.
+
+        :raises ExperimentError: where the folder does not fit the plan any more.
+        :raises OSError: where it cannot be read or written.
+        """
         if self._launch is None:
             return
         self._launch.stop()
         self._launch = None
-        self._settle()
+        self._look_through()

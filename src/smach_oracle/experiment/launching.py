@@ -1,4 +1,7 @@
-"""One roslaunch with a master of its own, whose last descendant is found again, also by the next run after a crash."""
+"""One roslaunch with a master of its own, whose last descendant is found again.
+
+A later experiment finds what one that crashed has left.
+"""
 import ctypes
 import errno
 import os
@@ -8,30 +11,40 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, Dict, IO, List, Mapping, Optional
+from typing import IO, Any, Dict, List, Mapping, Optional
 
 LOG_FILE = 'launch.log'
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
-NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']  # s, before roslaunch kills a node that does not end
+# s, before roslaunch kills a node that does not end
+NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']
 STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
 KILL_S = 10.0  # for the kernel to take away what was killed
-PORTS = range(20000, 65536)  # of which those are used that the system does not give to others by itself
-GIVEN_BY_CHANCE = Path('/proc/sys/net/ipv4/ip_local_port_range')  # the first and the last of these (Linux)
+# of which those are used that the system does not give to others by itself
+PORTS = range(20000, 65536)
+# the first and the last of these (Linux)
+GIVEN_BY_CHANCE = Path('/proc/sys/net/ipv4/ip_local_port_range')
 _PR_SET_PDEATHSIG = 1
 
 
 class Launch:
-    """A running roslaunch. Its output goes to the end of `launch.log` in the job's folder, ROS's logs to `log`."""
+    """A running roslaunch.
+
+    Its output goes to the end of `launch.log` in the job's folder, ROS's logs to `log`.
+    """
 
     def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any]) -> None:
-        """Start it. Raises OSError."""
+        """Start it.
+
+        :raises OSError: where that cannot be done.
+        """
         self._mark = str(folder)
         port = free_port()
         command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
         command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
         self._log_file: IO[str] = (folder / LOG_FILE).open('a')
-        self._process = subprocess.Popen(command, env=environment_of(folder, port), stdout=self._log_file,
-                                         stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=end_with_parent)
+        self._process = subprocess.Popen(command, env=environment_of(folder, port),
+                                         stdout=self._log_file, stderr=subprocess.STDOUT,
+                                         start_new_session=True, preexec_fn=end_with_parent)
 
     def running(self) -> bool:
         """Whether roslaunch has not ended."""
@@ -55,14 +68,21 @@ class Launch:
 
 
 def environment_of(folder: Path, port: int) -> Dict[str, str]:
-    """What a job's processes find in their environment: their own master, whatever robot the caller's shell is set to.
+    """The environment of a job's processes, with a master of its own, whatever the shell has set.
 
-    Jobs run side by side, each with several nodes: more threads in one of them would only be in the others' way.
+    Jobs run side by side, each with several nodes: more threads in one of them would only be in the
+    others' way.
     """
-    caller = {name: value for name, value in os.environ.items() if name not in ('ROS_NAMESPACE', 'ROS_IP')}
+    caller = {
+        name: value
+        for name, value in os.environ.items() if name not in ('ROS_NAMESPACE', 'ROS_IP')
+    }
     threads = {name: caller.get(name, '1') for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS')}
-    return {**caller, **threads, 'ROS_MASTER_URI': 'http://localhost:{}'.format(port), 'ROS_HOSTNAME': 'localhost',
-            'ROS_LOG_DIR': str(folder / 'log'), 'PYTHONUNBUFFERED': '1', MARK: str(folder)}
+    return {
+        **caller, **threads, 'ROS_MASTER_URI': 'http://localhost:{}'.format(port),
+        'ROS_HOSTNAME': 'localhost', 'ROS_LOG_DIR': str(folder / 'log'), 'PYTHONUNBUFFERED': '1',
+        MARK: str(folder)
+    }
 
 
 def size_of(log: Path) -> int:
@@ -77,17 +97,23 @@ def last_words(log: Path, count: int = 6) -> str:
     """The last lines of a log, each on a line of its own; '' where there is none."""
     if not log.exists():
         return ''
-    lines = [line for line in log.read_text(encoding='utf-8', errors='replace').splitlines() if line.strip()]
+    lines = [
+        line for line in log.read_text(encoding='utf-8', errors='replace').splitlines()
+        if line.strip()
+    ]
     return ''.join('\n  ' + line for line in lines[-count:])
 
 
 def end_with_parent() -> None:
-    """In a child before it becomes another program: be told to stop when the parent is killed (Linux)."""
+    """Have the kernel send SIGINT to this process when its parent is killed (Linux).
+
+    Called in a child before it becomes another program.
+    """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on, nor is given by chance before it is used."""
+    """A free TCP port of the loopback interface that the system does not give by itself."""
     chance = random.SystemRandom()
     given = given_by_chance()
     ports = [port for port in PORTS if port not in given] or PORTS
@@ -104,7 +130,7 @@ def free_port() -> int:
 
 
 def given_by_chance() -> range:
-    """The ports that the system gives to who asks for any; Linux's own where it does not say."""
+    """The ports that the system gives by itself; those of Linux where that cannot be read."""
     try:
         first, last = map(int, GIVEN_BY_CHANCE.read_text(encoding='ascii').split())
     except (OSError, ValueError):

@@ -13,6 +13,7 @@ VERSION = 1
 # The task, its launch file, and how many trials the paper has of it.
 TASKS: Dict[str, Tuple[str, int]] = {'pick_and_place': ('pick_and_place.launch', 150),
                                      'drink_retrieval': ('drink_retrieval.launch', 100)}
+ARMS = 'arms'  # key of the variants in an experiment's file: the older name
 CONFIGURED = 'configured'  # a setting's value that leaves it as the task has it
 PACKAGES = ('pybullet', 'ompl', 'numpy', 'scipy', 'opencv-python-headless', 'example-robot-data')
 
@@ -21,7 +22,7 @@ class ExperimentError(Exception):
     """The experiment cannot be run; the text says which part of it, why and where its log is."""
 
 
-class Arm(NamedTuple):
+class Variant(NamedTuple):
     """Trials under the same oracle, or without one; its name is that of its folder."""
 
     name: str
@@ -29,46 +30,51 @@ class Arm(NamedTuple):
     settings: Mapping[str, Any]  # of the oracle, over those of the task
 
 
-class Plan(NamedTuple):
-    """An experiment: each arm is run in each replicate, on the same seeds as the other arms."""
+class ExperimentPlan(NamedTuple):
+    """An experiment: each variant runs in each replicate, on the same seeds."""
 
     task: str
     trials: int
     seed: int
     replicates: int
-    arms: Tuple[Arm, ...]
+    variants: Tuple[Variant, ...]
     answer_delay: float  # s
     benign: bool = False  # worlds without causes to fail
 
     def first_seed(self, replicate: int) -> int:
-        """Seed of the first trial of a replicate, which is counted from 0; the next trial has the next."""
+        """Seed of the first trial of a replicate (from 0); each next trial has the next seed."""
         return self.seed + replicate * self.trials
 
     def as_data(self) -> Dict[str, Any]:
         """The plan as plain data, as its file has it."""
-        return dict(self._asdict(), arms=[dict(arm._asdict(), settings=dict(arm.settings)) for arm in self.arms])
+        data = self._asdict()
+        del data['variants']
+        data[ARMS] = [dict(variant._asdict(), settings=dict(variant.settings))
+                      for variant in self.variants]
+        return data
 
 
-def make_arms(which: str, settings: Mapping[str, Any], varied: Mapping[str, Sequence[Any]]) -> Tuple[Arm, ...]:
-    """The arms: one with the oracle for each combination of what is varied, one without.
+def make_variants(which: str, settings: Mapping[str, Any],
+                  varied: Mapping[str, Sequence[Any]]) -> Tuple[Variant, ...]:
+    """The variants: one with the oracle for each combination of what is varied, one without.
 
     :param which: 'both', 'with' or 'without'.
     :param settings: of every oracle.
     :param varied: settings with the values they take one after the other, e.g. {'memory': [5, 10]}.
     """
-    arms: List[Arm] = []
+    variants: List[Variant] = []
     if which in ('both', 'with'):
         for values in itertools.product(*varied.values()):
             chosen = dict(zip(varied, values))
-            told = ['{}_{}'.format(key, chosen[key]) for key in varied if len(varied[key]) > 1]
+            named = ['{}_{}'.format(key, chosen[key]) for key in varied if len(varied[key]) > 1]
             given = {key: value for key, value in chosen.items() if value != CONFIGURED}
-            arms.append(Arm('_'.join(['with_oracle'] + told), True, {**settings, **given}))
+            variants.append(Variant('_'.join(['with_oracle'] + named), True, {**settings, **given}))
     if which in ('both', 'without'):
-        arms.append(Arm('without_oracle', False, {}))
-    return tuple(arms)
+        variants.append(Variant('without_oracle', False, {}))
+    return tuple(variants)
 
 
-def enter_folder(folder: Path, plan: Plan) -> bool:
+def enter_folder(folder: Path, plan: ExperimentPlan) -> bool:
     """Make the folder of an experiment, or come back to it.
 
     :returns: whether it was there before: the experiment goes on.
@@ -81,32 +87,39 @@ def enter_folder(folder: Path, plan: Plan) -> bool:
         _refuse_another(path, plan)
         return True
     if any(item.name != '.lock' for item in folder.iterdir()):
-        raise ExperimentError('{}: not empty, and no experiment: there is no {} in it'.format(folder, EXPERIMENT_FILE))
-    write_json(path, {'format': FORMAT, 'version': VERSION, 'settings': plan.as_data(), 'software': software()})
+        raise ExperimentError('{}: not empty, and no experiment: there is no {} in it'.format(
+            folder, EXPERIMENT_FILE))
+    write_json(
+        path,
+        {'format': FORMAT, 'version': VERSION, 'settings': plan.as_data(), 'software': software()})
     return False
 
 
-def _refuse_another(path: Path, plan: Plan) -> None:
+def _refuse_another(path: Path, plan: ExperimentPlan) -> None:
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
         there, ours = content['settings'], json.loads(json.dumps(plan.as_data()))
-        known = (content['format'], content['version']) == (FORMAT, VERSION) and isinstance(there, dict)
+        known = (content['format'], content['version']) == (FORMAT, VERSION) and isinstance(
+            there, dict)
     except (ValueError, KeyError, TypeError) as err:
         raise ExperimentError('{}: no settings of an experiment: {!r}'.format(path, err)) from err
     if not known:
         raise ExperimentError('{}: not written by this version'.format(path))
     differing = [key for key in sorted(set(there) | set(ours)) if there.get(key) != ours.get(key)]
     if differing:
-        raise ExperimentError('{}: an experiment with other settings was begun there ({}); go on with those, or give '
-                              'another --output'.format(path.parent, '; '.join(
-                                  '{}: there {}, now {}'.format(key, in_words(there.get(key)), in_words(ours.get(key)))
-                                  for key in differing)))
+        raise ExperimentError(
+            '{}: an experiment with other settings was begun there ({}); go on with those, or give '
+            'another --output'.format(
+                path.parent, '; '.join('{}: there {}, now {}'.format(
+                    'variants' if key == ARMS else key, setting_text(there.get(key)),
+                    setting_text(ours.get(key))) for key in differing)))
 
 
-def in_words(value: Any) -> str:
-    """A setting as an error tells it: arms by their names and settings."""
+def setting_text(value: Any) -> str:
+    """A setting for an error's text; variants by their names and settings."""
     if isinstance(value, list):
-        return ', '.join('{} {}'.format(arm['name'], arm['settings'] or '') .strip() for arm in value)
+        return ', '.join('{} {}'.format(variant['name'], variant['settings'] or '').strip()
+                         for variant in value)
     return repr(value)
 
 
@@ -122,7 +135,10 @@ def software() -> Dict[str, str]:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a file so that a crash at any moment leaves the old one or the new. Raises OSError."""
+    """Write a file so that a crash at any moment leaves the old one or the new.
+
+    :raises OSError: where it cannot be written.
+    """
     temporary = path.with_name(path.name + '.tmp')
     with temporary.open('w', encoding='utf-8') as stream:
         json.dump(content, stream, indent=1, sort_keys=True)

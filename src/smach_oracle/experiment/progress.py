@@ -1,10 +1,11 @@
-"""How far an experiment is: one line that is rewritten on a terminal, a line now and then elsewhere."""
+"""The progress of an experiment: a line rewritten on a terminal, one now and then elsewhere."""
 import time
 from typing import IO, List, Sequence
 
-from smach_oracle.analysis.trials import Ending, TrialSummary
+from smach_oracle.analysis.trial_counter import TrialEnding
+from smach_oracle.analysis.trials import TrialSummary
 
-from .job import Job
+from .job import ExperimentJob
 
 LOG_EVERY_S = 10.0
 
@@ -20,7 +21,7 @@ class ProgressLine:
         self._began = time.monotonic()
         self._finished_before: List[int] = []
 
-    def show(self, jobs: Sequence[Job]) -> None:
+    def show(self, jobs: Sequence[ExperimentJob]) -> None:
         """Trials so far, what came of them, and the time left."""
         for job in jobs:
             for message in job.messages:
@@ -28,7 +29,7 @@ class ProgressLine:
             job.messages.clear()
         finished = [job.finished for job in jobs]
         self._finished_before = self._finished_before or finished
-        text = '   '.join(describe_arms(jobs))
+        text = '   '.join(describe_variants(jobs))
         now = time.monotonic()
         if text == self._last or (not self._terminal and now - self._printed < LOG_EVERY_S):
             return
@@ -52,26 +53,28 @@ def time_left(elapsed_s: float, done: int, missing: int) -> str:
     if not done or not missing:
         return ''
     left_s = elapsed_s / done * missing
-    return '   {:.0f} min left'.format(left_s / 60) if left_s >= 120 else '   {:.0f} s left'.format(left_s)
+    return '   {:.0f} min left'.format(left_s /
+                                       60) if left_s >= 120 else '   {:.0f} s left'.format(left_s)
 
 
-def describe_arms(jobs: Sequence[Job]) -> List[str]:
+def describe_variants(jobs: Sequence[ExperimentJob]) -> List[str]:
     """E.g. "with oracle 40/150: 11 with failures, 10 recovered, 2 asked, 0 failed"."""
     texts = []
-    for name in dict.fromkeys(job.arm.name for job in jobs):
-        mine = [job for job in jobs if job.arm.name == name]
+    for name in dict.fromkeys(job.variant.name for job in jobs):
+        mine = [job for job in jobs if job.variant.name == name]
         trials = [trial for job in mine for trial in job.summaries.values()]
         lost = sum(len(job.lost) for job in mine)
         texts.append('{} {}/{}{}{}'.format(
-            name.replace('_', ' '), sum(job.finished for job in mine), sum(job.trials for job in mine),
-            ': ' + describe_trials(trials, mine[0].arm.recovers) if trials else '',
+            name.replace('_', ' '), sum(job.finished for job in mine),
+            sum(job.trials for job in mine),
+            ': ' + describe_trials(trials, mine[0].variant.recovers) if trials else '',
             ', {} lost'.format(lost) if lost else ''))
     return texts
 
 
 def describe_trials(trials: Sequence[TrialSummary], recovers: bool) -> str:
     """What came of some trials, in numbers of trials."""
-    failed = '{} failed'.format(sum(trial.ending is Ending.FAILURE for trial in trials))
+    failed = '{} failed'.format(sum(trial.ending is TrialEnding.FAILURE for trial in trials))
     if not recovers:
         return failed
     return '{} with failures, {} recovered, {} asked, {}'.format(

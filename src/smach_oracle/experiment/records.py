@@ -1,7 +1,10 @@
-"""What is on disk of one job, which is one replicate of one arm: complete trials, lost ones, and where to go on.
+"""The folder of one job: complete trials, lost ones, and where to go on.
 
-The bag of a trial tells what had been learned at its end, so that a bag with its end in it is all that is needed to go
-on after it, whatever happened at whichever moment. Bags are in the order of their names, which is that of the trials.
+A job is one replicate of one variant.
+
+The bag of a trial holds the rates learned at its end, so that a bag with its end in it is all that
+is needed to go on after it, whatever happened at whichever moment. Bags are in the order of
+their names, which is that of the trials.
 """
 import json
 import os
@@ -9,10 +12,11 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
-from smach_oracle.analysis.trials import Ending, TrialSummary, summarise
+from smach_oracle.analysis.trial_counter import TrialEnding
+from smach_oracle.analysis.trials import TrialSummary, summarise
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
-from smach_oracle.oracle.events import EventKind
-from smach_oracle.oracle.rates_file import write_learned
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.rates_file import write_learned
 
 from .plan import ExperimentError, write_json
 
@@ -21,27 +25,30 @@ RATES_FILE = 'rates.json'
 DROPPED = '.dropped'  # behind the name of a bag that does not count
 
 
-class Recorded(NamedTuple):
-    """One trial as its bag tells it."""
+class RecordedTrial(NamedTuple):
+    """One trial, from its bag."""
 
     summary: TrialSummary
-    learned: Optional[Mapping[str, Any]]  # at its end; None where it does not tell
+    learned: Optional[Mapping[str, Any]]  # at its end; None where the bag lacks it
 
 
-class Progress(NamedTuple):
+class JobProgress(NamedTuple):
     """How far a job is."""
 
-    done: List[Recorded]
+    done: List[RecordedTrial]
     lost: Dict[int, str]  # number of the trial, from 0: why
     dropped: Tuple[str, ...]  # names of the bags that were put aside
     next_trial: int  # number of the first trial that is neither done nor lost
 
 
-class JobRecords:
+class ReplicateRecords:
     """The folder of a job."""
 
     def __init__(self, folder: Path, first_seed: int, trials: int) -> None:
-        """Make the folder. Raises OSError."""
+        """Make the folder.
+
+        :raises OSError: where it cannot be made.
+        """
         self.folder = folder
         self.rates = folder / RATES_FILE
         self.truth = folder / TRUTH_FILE
@@ -50,10 +57,11 @@ class JobRecords:
         self._reader = EventReader()
         folder.mkdir(parents=True, exist_ok=True)
 
-    def settle(self) -> Progress:
-        """Look through the folder while nothing runs: put aside what is not complete, and prepare to go on.
+    def tidy_up(self) -> JobProgress:
+        """Put aside what is not complete, and prepare to go on; only while nothing runs.
 
-        Afterwards there are the bags and the truth of complete trials, and the rates as the last one left them.
+        Afterwards there are the bags and the truth of complete trials, and the rates as the last
+        one left them.
 
         :raises ExperimentError: where a bag is of another seed than its place says.
         :raises OSError: where a file cannot be moved or written.
@@ -61,14 +69,15 @@ class JobRecords:
         lost, truths = self._lost(), self._truths()
         numbers = [number for number in range(self._trials) if number not in lost]
         paths = self._bags()
-        done: List[Recorded] = []
+        done: List[RecordedTrial] = []
         while len(done) < min(len(paths), len(numbers)):
             recorded = self.read(paths[len(done)])
             seed = self._first_seed + numbers[len(done)]
             if recorded is None or not self._is_complete(recorded, seed, truths):
                 break
             if recorded.learned is None:
-                raise ExperimentError('{}: it does not tell what was learned'.format(paths[len(done)]))
+                raise ExperimentError('{}: it does not tell what was learned'.format(
+                    paths[len(done)]))
             done.append(recorded)
         dropped = paths[len(done):]
         for path in dropped:
@@ -77,10 +86,11 @@ class JobRecords:
         self._keep_lost({number: why for number, why in lost.items() if number < next_trial})
         self._keep_truths({self._first_seed + number for number in numbers[:len(done)]})
         self._restore_rates(done[-1].learned if done else None)
-        return Progress(done, self._lost(), tuple(os.path.basename(path) for path in dropped), next_trial)
+        return JobProgress(done, self._lost(), tuple(os.path.basename(path) for path in dropped),
+                           next_trial)
 
-    def read(self, path: str) -> Optional[Recorded]:
-        """What a bag tells of its trial; None where it is not to be read, or is not of one trial."""
+    def read(self, path: str) -> Optional[RecordedTrial]:
+        """The trial of a bag; None where the bag cannot be read, or is not of one trial."""
         try:
             content = self._reader.read(path)
         except BagError:
@@ -89,20 +99,24 @@ class JobRecords:
             return None
         summary = summarise(content.events, (path,))
         end = next((event for event in content.events if event.kind == EventKind.TRIAL_END), None)
-        learned = end.data.get('learned') if end is not None and isinstance(end.data, Mapping) else None
-        return Recorded(summary._replace(cause=content.causes.get(summary.trial_id)), learned)
+        learned = end.data.get('learned') if end is not None and isinstance(end.data,
+                                                                            Mapping) else None
+        return RecordedTrial(summary._replace(cause=content.causes.get(summary.trial_id)), learned)
 
-    def _is_complete(self, recorded: Recorded, seed: int, truths: Mapping[int, Any]) -> bool:
+    def _is_complete(self, recorded: RecordedTrial, seed: int, truths: Mapping[int, Any]) -> bool:
         summary = recorded.summary
-        if summary.ending in (Ending.UNFINISHED, Ending.PREEMPTED) or seed not in truths:
+        if summary.ending in (TrialEnding.UNFINISHED, TrialEnding.PREEMPTED) or seed not in truths:
             return False
         if summary.cause is not None and summary.cause.seed != seed:
             raise ExperimentError('{}: a trial of seed {} where seed {} is expected'.format(
                 summary.bags[0], summary.cause.seed, seed))
         return True
 
-    def lose(self, number: int, why: str) -> None:
-        """Note that a trial could not be run. Raises OSError."""
+    def mark_lost(self, number: int, why: str) -> None:
+        """Note that a trial could not be run.
+
+        :raises OSError: where it cannot be written.
+        """
         self._keep_lost({**self._lost(), number: why})
 
     def closed_bags(self) -> List[str]:
@@ -121,7 +135,10 @@ class JobRecords:
         if not path.exists():
             return {}
         try:
-            return {int(key): str(why) for key, why in json.loads(path.read_text(encoding='utf-8')).items()}
+            return {
+                int(key): str(why)
+                for key, why in json.loads(path.read_text(encoding='utf-8')).items()
+            }
         except (ValueError, AttributeError) as err:
             raise ExperimentError('{}: {}'.format(path, err)) from err
 
@@ -134,7 +151,7 @@ class JobRecords:
             raise ExperimentError(str(err)) from err
 
     def _keep_truths(self, seeds: Any) -> None:
-        """Leave the lines of these seeds alone: that of an interrupted trial must not stand for its next run."""
+        """Keep the lines of these seeds only: an interrupted trial has a line of its own later."""
         if not self.truth.exists():
             return
         lines = self.truth.read_text(encoding='utf-8').split('\n')

@@ -4,7 +4,7 @@ from types import FrameType
 from typing import Any, Dict, Optional
 
 
-class Interrupted(Exception):
+class StopRequested(Exception):
     """A signal asked to stop."""
 
     def __init__(self, signum: int) -> None:
@@ -12,11 +12,12 @@ class Interrupted(Exception):
         self.signum = signum
 
 
-class Interrupts:
-    """``with Interrupts() as interrupts:`` signals that ask to stop are noted there, for `check` to raise.
+class StopSignals:
+    """Notes signals that ask to stop, for `check` to raise: `with StopSignals() as signals`.
 
-    So they cannot tear apart the starting and the stopping of the jobs, and the second Ctrl-C of somebody impatient
-    does not leave robots running that the first one was about to stop. A hangup that nohup has ignored stays ignored.
+    So they cannot tear apart the starting and the stopping of the jobs, and the second Ctrl-C of
+    somebody impatient does not leave robots running that the first one was about to stop. A hangup
+    that nohup has ignored stays ignored.
     """
 
     SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -25,7 +26,7 @@ class Interrupts:
         self._came: Optional[int] = None
         self._before: Dict[int, Any] = {}
 
-    def __enter__(self) -> 'Interrupts':
+    def __enter__(self) -> 'StopSignals':
         hangup_ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         self._before = {signum: signal.signal(signum, self._note) for signum in self.SIGNALS
                         if not (signum == signal.SIGHUP and hangup_ignored)}
@@ -39,6 +40,6 @@ class Interrupts:
         self._came = self._came or signum
 
     def check(self) -> None:
-        """Raise Interrupted if a signal came."""
+        """Raise StopRequested if a signal came."""
         if self._came:
-            raise Interrupted(self._came)
+            raise StopRequested(self._came)

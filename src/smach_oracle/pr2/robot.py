@@ -1,19 +1,32 @@
-"""What the PR2 offers its own subsystems: encoders, controllers, a camera. Nothing here knows the truth of the world.
+"""What the PR2 offers its own subsystems: encoders, controllers, a camera; never the truth.
 
-Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the world's DirectRobot,
-which runs in one process. Lengths in m, angles in rad, times in s; frames as in REP 105 and REP 120.
+Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the
+world's DirectRobot, which runs in one process. Lengths in m, angles in rad, times in s; frames as
+in REP 105 and REP 120.
 """
 from typing import Dict, List, NamedTuple, Protocol, Sequence
 
 import numpy as np
 
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.transforms import VectorLike
+
 ARMS = ('left', 'right')
 ARM_JOINTS: Dict[str, List[str]] = {
-    arm: [arm[0] + name for name in ('_shoulder_pan_joint', '_shoulder_lift_joint', '_upper_arm_roll_joint',
-                                     '_elbow_flex_joint', '_forearm_roll_joint', '_wrist_flex_joint',
-                                     '_wrist_roll_joint')] for arm in ARMS}
+    arm: [
+        arm[0] + name for name in ('_shoulder_pan_joint', '_shoulder_lift_joint',
+                                   '_upper_arm_roll_joint', '_elbow_flex_joint',
+                                   '_forearm_roll_joint', '_wrist_flex_joint', '_wrist_roll_joint')
+    ]
+    for arm in ARMS
+}
+# a finger's position is its travel from its closed place, m: the gap between the tips is their sum
+FINGER_JOINTS: Dict[str, List[str]] = {
+    arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS
+}
 TOOL_FRAME = {arm: arm[0] + '_gripper_tool_frame' for arm in ARMS}
-BASE_FRAME = 'base_footprint'  # on the floor below the middle of the base; the frame subsystems think in
+# on the floor below the middle of the base; the frame subsystems think in
+BASE_FRAME = 'base_footprint'
 BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
 ODOM_FRAME = 'odom_combined'
 GOAL_FRAMES = (BASE_FRAME, 'base_link', ODOM_FRAME)  # in which goals may be given
@@ -22,7 +35,7 @@ GRIPPER_OPEN = 0.09  # m between the finger tips
 
 
 class RobotError(Exception):
-    """A controller refused or missed a command; the text says which, what was asked and what came of it."""
+    """A controller refused or missed a command; the text names it, the command and the outcome."""
 
 
 class GripperState(NamedTuple):
@@ -30,18 +43,9 @@ class GripperState(NamedTuple):
 
     position: float  # m between the finger tips
     effort: float  # N
-    stalled: bool  # it stopped before the position that it was sent to: it holds something, or is blocked
+    # it stopped before the position that it was sent to: it holds something, or is blocked
+    stalled: bool
     reached: bool
-
-
-class Frame(NamedTuple):
-    """What the head camera saw at one moment."""
-
-    stamp: float  # s, ROS time
-    colour: np.ndarray  # (h, w, 3) uint8, RGB
-    depth: np.ndarray  # (h, w) float32, m along the optical axis, registered to colour; NaN where nothing was measured
-    intrinsics: np.ndarray  # (3, 3)
-    base_from_camera: np.ndarray  # 4x4, BASE_FRAME from CAMERA_FRAME (z forward, x right, y down)
 
 
 class Robot(Protocol):
@@ -58,26 +62,37 @@ class Robot(Protocol):
 
         :param positions: (n, len(joints)), the points after the present one.
         :param times: (n,), s from the start, increasing.
-        :raises RobotError: where the controller refuses it, or a joint ends or strays too far from it.
+        :raises RobotError: where the controller refuses it, or a joint ends or strays too far from
+            it.
         """
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
         """Open or close a gripper to `position` m between the tips, with at most `max_effort` N.
 
-        :raises RobotError: where it is refused or does not come to its end; to stall at something is no error.
+        :raises RobotError: where it is refused or does not come to its end; to stall at something
+            is no error.
         """
 
     def torso(self, height: float) -> None:
-        """Lift the torso joint to `height` m. Raises RobotError."""
+        """Lift the torso joint to `height` m.
 
-    def look_at(self, point: Sequence[float]) -> None:
-        """Point the camera's optical axis at a point (3,) of BASE_FRAME. Raises RobotError."""
+        :raises RobotError: where it does not get there.
+        """
+
+    def look_at(self, point: VectorLike) -> None:
+        """Point the camera's optical axis at a point (3,) of BASE_FRAME.
+
+        :raises RobotError: where the head does not get there.
+        """
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
         """Drive the base to a pose (4x4) in ODOM_FRAME, straight and blindly.
 
-        :raises RobotError: where it ends elsewhere, as far as odometry can tell.
+        :raises RobotError: where it ends elsewhere, by its odometry.
         """
 
-    def see(self) -> Frame:
-        """A fresh frame of the head camera. Raises RobotError where none comes."""
+    def see(self) -> CameraImage:
+        """A fresh image of the head camera.
+
+        :raises RobotError: where none comes.
+        """

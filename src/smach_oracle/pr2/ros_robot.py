@@ -2,32 +2,45 @@
 import math
 import threading
 import time
-from typing import Any, Dict, Optional, Sequence
+from typing import Dict, Optional, Sequence
 
+import genpy
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import (FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult,
-                              GripperCommandAction, GripperCommandGoal, PointHeadAction, PointHeadGoal,
-                              SingleJointPositionAction, SingleJointPositionGoal)
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ...geometry.transforms import quaternion
-from ...ros.goal_link import GoalEvent, GoalLink, lost
-from .interface import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, Frame, GripperState, RobotError
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    GripperCommandAction,
+    GripperCommandGoal,
+    PointHeadAction,
+    PointHeadGoal,
+    SingleJointPositionAction,
+    SingleJointPositionGoal,
+)
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.transforms import VectorLike, quaternion
+from smach_oracle.ros.goal_link import GoalEvent, GoalLink, SentGoal, lost
+
+from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, GripperState, RobotError
 from .ros_senses import RosSenses
 
 NO_SNAPSHOT = 'none'
 
 
 class RosRobot:
-    """The Robot protocol over ROS. All names are relative to the node's namespace, and can be remapped.
+    """The Robot protocol over ROS.
 
-    :param snapshot: service smach_oracle/Snapshot of a simulated world, which gives joint states, transforms and frames
-        with one stamp; NO_SNAPSHOT: whatever comes next, as on a real robot.
+    All names are relative to the node's namespace, and can be remapped.
+
+    :param snapshot: service smach_oracle/Snapshot of a simulated world, which gives joint states,
+        transforms and images with one stamp; NO_SNAPSHOT: whatever comes next, as on a real robot.
     :param timeout_s: wall s that the robot may be silent, or not there, before a call fails.
     """
 
@@ -36,7 +49,8 @@ class RosRobot:
         self._senses = RosSenses('' if snapshot == NO_SNAPSHOT else snapshot, timeout_s)
         self._links: Dict[str, GoalLink] = {}
         for side in (arm[0] for arm in ARMS):
-            self._link(side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction)
+            self._link(side + '_arm_controller/follow_joint_trajectory',
+                       FollowJointTrajectoryAction)
             self._link(side + '_gripper_controller/gripper_action', GripperCommandAction)
         self._link('head_traj_controller/point_head_action', PointHeadAction)
         self._link('torso_controller/position_joint_action', SingleJointPositionAction)
@@ -44,11 +58,14 @@ class RosRobot:
         self._aborted = threading.Event()
         self._calls = threading.RLock()
 
-    def _link(self, name: str, spec: Any) -> None:
+    def _link(self, name: str, spec: type) -> None:
         self._links[name] = GoalLink(rospy.resolve_name(name), spec)
 
     def abort(self) -> None:
-        """Stop what moves now, and refuse all further calls with RobotError until resume(). From any thread."""
+        """Stop what moves now, and refuse all further calls until resume(); from any thread.
+
+        Calls raise RobotError meanwhile.
+        """
         self._aborted.set()
 
     def resume(self) -> None:
@@ -56,16 +73,22 @@ class RosRobot:
         self._aborted.clear()
 
     def joints(self) -> Dict[str, float]:
-        """See Robot. Raises RobotError where no joint states come."""
+        """See Robot.
+
+        :raises RobotError: where no joint states come.
+        """
         self._check_allowed()
         return self._senses.joints()
 
     def odom_from_base(self) -> np.ndarray:
-        """See Robot. Raises RobotError where no transform comes."""
+        """See Robot.
+
+        :raises RobotError: where no transform comes.
+        """
         self._check_allowed()
         return self._senses.transform(ODOM_FRAME, BASE_FRAME)
 
-    def see(self) -> Frame:
+    def see(self) -> CameraImage:
         """See Robot."""
         self._check_allowed()
         return self._senses.see(BASE_FRAME, CAMERA_FRAME)
@@ -73,7 +96,8 @@ class RosRobot:
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
         """See Robot; all of the joints belong to one arm.
 
-        :raises RobotError: for other joints, for shapes that do not fit, and where the controller refuses or fails.
+        :raises RobotError: for other joints, for shapes that do not fit, and where the controller
+            refuses or fails.
         """
         arm = next((arm for arm in ARMS if set(joints) <= set(ARM_JOINTS[arm])), '')
         if not arm or not len(joints):
@@ -83,45 +107,61 @@ class RosRobot:
         if shape != (len(times), len(joints)):
             raise RobotError('follow: positions {} do not fit {} times and {} joints'.format(
                 shape, len(times), len(joints)))
-        points = [JointTrajectoryPoint(positions=list(map(float, point)), time_from_start=_duration(moment))
-                  for point, moment in zip(positions, times)]
-        goal = FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=list(joints), points=points))
+        points = [
+            JointTrajectoryPoint(positions=list(map(float, point)),
+                                 time_from_start=_duration(moment))
+            for point, moment in zip(positions, times)
+        ]
+        goal = FollowJointTrajectoryGoal(
+            trajectory=JointTrajectory(joint_names=list(joints), points=points))
         result = self._do(arm[0] + '_arm_controller/follow_joint_trajectory', goal, arm + ' arm')
         if result.error_code != FollowJointTrajectoryResult.SUCCESSFUL:
-            raise RobotError('{} arm: error {} {}'.format(arm, result.error_code, result.error_string))
+            raise RobotError('{} arm: error {} {}'.format(arm, result.error_code,
+                                                          result.error_string))
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
-        """See Robot. A gripper that stalls has not failed; RobotError means that it did not do what it was told."""
+        """See Robot; a gripper that stalls has not failed.
+
+        :raises RobotError: where it did not carry out the command.
+        """
         if arm not in ARMS:
             raise RobotError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = float(position), float(max_effort)
-        result = self._do(arm[0] + '_gripper_controller/gripper_action', goal, arm + ' gripper', stalls=True)
+        result = self._do(arm[0] + '_gripper_controller/gripper_action', goal, arm + ' gripper',
+                          stalls=True)
         return GripperState(result.position, result.effort, result.stalled, result.reached_goal)
 
     def torso(self, height: float) -> None:
         """See Robot."""
-        self._do('torso_controller/position_joint_action', SingleJointPositionGoal(position=float(height)), 'torso')
+        self._do('torso_controller/position_joint_action',
+                 SingleJointPositionGoal(position=float(height)), 'torso')
 
-    def look_at(self, point: Sequence[float]) -> None:
+    def look_at(self, point: VectorLike) -> None:
         """See Robot."""
         target = PointStamped(Header(frame_id=BASE_FRAME), Point(*map(float, point)))
-        goal = PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=CAMERA_FRAME)
+        goal = PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0),
+                             pointing_frame=CAMERA_FRAME)
         self._do('head_traj_controller/point_head_action', goal, 'head')
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
-        """See Robot. Raises RobotError for a goal that is no finite 4x4, too."""
+        """See Robot.
+
+        :raises RobotError: also for a goal that is not a finite 4x4.
+        """
         if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
             raise RobotError('drive: the goal is no finite 4x4 pose')
         place = Point(*odom_from_goal[:3, 3].tolist())
         pose = Pose(place, Quaternion(*quaternion(odom_from_goal).tolist()))
         self._do('move_base', MoveBaseGoal(PoseStamped(Header(frame_id=ODOM_FRAME), pose)), 'base')
 
-    def _do(self, name: str, goal: Any, what: str, stalls: bool = False) -> Any:
+    def _do(self, name: str, goal: genpy.Message, what: str,
+            stalls: bool = False) -> genpy.Message:
         """Send a goal and wait for its result.
 
-        :param stalls: a goal that was aborted has a result all the same (a gripper that holds something).
-        :raises RobotError: where nobody takes it, it fails, or abort() is called.
+        :param stalls: a goal that was aborted has a result all the same (a gripper that holds
+            something).
+        :raises RobotError: where no controller takes it, it fails, or abort() is called.
         """
         with self._calls:
             link = self._ready(name, what)
@@ -155,23 +195,26 @@ class RosRobot:
             raise RobotError('the robot was told to stop')
 
     @staticmethod
-    def _check(link: GoalLink, sent: Any, what: str) -> None:
+    def _check(link: GoalLink, sent: SentGoal, what: str) -> None:
         if rospy.is_shutdown():
             raise RobotError('{}: this node is shutting down'.format(what))
         if not link.alive() or sent.unheard(time.monotonic()):
             raise RobotError('{}: the controller at {} has gone'.format(what, link.name))
 
     @staticmethod
-    def _result(event: GoalEvent, what: str, stalls: bool) -> Any:
-        ended_well = event.status == GoalStatus.SUCCEEDED or (stalls and event.status == GoalStatus.ABORTED)
+    def _result(event: GoalEvent, what: str, stalls: bool) -> genpy.Message:
+        ended_well = event.status == GoalStatus.SUCCEEDED or (stalls and event.status
+                                                              == GoalStatus.ABORTED)
         if ended_well and event.result is not None:
             return event.result
         if lost(event):
             raise RobotError('{}: the controller was restarted'.format(what))
         text = event.text or getattr(event.result, 'error_string', '')
-        raise RobotError('{}: {}{}'.format(what, {
-            GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted', GoalStatus.RECALLED: 'preempted'}.get(
-                event.status, 'failed'), ': ' + text if text else ''))
+        raise RobotError('{}: {}{}'.format(
+            what, {
+                GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted',
+                GoalStatus.RECALLED: 'preempted'
+            }.get(event.status, 'failed'), ': ' + text if text else ''))
 
 
 def _duration(seconds: float) -> rospy.Duration:

@@ -1,4 +1,4 @@
-"""Driving a hand by velocities, as a person at a joystick does: towards a place, watching where it is."""
+"""Drives a hand by velocities, as a person at a joystick does: towards a place, watching it."""
 from typing import NamedTuple, Protocol, Tuple
 
 import numpy as np
@@ -11,7 +11,7 @@ _EASE_S = 30.0  # within which an arm that sways on comes to its ease, or is tak
 _AT_EASE = 8  # periods in which the hand hardly moves any more
 
 
-class Grip(NamedTuple):
+class GripResult(NamedTuple):
     """How a motion of the gripper ended."""
 
     gap: float  # m between the tips
@@ -33,15 +33,15 @@ class DrivenHand(Protocol):
         `turn_freely`: only its linear part counts.
         """
 
-    def grip(self, gap: float, effort: float) -> Grip:
-        """Move the gripper to `gap` m between its tips, with at most `effort` N, and wait for its end."""
+    def grip(self, gap: float, effort: float) -> GripResult:
+        """Move the gripper to `gap` m between its tips, with at most `effort` N, until it rests."""
 
 
-class Stuck(Exception):
-    """The hand does not get to where it shall; the text says how far it got and what stopped it."""
+class StuckError(Exception):
+    """The hand does not get there; the text says how far it got and what stopped it."""
 
 
-class Pilot:
+class HandDriver:
     """Drives one hand."""
 
     def __init__(self, hand: DrivenHand, speed: float = 0.22, turn: float = 0.9) -> None:
@@ -50,12 +50,13 @@ class Pilot:
         self._speed = speed
         self._turn = turn
 
-    def go(self, goal: np.ndarray, share: float = 1.0, near: Tuple[float, float] = (0.01, 0.05)) -> None:
+    def go(self, goal: np.ndarray, share: float = 1.0, near: Tuple[float,
+                                                                   float] = (0.01, 0.05)) -> None:
         """Drive the tool straight to a pose (4x4, base_footprint from tool).
 
         :param share: of the speed of free motions.
         :param near: m and rad from the goal that will do.
-        :raises Stuck: where it does not come nearer any more.
+        :raises StuckError: where it does not come nearer any more.
         """
         best, since, limit = np.inf, 0, ''
         while True:
@@ -66,12 +67,16 @@ class Pilot:
             left = distance + 0.2 * angle
             best, since = (left, 0) if left < best - 5e-4 else (best, since + 1)
             if since > _PATIENCE:
-                raise Stuck('the hand stays {:.0f} cm and {:.0f} degrees away{}'.format(
+                raise StuckError('the hand stays {:.0f} cm and {:.0f} degrees away{}'.format(
                     100 * distance, np.degrees(angle), ': ' + limit if limit else ''))
-            limit = self.hand.move(np.concatenate([way, turn]) / self._time_for(distance, angle, share)) or limit
+            limit = self.hand.move(
+                np.concatenate([way, turn]) / self._time_for(distance, angle, share)) or limit
 
     def come_to(self, point: np.ndarray, near: float = 0.03) -> None:
-        """Drive the tool to a point (3,) m, and let the arm come to its ease there. Raises Stuck."""
+        """Drive the tool to a point (3,) m, base_footprint, and let the arm turn to its posture.
+
+        :raises StuckError: where it does not come as near as `near` m.
+        """
         before = self.hand.tool()
         still, limit = 0, ''
         for _ in range(int(_EASE_S / self.hand.period)):
@@ -79,31 +84,40 @@ class Pilot:
                 break
             way = point - before[:3, 3]
             velocity = way / self._time_for(float(np.linalg.norm(way)), 0.0, 1.0)
-            limit = self.hand.move(np.concatenate([velocity, np.zeros(3)]), turn_freely=True) or limit
+            limit = self.hand.move(np.concatenate([velocity, np.zeros(3)]),
+                                   turn_freely=True) or limit
             now = self.hand.tool()
             moved, turned = (float(np.linalg.norm(part)) for part in error(before, now))
             still = still + 1 if moved < 5e-4 and turned < 4e-3 else 0
             before = now
         distance = float(np.linalg.norm(point - before[:3, 3]))
         if distance > near:
-            raise Stuck('the hand stays {:.0f} cm away{}'.format(100 * distance, ': ' + limit if limit else ''))
+            raise StuckError('the hand stays {:.0f} cm away{}'.format(100 * distance,
+                                                                 ': ' + limit if limit else ''))
 
     def shift(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, share: float = 1.0) -> None:
-        """Drive by so many m along the axes of base_footprint. Raises Stuck."""
+        """Drive by so many m along the axes of base_footprint.
+
+        :raises StuckError: where it does not get there.
+        """
         goal = self.hand.tool().copy()
         goal[:3, 3] += (x, y, z)
         self.go(goal, share)
 
     def back(self, distance: float, share: float = 0.5) -> None:
-        """Draw the hand back by so many m, along its own axis. Raises Stuck."""
+        """Draw the hand back by so many m, along its own axis.
+
+        :raises StuckError: where it does not get there.
+        """
         tool = self.hand.tool()
-        self.shift(*(-distance * tool[:3, 0]), share=share)
+        x, y, z = -distance * tool[:3, 0]
+        self.shift(x, y, z, share=share)
 
     def open(self, gap: float = 0.085) -> None:
         """Open the gripper to `gap` m."""
         self.hand.grip(gap, 40.0)
 
-    def close(self, effort: float = 100.0) -> Grip:
+    def close(self, effort: float = 100.0) -> GripResult:
         """Close it on whatever there is, with at most `effort` N."""
         return self.hand.grip(0.0, effort)
 
@@ -113,11 +127,11 @@ class Pilot:
             self.hand.move(np.zeros(6))
 
     def _time_for(self, distance: float, angle: float, share: float) -> float:
-        return max(distance / (self._speed * share), angle / (self._turn * share), self.hand.period / _FINE)
+        return max(distance / (self._speed * share), angle / (self._turn * share),
+                   self.hand.period / _FINE)
 
 
 def error(tool: np.ndarray, goal: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """What is missing from one pose (4x4) to another: m (3,) and rad (3,), along the axes of their base."""
+    """The way from one pose (4x4) to another: m (3,) and rad (3,), along the axes of their base."""
     turned = goal @ inverse(tool)
     return goal[:3, 3] - tool[:3, 3], rotation_vector(turned)
-

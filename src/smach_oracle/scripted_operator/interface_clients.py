@@ -1,4 +1,4 @@
-"""The services of the two interfaces, as the scripted operator calls them."""
+"""Clients of the two interfaces' services."""
 import time
 from typing import Callable, Sequence, TypeVar
 
@@ -8,18 +8,25 @@ from geometry_msgs.msg import Point32
 from sensor_msgs.msg import RegionOfInterest
 
 from smach_oracle.msg import SegmentStroke
-from smach_oracle.srv import (FinishInterface, GiveUpInterface, SegmentObject, SegmentObjectRequest, UseFrame,
-                              UseFrameRequest)
+from smach_oracle.srv import (
+    FinishInterface,
+    GiveUpInterface,
+    SegmentObject,
+    SegmentObjectRequest,
+    UseFrame,
+    UseFrameRequest,
+    UseFrameResponse,
+)
 
-from .showing import Line, Marked, Region
-from .topic_hand import Interrupted
+from .showing import MarkedResult, OperatorStroke, Region
+from .topic_hand import GoalEndedError
 
 _RETRY_S = 0.05
 T = TypeVar('T')
 
 
-class Settling:
-    """How a person ends the work with an interface."""
+class FinishClient:
+    """Ends the goal of an interface, as a person does."""
 
     def __init__(self, interface: str) -> None:
         self._finish = rospy.ServiceProxy(interface + '/finish', FinishInterface)
@@ -31,39 +38,48 @@ class Settling:
         return '' if answer.ok else answer.message
 
     def give_up(self, text: str) -> None:
-        """End it without a result; one that has ended already is left."""
+        """End it without a result; does nothing where it has ended already."""
         self._give_up(text=text)
 
 
-class Drawing:
+class PerceptionClient:
     """The perception interface."""
 
     def __init__(self, interface: str) -> None:
         self._segment = rospy.ServiceProxy(interface + '/segment', SegmentObject)
         self._use_frame = rospy.ServiceProxy(interface + '/use_frame', UseFrame)
 
-    def take_frame(self, limit_s: float) -> None:
-        """Have a fresh frame shown, waiting at most so long (wall time) for the interface to begin.
+    def take_image(self, limit_s: float) -> None:
+        """Have a fresh image shown, waiting at most so long (wall time) for the interface to begin.
 
-        :raises Interrupted: where it does not, or gets no frame.
+        :raises GoalEndedError: where it does not, or gets no image.
         """
-        answer = until(lambda: self._use_frame(UseFrameRequest.FRESH), lambda reply: reply.ok, limit_s)
-        if not answer.ok:
-            raise Interrupted('the perception interface shows nothing: ' + answer.message)
+        def use_fresh() -> UseFrameResponse:
+            return self._use_frame(UseFrameRequest.FRESH)
 
-    def segment(self, region: Region, strokes: Sequence[Line]) -> Marked:
-        """See showing.Segment."""
+        def shows(response: UseFrameResponse) -> bool:
+            return bool(response.ok)
+
+        answer = until(use_fresh, shows, limit_s)
+        if not answer.ok:
+            raise GoalEndedError('the perception interface shows nothing: ' + answer.message)
+
+    def segment(self, region: Region, strokes: Sequence[OperatorStroke]) -> MarkedResult:
+        """See showing.SegmentCall."""
         request = SegmentObjectRequest(region=RegionOfInterest(
             x_offset=region[0], y_offset=region[1], width=region[2], height=region[3]))
-        request.strokes = [SegmentStroke(line.foreground, [Point32(x, y, 0.0) for x, y in line.points], 0.0)
-                           for line in strokes]
+        request.strokes = [
+            SegmentStroke(line.foreground, [Point32(x, y, 0.0) for x, y in line.points], 0.0)
+            for line in strokes
+        ]
         answer = self._segment(request)
         at, size = answer.object.pose.position, answer.size
-        return Marked(answer.ok, answer.message, np.array([at.x, at.y, at.z]), np.array([size.x, size.y, size.z]))
+        return MarkedResult(answer.ok, answer.message, np.array([at.x, at.y, at.z]),
+                            np.array([size.x, size.y, size.z]))
 
 
 def until(call: Callable[[], T], holds: Callable[[T], bool], limit_s: float) -> T:
-    """Call until the answer is right, at most so long in wall time; the last answer."""
+    """Call until the answer holds, at most so long in wall time; returns the last answer."""
     until_s = time.monotonic() + limit_s
     answer = call()
     while not holds(answer) and time.monotonic() < until_s and not rospy.is_shutdown():

@@ -1,4 +1,4 @@
-"""What the scripted operator does with a hand in place of the robot: take a thing, put it down, hand it over."""
+"""Work by hand in place of the robot: take a thing, put it down."""
 from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -6,11 +6,13 @@ import numpy as np
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.transforms import from_rpy, transform
 
-from .pilot import Pilot, Stuck
-from .sight import Seen, Sight
+from .hand_driver import HandDriver, StuckError
+from .true_scene import TrueBody, TrueScene
 
-READY = {'right': np.array([0.52, -0.22, 1.0]), 'left': np.array([0.52, 0.22, 1.0])}  # m, before the chest
-SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}  # x, y in base_footprint, m
+# m, before the chest
+READY = {'right': np.array([0.52, -0.22, 1.0]), 'left': np.array([0.52, 0.22, 1.0])}
+# x, y in base_footprint, m
+SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}
 WIDEST = 0.08  # m between the tips that a thing may take up
 BEFORE = 0.12  # m before a thing, from where the hand goes straight
 LIFT = 0.12  # m
@@ -22,77 +24,80 @@ _OFF_SHELF = 0.03  # m that a thing is lifted inside a shelf
 _SQUEEZE = 90.0  # N: the robot, which grips with less, may have lost it before
 OUT = 0.28  # m straight back out of a shelf
 
-Look = Callable[[], Sight]
+ReadScene = Callable[[], TrueScene]
 
 
-class Failed(Exception):
-    """It did not work; the text says what the eye saw."""
+class ManoeuvreError(Exception):
+    """It did not work; the text says what came of it."""
 
 
 class Attempt(NamedTuple):
     """One try at a state's work by hand."""
 
-    pilot: Pilot
-    look: Look
+    driver: HandDriver
+    read_scene: ReadScene
     number: int  # of tries before this one
-    slip: Callable[[], np.ndarray]  # (3,) m, by how much the eye misjudges a place
+    slip: Callable[[], np.ndarray]  # (3,) m, by how much a person misjudges a place
 
 
-def pick(attempt: Attempt, target: Callable[[Sight], Optional[Seen]]) -> None:
+def pick(attempt: Attempt, target: Callable[[TrueScene], Optional[TrueBody]]) -> None:
     """Take a thing and lift it.
 
-    :param target: finds it in what is seen.
-    :raises Failed, Stuck: where it is not in the hand in the end.
+    :param target: finds it in the scene.
+    :raises ManoeuvreError: where it is not in the hand in the end.
+    :raises StuckError: where the hand does not get there.
     """
-    pilot, arm = attempt.pilot, attempt.pilot.hand.arm
-    sight = attempt.look()
-    if sight.held_by(arm) is None:
-        thing = target(sight)
+    driver, arm = attempt.driver, attempt.driver.hand.arm
+    scene = attempt.read_scene()
+    if scene.held_by(arm) is None:
+        thing = target(scene)
         if thing is None:
-            raise Failed('there is nothing to take')
-        _fetch(attempt, sight, thing)
-    pilot.shift(z=LIFT, share=0.5)
-    pilot.rest(10)
-    if attempt.look().held_by(arm) is None:
-        raise Failed('it slipped out of the hand')
+            raise ManoeuvreError('there is nothing to take')
+        _fetch(attempt, scene, thing)
+    driver.shift(z=LIFT, share=0.5)
+    driver.rest(10)
+    if attempt.read_scene().held_by(arm) is None:
+        raise ManoeuvreError('it slipped out of the hand')
 
 
-def _fetch(attempt: Attempt, sight: Sight, thing: Seen) -> None:
-    pilot = attempt.pilot
-    ways = grasps(thing.box, [other.box for other in sight.movable() if other.name != thing.name], pilot.hand.arm)
+def _fetch(attempt: Attempt, scene: TrueScene, thing: TrueBody) -> None:
+    driver = attempt.driver
+    ways = grasps(thing.box, [other.box for other in scene.movable() if other.name != thing.name],
+                  driver.hand.arm)
     if not ways:
-        raise Failed('{} is too wide for the hand'.format(thing.name))
+        raise ManoeuvreError('{} is too wide for the hand'.format(thing.name))
     grasp = ways[attempt.number % len(ways)]
     grasp[:3, 3] += attempt.slip()
-    pilot.open()
-    come_out(pilot, thing.top)
+    driver.open()
+    come_out(driver, thing.top)
     before = transform(grasp[:3, 3] - BEFORE * grasp[:3, 0], grasp[:3, :3])
     above = before.copy()
     above[2, 3] = max(above[2, 3], thing.top + 0.10)
-    pilot.go(above, near=(0.04, 0.2))
-    pilot.go(before)
-    pilot.go(grasp, share=0.4, near=(0.006, 0.05))
-    grip = pilot.close()
-    if not grip.stalled or attempt.look().held_by(pilot.hand.arm) is None:
-        pilot.open()
-        pilot.back(BEFORE)
-        raise Failed('the hand closed on nothing')
+    driver.go(above, near=(0.04, 0.2))
+    driver.go(before)
+    driver.go(grasp, share=0.4, near=(0.006, 0.05))
+    grip = driver.close()
+    if not grip.stalled or attempt.read_scene().held_by(driver.hand.arm) is None:
+        driver.open()
+        driver.back(BEFORE)
+        raise ManoeuvreError('the hand closed on nothing')
 
 
-def come_out(pilot: Pilot, height: float) -> None:
-    """Take the hand out of whatever it is among: back, up over `height` m, and before the robot's chest."""
-    tool = pilot.hand.tool()
+def come_out(driver: HandDriver, height: float) -> None:
+    """Take the hand out from among things: back, up over `height` m, and before the chest."""
+    tool = driver.hand.tool()
     if tool[0, 3] > 0.45 and tool[2, 3] < height + 0.12:
-        _as_far_as_it_goes(lambda: pilot.back(0.10))
-        _as_far_as_it_goes(lambda: pilot.shift(z=height + 0.15 - tool[2, 3]))
+        _as_far_as_it_goes(lambda: driver.back(0.10))
+        _as_far_as_it_goes(lambda: driver.shift(z=height + 0.15 - tool[2, 3]))
     elif tool[2, 3] < height + 0.05:
-        _as_far_as_it_goes(lambda: pilot.shift(z=height + 0.10 - tool[2, 3]))
-    pilot.come_to(READY[pilot.hand.arm] + [0.0, 0.0, max(0.0, height + 0.1 - READY[pilot.hand.arm][2])])
+        _as_far_as_it_goes(lambda: driver.shift(z=height + 0.10 - tool[2, 3]))
+    driver.come_to(READY[driver.hand.arm] +
+                   [0.0, 0.0, max(0.0, height + 0.1 - READY[driver.hand.arm][2])])
 
 
 def grasps(thing: UprightBox, others: List[UprightBox], arm: str,
            pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
-    """Poses (4x4, base_footprint from tool) from which to take a thing, the most promising first."""
+    """Poses (4x4, base_footprint from tool) from which to take a thing, most promising first."""
     straight = float(np.arctan2(*(thing.centre[:2] - SHOULDER[arm])[::-1]))
     found = []
     for order, (pitch, turn) in enumerate((pitch, turn) for pitch in pitches for turn in _TURNS):
@@ -103,9 +108,10 @@ def grasps(thing: UprightBox, others: List[UprightBox], arm: str,
         height = min(max(thing.centre[2], low + 0.04 + 0.03 * np.sin(pitch)), high - 0.015)
         ahead = min(0.012, thing.narrow / 3)
         pose[:3, 3] = thing.centre[:2].tolist() + [height]
-        pose[:2, 3] += ahead * pose[:2, 0] / max(np.linalg.norm(pose[:2, 0]), 0.2)
+        pose[:2, 3] += ahead * pose[:2, 0] / max(float(np.linalg.norm(pose[:2, 0])), 0.2)
         crowded = sum(max(0.0, CLEAR_OF - _beside(pose, other)) for other in others)
-        found.append((20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - pitches[0]), order, pose))
+        found.append((20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - pitches[0]),
+                      order, pose))
     return [pose for _, _, pose in sorted(found, key=lambda item: item[:2])]
 
 
@@ -118,7 +124,10 @@ def width_across(thing: UprightBox, heading: float) -> float:
 
 
 def _beside(pose: np.ndarray, other: UprightBox) -> float:
-    """m from another thing's edge to the line along which the hand comes, in the plane; large behind the target."""
+    """m, in the plane, from another thing's edge to the line along which the hand comes.
+
+    Large for things behind the target.
+    """
     way = pose[:2, 0] / np.linalg.norm(pose[:2, 0])
     offset = other.centre[:2] - pose[:2, 3]
     along = offset @ way
@@ -130,63 +139,66 @@ def _beside(pose: np.ndarray, other: UprightBox) -> float:
 def put_down(attempt: Attempt, place: np.ndarray) -> None:
     """Put what the hand holds down upright.
 
-    :param place: (3,) m, where its centre shall be, in base_footprint; it comes to stand on what is below.
-    :raises Failed, Stuck: where it does not stand there in the end.
+    :param place: (3,) m, where its centre shall be, in base_footprint; it comes to stand on what is
+        below.
+    :raises ManoeuvreError: where it does not stand there in the end.
+    :raises StuckError: where the hand does not get there.
     """
-    pilot, arm = attempt.pilot, attempt.pilot.hand.arm
-    thing = attempt.look().held_by(arm)
+    driver, arm = attempt.driver, attempt.driver.hand.arm
+    thing = attempt.read_scene().held_by(arm)
     if thing is None:
-        raise Failed('the hand holds nothing')
+        raise ManoeuvreError('the hand holds nothing')
     carry(attempt, thing, place + [0.0, 0.0, 0.10])
     thing = _in_hand(attempt, arm)
-    support = attempt.look().support_below(thing)
+    support = attempt.read_scene().support_below(thing)
     down = thing.bottom - (support.top if support is not None else place[2] - thing.size[2] / 2)
     offset = (place - thing.centre)[:2] + attempt.slip()[:2]
-    pilot.shift(offset[0], offset[1], share=0.5)
-    _as_far_as_it_goes(lambda: pilot.shift(z=-down + 0.004, share=0.3))
-    let_go(pilot)
-    left = attempt.look().bodies.get(thing.name)
+    driver.shift(offset[0], offset[1], share=0.5)
+    _as_far_as_it_goes(lambda: driver.shift(z=-down + 0.004, share=0.3))
+    let_go(driver)
+    left = attempt.read_scene().bodies.get(thing.name)
     if left is None:
-        raise Failed('{} is gone'.format(thing.name))
+        raise ManoeuvreError('{} is gone'.format(thing.name))
     _check_stands(left, place)
 
 
-def carry(attempt: Attempt, thing: Seen, centre: np.ndarray) -> None:
-    """Carry a thing until its centre is at (3,) m: up, across, the hand turning as is natural for the arm.
+def carry(attempt: Attempt, thing: TrueBody, centre: np.ndarray) -> None:
+    """Carry a thing until its centre is at (3,) m: up, then across, turning with the arm.
 
-    :raises Failed, Stuck: where it is lost, or the hand does not get there.
+    :raises ManoeuvreError: where it is lost, or the hand does not get there.
+    :raises StuckError: where the hand does not get there.
     """
-    pilot, arm = attempt.pilot, attempt.pilot.hand.arm
+    driver, arm = attempt.driver, attempt.driver.hand.arm
     rise = centre[2] - thing.centre[2]
     if rise > 0.02:
-        pilot.shift(z=rise, share=0.6)
-    tool, now = pilot.hand.tool(), _in_hand(attempt, arm).centre
+        driver.shift(z=rise, share=0.6)
+    tool, now = driver.hand.tool(), _in_hand(attempt, arm).centre
     turn = _heading(centre, arm) - _heading(now, arm)
     goals = tuple(_carried(tool, now, centre, part * turn) for part in (1.0, 0.5, 0.0))
-    _first_that_goes(pilot, goals)
+    _first_that_goes(driver, goals)
     _in_hand(attempt, arm)
 
 
-def let_go(pilot: Pilot) -> None:
-    """Open the gripper, and draw the hand back and up. Raises Stuck."""
-    pilot.open()
-    pilot.rest(5)
-    _as_far_as_it_goes(lambda: pilot.back(0.13, share=0.4))
-    _as_far_as_it_goes(lambda: pilot.shift(z=0.10))
+def let_go(driver: HandDriver) -> None:
+    """Open the gripper, and draw the hand back and up."""
+    driver.open()
+    driver.rest(5)
+    _as_far_as_it_goes(lambda: driver.back(0.13, share=0.4))
+    _as_far_as_it_goes(lambda: driver.shift(z=0.10))
 
 
 def _carried(tool: np.ndarray, now: np.ndarray, centre: np.ndarray, turn: float) -> np.ndarray:
-    """The tool's pose once the thing at `now` is at `centre`, turned by `turn` about the vertical."""
+    """The tool's pose once the thing at `now` is at `centre`, turned by `turn` rad about z."""
     rotation = from_rpy((0, 0, 0), yaw=turn)[:3, :3]
     return transform(centre + rotation @ (tool[:3, 3] - now), rotation @ tool[:3, :3])
 
 
-def _first_that_goes(pilot: Pilot, goals: Tuple[np.ndarray, ...]) -> None:
+def _first_that_goes(driver: HandDriver, goals: Tuple[np.ndarray, ...]) -> None:
     for last, goal in enumerate(goals, 1 - len(goals)):
         try:
-            pilot.go(goal, share=0.7, near=(0.015, 0.1))
+            driver.go(goal, share=0.7, near=(0.015, 0.1))
             return
-        except Stuck:
+        except StuckError:
             if last == 0:
                 raise
 
@@ -195,17 +207,17 @@ def _heading(point: np.ndarray, arm: str) -> float:
     return float(np.arctan2(*(point[:2] - SHOULDER[arm])[::-1]))
 
 
-def _in_hand(attempt: Attempt, arm: str) -> Seen:
-    thing = attempt.look().held_by(arm)
+def _in_hand(attempt: Attempt, arm: str) -> TrueBody:
+    thing = attempt.read_scene().held_by(arm)
     if thing is None:
-        raise Failed('it was lost on the way')
+        raise ManoeuvreError('it was lost on the way')
     return thing
 
 
-def _check_stands(thing: Seen, place: np.ndarray) -> None:
+def _check_stands(thing: TrueBody, place: np.ndarray) -> None:
     beside = float(np.hypot(*(thing.centre - place)[:2]))
     if not thing.upright or beside > 0.05 or thing.held:
-        raise Failed('{} {} {:.0f} cm beside its place'.format(
+        raise ManoeuvreError('{} {} {:.0f} cm beside its place'.format(
             thing.name, 'stands' if thing.upright else 'lies', 100 * beside))
 
 
@@ -213,42 +225,44 @@ def _as_far_as_it_goes(drive: Callable[[], None]) -> None:
     """A motion that need not get all the way."""
     try:
         drive()
-    except Stuck:
+    except StuckError:
         return
 
 
-def pull_out(attempt: Attempt, target: Callable[[Sight], Optional[Seen]]) -> None:
+def pull_out(attempt: Attempt, target: Callable[[TrueScene], Optional[TrueBody]]) -> None:
     """Take a thing out of a shelf: level, straight in, lifted a little, straight back.
 
-    :raises Failed, Stuck: where it is not in the hand in the end.
+    :raises ManoeuvreError: where it is not in the hand in the end.
+    :raises StuckError: where the hand does not get there.
     """
-    pilot, arm = attempt.pilot, attempt.pilot.hand.arm
-    sight = attempt.look()
-    if sight.held_by(arm) is None:
-        thing = target(sight)
+    driver, arm = attempt.driver, attempt.driver.hand.arm
+    scene = attempt.read_scene()
+    if scene.held_by(arm) is None:
+        thing = target(scene)
         if thing is None:
-            raise Failed('there is nothing to take')
-        _reach_in(attempt, sight, thing)
-    _as_far_as_it_goes(lambda: pilot.shift(z=_OFF_SHELF, share=0.3))
-    _as_far_as_it_goes(lambda: pilot.shift(x=-OUT, share=0.4))
-    if attempt.look().held_by(arm) is None:
-        raise Failed('it slipped out of the hand')
+            raise ManoeuvreError('there is nothing to take')
+        _reach_in(attempt, scene, thing)
+    _as_far_as_it_goes(lambda: driver.shift(z=_OFF_SHELF, share=0.3))
+    _as_far_as_it_goes(lambda: driver.shift(x=-OUT, share=0.4))
+    if attempt.read_scene().held_by(arm) is None:
+        raise ManoeuvreError('it slipped out of the hand')
 
 
-def _reach_in(attempt: Attempt, sight: Sight, thing: Seen) -> None:
-    pilot = attempt.pilot
-    others = [other.box for other in sight.movable() if other.name != thing.name]
-    level = grasps(thing.box, others, pilot.hand.arm, _LEVEL)
+def _reach_in(attempt: Attempt, scene: TrueScene, thing: TrueBody) -> None:
+    driver = attempt.driver
+    others = [other.box for other in scene.movable() if other.name != thing.name]
+    level = grasps(thing.box, others, driver.hand.arm, _LEVEL)
     if not level:
-        raise Failed('{} is too wide for the hand'.format(thing.name))
+        raise ManoeuvreError('{} is too wide for the hand'.format(thing.name))
     grasp = level[attempt.number % len(level)]
     grasp[:3, 3] += attempt.slip()
-    pilot.open()
-    _as_far_as_it_goes(lambda: pilot.shift(x=min(0.0, thing.centre[0] - OUT - pilot.hand.tool()[0, 3]), share=0.5))
-    _as_far_as_it_goes(lambda: pilot.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
-    pilot.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
-    pilot.go(grasp, share=0.4, near=(0.006, 0.05))
-    if not pilot.close(_SQUEEZE).stalled or attempt.look().held_by(pilot.hand.arm) is None:
-        pilot.open()
-        pilot.back(OUT * 0.7)
-        raise Failed('the hand closed on nothing')
+    driver.open()
+    _as_far_as_it_goes(lambda: driver.shift(
+        x=min(0.0, thing.centre[0] - OUT - driver.hand.tool()[0, 3]), share=0.5))
+    _as_far_as_it_goes(lambda: driver.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
+    driver.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
+    driver.go(grasp, share=0.4, near=(0.006, 0.05))
+    if not driver.close(_SQUEEZE).stalled or attempt.read_scene().held_by(driver.hand.arm) is None:
+        driver.open()
+        driver.back(OUT * 0.7)
+        raise ManoeuvreError('the hand closed on nothing')

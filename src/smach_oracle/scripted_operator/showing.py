@@ -1,9 +1,9 @@
-"""How the scripted operator shows a thing in the camera's image: a hasty rectangle, a look at the mask, strokes."""
+"""Shows a thing in the camera's image as a person does: a hasty rectangle, then strokes."""
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .sight import Seen, Sight
+from .true_scene import TrueBody, TrueScene
 
 LEAST_VISIBLE = 0.35  # share of a thing's outline that must be free, to show it
 LEAST_PIXELS = 12  # px of its width and height
@@ -16,15 +16,15 @@ _TRIES = 4
 Region = Tuple[int, int, int, int]  # px: x, y, width, height
 
 
-class Line(NamedTuple):
+class OperatorStroke(NamedTuple):
     """A stroke."""
 
     foreground: bool
     points: Sequence[Tuple[float, float]]  # px
 
 
-class Marked(NamedTuple):
-    """What the interface made of a drawing."""
+class MarkedResult(NamedTuple):
+    """The interface's answer to a drawing."""
 
     ok: bool
     message: str
@@ -32,22 +32,28 @@ class Marked(NamedTuple):
     size: np.ndarray  # (3,) m
 
 
-Segment = Callable[[Region, Sequence[Line]], Marked]
+SegmentCall = Callable[[Region, Sequence[OperatorStroke]], MarkedResult]
 
 
-def what_to_show(sight: Sight) -> Optional[Seen]:
-    """The thing that a task would take next: the nearest one that can be seen well enough; None where there is none."""
-    seen = [body for body in sight.movable() if body.visible >= LEAST_VISIBLE and min(body.region[2:]) >= LEAST_PIXELS
-            and not body.held and (not sight.goal_body or body.name == sight.goal_body)]
-    return min(seen, key=lambda body: float(np.hypot(*body.centre[:2])), default=None)
+def what_to_show(scene: TrueScene) -> Optional[TrueBody]:
+    """The nearest thing that can be seen well enough, which a task would take next; or None."""
+    seen = [
+        body for body in scene.movable()
+        if body.visible >= LEAST_VISIBLE and min(body.region[2:]) >= LEAST_PIXELS and not body.held
+        and (not scene.goal_body or body.name == scene.goal_body)
+    ]
+    if not seen:
+        return None
+    return min(seen, key=lambda body: float(np.hypot(*body.centre[:2])))
 
 
-def show(segment: Segment, thing: Seen, image: Tuple[int, int], generator: np.random.Generator,
-         refresh: Callable[[], None]) -> str:
-    """Mark a thing until the mask looks right; '' then, else what is wrong with the last one.
+def show(segment: SegmentCall, thing: TrueBody, image: Tuple[int, int],
+         generator: np.random.Generator, refresh: Callable[[], None]) -> str:
+    """Mark a thing until the mask looks right.
 
     :param image: its width and height, px.
-    :param refresh: asks for another frame, between two tries: glare passes.
+    :param refresh: asks for another image, between two tries: glare passes.
+    :returns: '', else what is wrong with the last mask.
     """
     wrong = ''
     for number in range(_TRIES):
@@ -65,27 +71,31 @@ def rectangle(region: Region, image: Tuple[int, int], generator: np.random.Gener
     """A rectangle about a region (px), drawn by hand, within the image."""
     left, top, width, height = region
     missed = generator.normal(0.0, _EDGE_SIGMA, 4)
-    x, right = (int(np.clip(round(edge), 0, image[0])) for edge in (left - _MARGIN + missed[0],
-                                                                    left + width + _MARGIN + missed[1]))
-    y, bottom = (int(np.clip(round(edge), 0, image[1])) for edge in (top - _MARGIN + missed[2],
-                                                                     top + height + _MARGIN + missed[3]))
+    x, right = (int(np.clip(round(edge), 0, image[0]))
+                for edge in (left - _MARGIN + missed[0], left + width + _MARGIN + missed[1]))
+    y, bottom = (int(np.clip(round(edge), 0, image[1]))
+                 for edge in (top - _MARGIN + missed[2], top + height + _MARGIN + missed[3]))
     return x, y, max(right - x, 1), max(bottom - y, 1)
 
 
-def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[Line, ...]:
+def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[OperatorStroke, ...]:
     """A line down the middle of the thing, and dots beside it that are none of it."""
     left, top, width, height = region
     middle = left + width / 2 + generator.normal(0.0, 0.05) * width
-    inside = Line(True, [(middle, top + 0.25 * height), (middle, top + 0.75 * height)])
-    beside = [Line(False, [(x, top + height / 2)]) for x in (left - 5.0, left + width + 5.0) if x >= 0.0]
+    inside = OperatorStroke(True, [(middle, top + 0.25 * height), (middle, top + 0.75 * height)])
+    beside = [
+        OperatorStroke(False, [(x, top + height / 2)]) for x in (left - 5.0, left + width + 5.0)
+        if x >= 0.0
+    ]
     return (inside,) + tuple(beside)
 
 
-def looks_wrong(marked: Marked, thing: Seen) -> str:
-    """What a person finds wrong with a mask, or ''."""
+def looks_wrong(marked: MarkedResult, thing: TrueBody) -> str:
+    """Why a person rejects a mask, or ''."""
     beside = float(np.hypot(*(marked.centre - thing.centre)[:2]))
     if beside > _TOO_FAR:
         return 'it is {:.0f} cm beside the thing'.format(100 * beside)
     larger = max(abs(np.sort(marked.size[:2]) - np.sort(np.array(thing.size)[:2])).max(),
                  abs(marked.size[2] - thing.size[2]))
-    return 'it is {:.0f} cm larger or smaller than the thing'.format(100 * larger) if larger > _TOO_LARGE else ''
+    return 'it is {:.0f} cm larger or smaller than the thing'.format(
+        100 * larger) if larger > _TOO_LARGE else ''

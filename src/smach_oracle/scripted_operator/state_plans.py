@@ -1,22 +1,23 @@
-"""Which means the scripted operator uses for which state, from its settings. Pure.
+"""What the scripted operator does about which state, from its settings. Pure.
 
     states:
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}
       default: {means: retry}
 """
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Sequence
 
-from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.checks import choice, flag, whole
 
 DEFAULT = 'default'
 SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
-# and the interface of each, by the name under which the oracle's settings offer it
+# means, and the interface of each by the name under which the oracle's settings offer it
 MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
 _TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave')
 _ROUNDS = 2  # of tries and going back, before a state is left undone
 
 
-class Means(NamedTuple):
+class StatePlan(NamedTuple):
     """What to do about a failed state."""
 
     means: str  # one of MEANS
@@ -28,90 +29,93 @@ class Means(NamedTuple):
     hidden: str = ''  # show: state to go to where nothing of it can be seen
     lost: str = ''  # put_down: state to go to where the hand holds nothing
     otherwise: str = ''  # state to go to after `tries` tries; '' : the failed one itself
-    leave: str = ''  # state to go on to, this one left undone, where all that was tried twice; '' : never
+    # state to go on to, this one left undone, where all that was tried twice; '' : never
+    leave: str = ''
     tries: int = 2
 
 
-class Plans:
-    """Means by the label of the failed state."""
+class StatePlans:
+    """Plans by the label of the failed state."""
 
-    def __init__(self, settings: Any) -> None:
+    def __init__(self, settings: object) -> None:
         """`settings`: a mapping as YAML gives it.
 
-        :raises ConfigError: naming the key, its value and what is allowed.
+        :raises SettingsError: naming the key, its value and what is allowed.
         """
         if not isinstance(settings, Mapping):
-            raise ConfigError('states', settings, 'a mapping from states to means')
-        self._means: Dict[str, Means] = {state: _means(state, value) for state, value in settings.items()}
-        self._means.setdefault(DEFAULT, Means(RETRY))
+            raise SettingsError('states', settings, 'a mapping from states to means')
+        self._plans: Dict[str, StatePlan] = {
+            state: _plan(state, value)
+            for state, value in settings.items()
+        }
+        self._plans.setdefault(DEFAULT, StatePlan(RETRY))
 
-    def of(self, state: str) -> Means:
-        """The means for a state."""
-        return self._means.get(state, self._means[DEFAULT])
+    def of(self, state: str) -> StatePlan:
+        """The plan for a state."""
+        return self._plans.get(state, self._plans[DEFAULT])
 
 
-class Decision(NamedTuple):
-    """What to answer; neither interface nor state: give up."""
+class OperatorAnswer(NamedTuple):
+    """An answer; with neither interface nor state it gives up."""
 
     interface: str = ''  # start this one
     goto: str = ''  # or go to this state
     why: str = ''
 
 
-class Situation(NamedTuple):
-    """What a decision needs to know of a question."""
+class QuestionFacts(NamedTuple):
+    """The facts about a question that decide its answer."""
 
     state: str
     states: List[str]  # that can be entered now
     interfaces: List[str]  # on offer
     tried: int  # how often this state was asked about in this trial before
-    holds: bool  # the hand of the means holds something
-    seen: bool  # what there is to show can be seen
+    holds: bool  # the hand of the plan holds something
+    seen: bool  # the thing to show can be seen
 
 
-def missing(means: Means, offered: Sequence[str]) -> str:
-    """The interface that the means need, where it is not offered, else ''."""
-    return '' if MEANS[means.means] in offered else MEANS[means.means]
+def missing(plan: StatePlan, offered: Sequence[str]) -> str:
+    """The interface that the plan needs, where it is not offered, else ''."""
+    return '' if MEANS[plan.means] in offered else MEANS[plan.means]
 
 
-def decide(means: Means, situation: Situation) -> Decision:
+def choose_answer(plan: StatePlan, question: QuestionFacts) -> OperatorAnswer:
     """The answer to a question."""
-    def go(state: str, why: str) -> Decision:
-        return Decision(goto=next((each for each in (state, situation.state) if each in situation.states), ''), why=why)
+    def go(state: str, why: str) -> OperatorAnswer:
+        return OperatorAnswer(
+            goto=next((each for each in (state, question.state) if each in question.states), ''),
+            why=why)
 
-    interface = MEANS[means.means]
-    if means.leave and situation.tried >= _ROUNDS * (means.tries + 1):
-        return go(means.leave, 'it is left as it is')
-    if interface not in situation.interfaces:
-        tired = situation.tried % (means.tries + 1) == means.tries
-        return go(means.otherwise if tired else '', 'once more' if not tired else 'from further back')
-    if means.means == SHOW and not situation.seen:
-        return go(means.hidden or means.otherwise, 'nothing of it can be seen')
-    if means.means == PUT_DOWN and not situation.holds:
-        return go(means.lost or means.otherwise, 'the hand holds nothing')
-    if situation.tried % (means.tries + 1) == means.tries:
-        return go(means.otherwise, 'it did not work by hand')
-    return Decision(interface=interface)
+    interface = MEANS[plan.means]
+    if plan.leave and question.tried >= _ROUNDS * (plan.tries + 1):
+        return go(plan.leave, 'it is left as it is')
+    if interface not in question.interfaces:
+        tired = question.tried % (plan.tries + 1) == plan.tries
+        return go(plan.otherwise if tired else '',
+                  'once more' if not tired else 'from further back')
+    if plan.means == SHOW and not question.seen:
+        return go(plan.hidden or plan.otherwise, 'nothing of it can be seen')
+    if plan.means == PUT_DOWN and not question.holds:
+        return go(plan.lost or plan.otherwise, 'the hand holds nothing')
+    if question.tried % (plan.tries + 1) == plan.tries:
+        return go(plan.otherwise, 'it did not work by hand')
+    return OperatorAnswer(interface=interface)
 
 
-def _means(state: str, value: Any) -> Means:
+def _plan(state: str, value: object) -> StatePlan:
     if not isinstance(value, Mapping):
-        raise ConfigError(state, value, 'a mapping with means')
-    unknown = sorted(str(field) for field in value if field not in Means._fields)
+        raise SettingsError(state, value, 'a mapping with means')
+    unknown = sorted(str(field) for field in value if field not in StatePlan._fields)
     if unknown:
-        raise ConfigError('{}.{}'.format(state, unknown[0]), value[unknown[0]], 'the keys ' + ', '.join(Means._fields))
-    if not isinstance(value.get('means'), str) or value['means'] not in MEANS:
-        raise ConfigError(state + '.means', value.get('means'), ', '.join(sorted(MEANS)))
+        raise SettingsError('{}.{}'.format(state, unknown[0]), value[unknown[0]],
+                          'the keys ' + ', '.join(StatePlan._fields))
+    choice(sorted(MEANS))(state + '.means', value.get('means'))
     for field in _TEXTS:
         if not isinstance(value.get(field, ''), str):
-            raise ConfigError('{}.{}'.format(state, field), value[field], 'a name')
-    if value.get('arm', 'right') not in ('left', 'right'):
-        raise ConfigError(state + '.arm', value['arm'], 'left, right')
+            raise SettingsError('{}.{}'.format(state, field), value[field], 'a name')
+    choice(('left', 'right'))(state + '.arm', value.get('arm', 'right'))
     if value['means'] == PUT_DOWN and bool(value.get('place')) == bool(value.get('onto')):
-        raise ConfigError(state, dict(value), 'either place or onto')
-    tries = value.get('tries', 2)
-    if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= 20:
-        raise ConfigError(state + '.tries', tries, 'a number from 1 to 20')
-    if not isinstance(value.get('inside', False), bool):
-        raise ConfigError(state + '.inside', value['inside'], 'true or false')
-    return Means(**value)
+        raise SettingsError(state, dict(value), 'either place or onto')
+    whole(1, 'a number from 1 to 20', 20)(state + '.tries', value.get('tries', 2))
+    flag(state + '.inside', value.get('inside', False))
+    return StatePlan(**value)

@@ -1,7 +1,7 @@
-"""The scripted operator's hand on ROS: commands to the manipulation interface, one after the other, in lock-step."""
+"""A hand behind the manipulation interface: one command at a time, in lock-step."""
 import threading
 import time
-from typing import Optional
+from typing import Callable, Optional
 
 import numpy as np
 import rospy
@@ -11,16 +11,17 @@ from std_msgs.msg import Header
 from smach_oracle.geometry.transforms import from_quaternion
 from smach_oracle.msg import TeleopCommand, TeleopState
 
-from .pilot import Grip, Stuck
+from .hand_driver import GripResult, StuckError
 
-_ANSWER_S = 90.0  # wall time in which a command must be carried out; a gripper may take many periods
-
-
-class Interrupted(Exception):
-    """The interface's goal has ended under the expert's hand."""
+# wall time in which a command must be carried out; a gripper may take many periods
+_ANSWER_S = 90.0
 
 
-class HandLink:
+class GoalEndedError(Exception):
+    """The interface's goal has ended before its work was done."""
+
+
+class TeleoperationClient:
     """The topics of the manipulation interface; hands of both arms share it."""
 
     def __init__(self, interface: str, operator: str) -> None:
@@ -29,30 +30,36 @@ class HandLink:
         self._seq = 0
         self._changed = threading.Condition()
         self._state: Optional[TeleopState] = None
-        self._publisher = rospy.Publisher(interface + '/command', TeleopCommand, queue_size=10, tcp_nodelay=True)
-        self._subscriber = rospy.Subscriber(interface + '/state', TeleopState, self._heard, queue_size=100,
-                                            tcp_nodelay=True)
+        self._publisher = rospy.Publisher(interface + '/command', TeleopCommand, queue_size=10,
+                                          tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(interface + '/state', TeleopState, self._heard,
+                                            queue_size=100, tcp_nodelay=True)
 
     def wait_for_goal(self, query_id: str, limit_s: float) -> bool:
-        """Wait until the interface works on a question; whether it does. Raises Interrupted where the node ends."""
+        """Wait until the interface works on a question; whether it does.
+
+        :raises GoalEndedError: where the node ends.
+        """
         return self._wait(lambda state: state.query_id == query_id, limit_s)
 
     def send(self, command: TeleopCommand) -> TeleopState:
         """Send a command, and wait until it is carried out.
 
-        :raises Stuck: where it is refused, or no answer comes.
-        :raises Interrupted: where the interface has no goal any more.
+        :raises StuckError: where it is refused, or no answer comes.
+        :raises GoalEndedError: where the interface has no goal any more.
         """
         self._seq += 1
         command.seq, command.operator = self._seq, self._operator
         self._publisher.publish(command)
-        if not self._wait(lambda state: (state.seq, state.sender) == (command.seq, self._operator), _ANSWER_S):
-            raise Stuck('the manipulation interface does not answer')
+        key = (self._seq, self._operator)
+        carried_out = self._wait(lambda state: (state.seq, state.sender) == key, _ANSWER_S)
         state = self._state
+        if not carried_out or state is None:
+            raise StuckError('the manipulation interface does not answer')
         if not state.query_id:
-            raise Interrupted('the manipulation interface has no goal any more')
+            raise GoalEndedError('the manipulation interface has no goal any more')
         if state.refused:
-            raise Stuck('command refused: ' + state.refused)
+            raise StuckError('command refused: ' + state.refused)
         return state
 
     def let_go(self, arm: str) -> None:
@@ -60,7 +67,7 @@ class HandLink:
         self._seq += 1
         self._publisher.publish(TeleopCommand(seq=self._seq, operator=self._operator, arm=arm))
 
-    def _wait(self, holds: object, limit_s: float) -> bool:
+    def _wait(self, holds: Callable[[TeleopState], bool], limit_s: float) -> bool:
         until_s = time.monotonic() + limit_s
         with self._changed:
             while not rospy.is_shutdown():
@@ -70,7 +77,7 @@ class HandLink:
                 if left_s <= 0:
                     return False
                 self._changed.wait(min(left_s, 0.5))
-        raise Interrupted('the node goes down')
+        raise GoalEndedError('the node goes down')
 
     def _heard(self, state: TeleopState) -> None:
         with self._changed:
@@ -79,16 +86,17 @@ class HandLink:
 
 
 class TopicHand:
-    """A DrivenHand of one arm; see pilot.py."""
+    """A DrivenHand of one arm; see hand_driver.py."""
 
-    def __init__(self, link: HandLink, arm: str, base: str, period: float) -> None:
+    def __init__(self, client: TeleoperationClient, arm: str, base: str, period: float) -> None:
         """`base`: the robot's base frame; `period`: s, of the interface.
 
-        :raises Stuck, Interrupted: as HandLink.send does.
+        :raises StuckError: as TeleoperationClient.send does.
+        :raises GoalEndedError: likewise.
         """
         self.arm = arm
         self.period = period
-        self._link = link
+        self._client = client
         self._base = base
         self._state = self._send(np.zeros(6))
 
@@ -103,18 +111,18 @@ class TopicHand:
         limit: str = self._state.limit
         return limit
 
-    def grip(self, gap: float, effort: float) -> Grip:
+    def grip(self, gap: float, effort: float) -> GripResult:
         """See DrivenHand."""
         self._state = self._send(np.zeros(6), move_gripper=True, gripper=gap, gripper_effort=effort)
         while self._state.gripper_moving:
             self._state = self._send(np.zeros(6))
-        return Grip(self._state.gripper, self._state.gripper_stalled)
+        return GripResult(self._state.gripper, self._state.gripper_stalled)
 
     def let_go(self) -> None:
         """Release the dead-man."""
-        self._link.let_go(self.arm)
+        self._client.let_go(self.arm)
 
     def _send(self, twist: np.ndarray, **more: object) -> TeleopState:
-        return self._link.send(TeleopCommand(
+        return self._client.send(TeleopCommand(
             header=Header(frame_id=self._base), arm=self.arm, dead_man=True,
             twist=Twist(Vector3(*twist[:3]), Vector3(*twist[3:])), **more))

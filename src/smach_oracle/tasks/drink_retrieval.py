@@ -1,27 +1,39 @@
 #!/usr/bin/env python3
-"""Fetch a drink out of a refrigerator and hand it to a person, again and again (the paper's second use case, VI-B).
+"""Fetch a drink out of a refrigerator and hand it over, again and again (the paper's VI-B).
 
 A plain SMACH script over actions. It stops a trial at the first action that fails.
 """
 import argparse
 import math
 import sys
-from typing import List, Optional
+from typing import Any, List, Optional
 
 import rospy
-import smach
-from control_msgs.msg import SingleJointPositionAction, SingleJointPositionGoal
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
-from smach_ros import SimpleActionState
-from smach_oracle.msg import (CloseDoorAction, CloseDoorGoal, DetectDrinkAction, DetectDrinkGoal, HandOverAction,
-                              HandOverGoal, OpenDoorAction, OpenDoorGoal, PickAction, PickGoal)
-from smach_oracle.srv import ResetWorld, ResetWorldRequest
 from std_msgs.msg import Header
+
+import smach
+from control_msgs.msg import SingleJointPositionAction, SingleJointPositionGoal
+from smach_oracle.msg import (
+    CloseDoorAction,
+    CloseDoorGoal,
+    DetectDrinkAction,
+    DetectDrinkGoal,
+    HandOverAction,
+    HandOverGoal,
+    OpenDoorAction,
+    OpenDoorGoal,
+    PickAction,
+    PickGoal,
+)
+from smach_oracle.srv import ResetWorld, ResetWorldRequest
+from smach_ros import SimpleActionState
 
 SERVER_WAIT_S = 20.0
 ODOM = 'odom_combined'
-FRIDGE = 'fridge'  # the collision map that PICK plans in: the known furniture, and what the camera sees on its shelf
+# the collision map that PICK plans in: the known furniture, and what the camera sees on its shelf
+FRIDGE = 'fridge'
 TORSO_HEIGHT = 0.25  # m
 # x, y in m, yaw in rad, in odom_combined
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
@@ -35,28 +47,32 @@ def make_machine() -> smach.StateMachine:
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
     with sm:
         smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'OPEN_FRIDGE'})
-        smach.StateMachine.add('OPEN_FRIDGE', action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
+        smach.StateMachine.add('OPEN_FRIDGE',
+                               action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
                                {'succeeded': 'MOVE_IN'})
         smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
         smach.StateMachine.add('DETECT_DRINK',
                                action('detect_drink', DetectDrinkAction, goal=DetectDrinkGoal(0.05),
                                       result_slots=['drink', 'size']),
                                {'succeeded': 'PICK_DRINK'})
-        smach.StateMachine.add('PICK_DRINK',
-                               action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size'],
-                                      result_slots=['grasp']),
-                               {'succeeded': 'MOVE_OUT'})
+        smach.StateMachine.add(
+            'PICK_DRINK',
+            action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size'],
+                   result_slots=['grasp']), {'succeeded': 'MOVE_OUT'})
         smach.StateMachine.add('MOVE_OUT', drive(*OUT_OF_THE_FRIDGE), {'succeeded': 'CLOSE_FRIDGE'})
-        smach.StateMachine.add('CLOSE_FRIDGE', action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
+        smach.StateMachine.add('CLOSE_FRIDGE',
+                               action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
                                {'succeeded': 'MOVE_HOME'})
         smach.StateMachine.add('MOVE_HOME', drive(*HOME), {'succeeded': 'HAND_OVER'})
-        smach.StateMachine.add('HAND_OVER', action('hand_over', HandOverAction, goal=HandOverGoal('right', palm())))
+        smach.StateMachine.add(
+            'HAND_OVER', action('hand_over', HandOverAction, goal=HandOverGoal('right', palm())))
     return sm
 
 
-def action(name: str, spec: type, **options: object) -> SimpleActionState:
+def action(name: str, spec: type, **options: Any) -> SimpleActionState:
     """An action state that does not wait for its server for ever."""
-    return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S), **options)
+    return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
+                             **options)
 
 
 def torso(height_m: float) -> SimpleActionState:
@@ -83,15 +99,19 @@ def palm() -> PoseStamped:
 
 
 def find_reset() -> rospy.ServiceProxy:
-    """The service that begins a trial. Ends the script where there is no world."""
+    """The service that begins a trial.
+
+    :raises SystemExit: where there is no world.
+    """
     try:
         rospy.wait_for_service('world/reset', SERVER_WAIT_S)
     except rospy.ROSInterruptException:
         raise
     except rospy.ROSException as err:
-        raise SystemExit('drink_retrieval: no world here: nobody offers {} within {:.0f} s; what starts both: '
-                         'roslaunch smach_oracle drink_retrieval.launch'.format(
-                             rospy.resolve_name('world/reset'), SERVER_WAIT_S)) from err
+        raise SystemExit(
+            'drink_retrieval: no world here: {} does not come within {:.0f} s; what starts both: '
+            'roslaunch smach_oracle drink_retrieval.launch'.format(
+                rospy.resolve_name('world/reset'), SERVER_WAIT_S)) from err
     return rospy.ServiceProxy('world/reset', ResetWorld)
 
 
@@ -118,9 +138,11 @@ def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
 
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
-    parser = argparse.ArgumentParser(description='Fetch a drink out of a refrigerator and hand it over.')
+    parser = argparse.ArgumentParser(
+        description='Fetch a drink out of a refrigerator and hand it over.')
     parser.add_argument('--trials', type=int, default=1, help='how many times (default: 1)')
-    parser.add_argument('--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)')
+    parser.add_argument('--seed', type=int, default=1,
+                        help='of the first trial; the next has the next (default: 1)')
     args = parser.parse_args(rospy.myargv(argv if argv is not None else sys.argv)[1:])
     if args.trials < 1 or args.seed < 0:
         parser.error('--trials must be 1 or more and --seed 0 or more')

@@ -1,9 +1,10 @@
-"""The PR2 as a model that physics can move: derived once from the installed example-robot-data, and kept in a cache.
+"""The PR2 as a model that physics can move, derived from example-robot-data and kept in a cache.
 
-What is mended: file names are made absolute; triangles get normals (some meshes have none and would look black); links
-without inertia get one of a gram, for simulators take none for 1 kg; the four-bar fingers become jaws that slide,
-whose joints read the way (m) of one finger from its closed place, so that the gap between the tips is their sum;
-parts in signal colours get those of a PR2.
+These parts are mended. File names are made absolute. Triangles get normals: some meshes have none
+and would look black. Links without inertia get one of a gram, for simulators would take 1 kg. The
+four-bar fingers become jaws that slide; their joints read the travel (m) of one finger from its
+closed place, so that the gap between the tips is their sum. Parts in signal colours get those of a
+PR2.
 """
 import os
 import shutil
@@ -21,7 +22,8 @@ from .rigid_links import inertia_of, merge_rigid_links, set_inertia
 MENDED = 4  # raise it when what is derived here changes: it names the cache's folder
 BASE_JOINTS = ('base_x', 'base_y', 'base_theta')  # of the mobile model: m, m, rad in the world
 JAW_OPEN = 0.045  # m, each finger from its closed place
-JAW_SHIFT = 0.00187  # m outwards, of each closed finger: as they are, the tips are within each other
+# m outwards, of each closed finger: as they are, the tips are within each other
+JAW_SHIFT = 0.00187
 LIGHT = 1e-3  # kg, of a link that has no mass
 LEAST_INERTIA = 1e-6  # kg m2
 COLOURS = {'White': '0.93 0.93 0.92 1', 'Grey2': '0.84 0.85 0.86 1', 'Grey': '0.60 0.61 0.63 1',
@@ -30,14 +32,15 @@ TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribu
 
 
 class ModelError(RuntimeError):
-    """The PR2's model cannot be had; the text says what is missing, and where."""
+    """The PR2's model cannot be had; the text names what is missing, and where."""
 
 
 class Pr2Files(NamedTuple):
     """The mended model on disk."""
 
     urdf: Path  # root base_footprint, child base_link; what a robot_description has
-    mobile: Path  # on BASE_JOINTS, root 'world', links that are fixed to each other made one; for physics
+    # on BASE_JOINTS, root 'world', links that are fixed to each other made one; for physics
+    mobile: Path
     srdf: Path  # which pairs of links may touch, among others
 
 
@@ -59,7 +62,7 @@ def pr2_urdf() -> Path:
 
 
 def srdf_pairs() -> FrozenSet[FrozenSet[str]]:
-    """The pairs of links whose collisions are no matter: neighbours, and those that never meet or always do."""
+    """The pairs of links that may touch: neighbours, and those that never meet or always do."""
     root = ElementTree.parse(str(pr2_files().srdf)).getroot()
     return frozenset(frozenset((pair.get('link1', ''), pair.get('link2', '')))
                      for pair in root.iter('disable_collisions'))
@@ -71,11 +74,13 @@ def _installed() -> Path:
         package = metadata.distribution('cmeel')
         metadata.version('example-robot-data')
     except metadata.PackageNotFoundError as err:
-        raise ModelError('the Python package {} is not installed; it has the PR2. Run scripts/setup'.format(
-            err.name)) from err
+        raise ModelError(
+            'the Python package {} is not installed; it has the PR2. Run scripts/setup'.format(
+                err.name)) from err
     share = Path(str(package.locate_file('cmeel.prefix'))) / 'share'
     if not (share / 'example-robot-data' / 'robots' / 'pr2_description').is_dir():
-        raise ModelError('there is no PR2 in {}: example-robot-data lies elsewhere or is broken'.format(share))
+        raise ModelError(
+            'there is no PR2 in {}: example-robot-data lies elsewhere or is broken'.format(share))
     return share
 
 
@@ -85,13 +90,17 @@ def _cache() -> Path:
 
 
 def _derive(share: Path, folder: Path) -> None:
-    """Write the model beside its place and move it there as a whole; who comes second throws its own away."""
+    """Write the model beside its place and move it there as a whole.
+
+    Where another process was faster, its model stays and this one is dropped.
+    """
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix='pr2-draft-', dir=str(folder.parent)))
     except OSError as err:
-        raise ModelError('the PR2 model cannot be kept in {}: {}; set XDG_CACHE_HOME to a folder that can be '
-                         'written'.format(folder.parent, err)) from err
+        raise ModelError(
+            'the PR2 model cannot be kept in {}: {}; set XDG_CACHE_HOME to a folder that can be '
+            'written'.format(folder.parent, err)) from err
     try:
         _write(share, draft, folder)
         os.chmod(draft, 0o755)
@@ -155,7 +164,10 @@ def _give_inertia(link: ElementTree.Element) -> None:
 
 
 def _drop_placeholders(link: ElementTree.Element) -> None:
-    """Boxes that stand for cameras: some are around the very eye, where the renderer divides by their depth of 0."""
+    """Remove the boxes that stand for cameras.
+
+    Some enclose the camera itself, where the renderer would divide by their depth of 0.
+    """
     for visual in link.findall('visual'):
         if visual.find('geometry/mesh') is None:
             link.remove(visual)
@@ -176,12 +188,14 @@ def _mend_joint(joint: ElementTree.Element) -> None:
         x, y, z = (float(value) for value in _child(joint, 'origin').get('xyz', '0 0 0').split())
         _child(joint, 'origin').set('xyz', '{} {} {}'.format(x, y + side * JAW_SHIFT, z))
         _child(joint, 'axis').set('xyz', '0 {} 0'.format(side))
-        _child(joint, 'limit').attrib.update(lower='0', upper=str(JAW_OPEN), effort='200', velocity='0.1')
+        _child(joint, 'limit').attrib.update(lower='0', upper=str(JAW_OPEN), effort='200',
+                                             velocity='0.1')
         _child(joint, 'dynamics').set('damping', '10')
     elif name.endswith(('finger_tip_joint', 'parallel_root_joint')):
         joint.set('type', 'fixed')
     elif name == 'torso_lift_joint':
-        _child(joint, 'dynamics').set('damping', '100')  # for 20000 (a spindle) the steps of physics are too long
+        # for 20000 (a spindle) the steps of physics are too long
+        _child(joint, 'dynamics').set('damping', '100')
     for mimic in joint.findall('mimic'):
         joint.remove(mimic)
 
@@ -194,9 +208,11 @@ def _child(element: ElementTree.Element, tag: str) -> ElementTree.Element:
 def _put_on_wheels(robot: ElementTree.Element) -> None:
     """Joints in front of the root that take it over the floor."""
     children = {_child(joint, 'child').get('link') for joint in robot.findall('joint')}
-    root = next(str(link.get('name')) for link in robot.findall('link') if link.get('name') not in children)
+    root = next(
+        str(link.get('name')) for link in robot.findall('link') if link.get('name') not in children)
     links: List[str] = ['world', 'base_x_link', 'base_y_link', root]
-    kinds: Tuple[Tuple[str, str], ...] = (('prismatic', '1 0 0'), ('prismatic', '0 1 0'), ('continuous', '0 0 1'))
+    kinds: Tuple[Tuple[str, str],
+                 ...] = (('prismatic', '1 0 0'), ('prismatic', '0 1 0'), ('continuous', '0 0 1'))
     for name in links[:3]:
         _inertial(ElementTree.SubElement(robot, 'link', name=name), 1.0, 0.1)
     for name, (kind, axis), parent, child in zip(BASE_JOINTS, kinds, links, links[1:]):
@@ -204,4 +220,5 @@ def _put_on_wheels(robot: ElementTree.Element) -> None:
         ElementTree.SubElement(joint, 'parent', link=parent)
         ElementTree.SubElement(joint, 'child', link=child)
         ElementTree.SubElement(joint, 'axis', xyz=axis)
-        ElementTree.SubElement(joint, 'limit', lower='-20', upper='20', effort='20000', velocity='1')
+        ElementTree.SubElement(joint, 'limit', lower='-20', upper='20', effort='20000',
+                               velocity='1')

@@ -6,32 +6,36 @@ from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.msg import BuildCollisionMapGoal, BuildCollisionMapResult, CollisionBoxes
 
-from ...geometry.transforms import from_rpy
-from .collision_map import CollisionMap, MapBook
+from ..planning.collision_map import CollisionMap, CollisionMapStore
+from ..robot import BASE_FRAME
 from .frames import pose_message
-from .interface import BASE_FRAME
-from .skill_server import Say
+from .skill_server import ReportStatus
 
 COLOUR = ColorRGBA(0.9, 0.6, 0.2, 0.5)
 
-Build = Callable[[BuildCollisionMapGoal, Say], BuildCollisionMapResult]
+Build = Callable[[BuildCollisionMapGoal, ReportStatus], BuildCollisionMapResult]
 
 
-class ShownMaps:
-    """Builds maps as `build` does, and publishes each on the latched topics `collision_map` and, as markers,
-    `collision_map_markers`."""
+class CollisionMapPublisher:
+    """Builds maps as `build` does, and publishes each.
 
-    def __init__(self, build: Build, maps: MapBook) -> None:
+    The topics are latched: `collision_map`, and `collision_map_markers` for RViz.
+    """
+
+    def __init__(self, build: Build, maps: CollisionMapStore) -> None:
         self._build = build
         self._maps = maps
         self._publisher = rospy.Publisher('collision_map', CollisionBoxes, queue_size=2, latch=True)
-        self._markers = rospy.Publisher('collision_map_markers', MarkerArray, queue_size=2, latch=True)
+        self._markers = rospy.Publisher('collision_map_markers', MarkerArray, queue_size=2,
+                                        latch=True)
 
-    def __call__(self, goal: BuildCollisionMapGoal, say: Say) -> BuildCollisionMapResult:
+    def __call__(self, goal: BuildCollisionMapGoal,
+                 report: ReportStatus) -> BuildCollisionMapResult:
         """A skill's handler."""
-        result = self._build(goal, say)
+        result = self._build(goal, report)
         boxes = boxes_message(result.map_id, self._maps.find(result.map_id))
         self._publisher.publish(boxes)
         self._markers.publish(markers_message(boxes))
@@ -49,7 +53,10 @@ def boxes_message(map_id: str, made: CollisionMap) -> CollisionBoxes:
 
 def markers_message(boxes: CollisionBoxes) -> MarkerArray:
     """The same as RViz draws it; what it drew before goes."""
-    drawn = [Marker(header=boxes.header, ns='collision_map', id=number, type=Marker.CUBE, action=Marker.ADD, pose=pose,
-                    scale=size, color=COLOUR, text=name)
-             for number, (name, pose, size) in enumerate(zip(boxes.names, boxes.poses, boxes.sizes))]
-    return MarkerArray([Marker(header=boxes.header, ns='collision_map', action=Marker.DELETEALL)] + drawn)
+    drawn = [
+        Marker(header=boxes.header, ns='collision_map', id=number, type=Marker.CUBE,
+               action=Marker.ADD, pose=pose, scale=size, color=COLOUR, text=name)
+        for number, (name, pose, size) in enumerate(zip(boxes.names, boxes.poses, boxes.sizes))
+    ]
+    return MarkerArray([Marker(header=boxes.header, ns='collision_map', action=Marker.DELETEALL)] +
+                       drawn)

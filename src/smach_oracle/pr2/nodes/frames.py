@@ -5,10 +5,18 @@ import numpy as np
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 
-from ...geometry.box import UprightBox
-from ...geometry.transforms import apply, from_quaternion, inverse, quaternion, transform, yaw_of
-from .arm import SkillError
-from .interface import BASE_FRAME, BASE_LINK_HEIGHT, GOAL_FRAMES, ODOM_FRAME, Robot
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.transforms import (
+    apply,
+    from_quaternion,
+    inverse,
+    quaternion,
+    transform,
+    yaw_of,
+)
+
+from ..planning.arm import SkillError
+from ..robot import BASE_FRAME, BASE_LINK_HEIGHT, GOAL_FRAMES, ODOM_FRAME, Robot
 
 LARGEST = 1.0  # m, of an object
 FARTHEST = 100.0  # m, of any pose
@@ -31,21 +39,29 @@ def base_from(frame: str, robot: Robot, what: str) -> np.ndarray:
 
 
 def pose_in_base(message: PoseStamped, robot: Robot, what: str) -> np.ndarray:
-    """4x4 in base_footprint. Raises SkillError for a wrong frame, or a pose that is none."""
+    """4x4 in base_footprint.
+
+    :raises SkillError: for a frame that is not allowed, or a pose that is not finite.
+    """
     position, turn = message.pose.position, message.pose.orientation
     try:
-        pose = from_quaternion((position.x, position.y, position.z), (turn.x, turn.y, turn.z, turn.w))
+        pose = from_quaternion((position.x, position.y, position.z),
+                               (turn.x, turn.y, turn.z, turn.w))
     except ValueError as err:
         raise SkillError('{}: {}'.format(what, err)) from err
     return _near(base_from(message.header.frame_id, robot, what) @ pose, what)
 
 
 def point_in_base(message: PointStamped, robot: Robot, what: str) -> np.ndarray:
-    """(3,) in base_footprint. Raises SkillError as pose_in_base does."""
+    """(3,) in base_footprint.
+
+    :raises SkillError: as pose_in_base does.
+    """
     point = np.array([message.point.x, message.point.y, message.point.z])
     if not np.isfinite(point).all():
         raise SkillError('{}: the point is not finite: {}'.format(what, list(point)))
-    return _near(transform(apply(base_from(message.header.frame_id, robot, what), point)), what)[:3, 3]
+    return _near(transform(apply(base_from(message.header.frame_id, robot, what), point)), what)[:3,
+                                                                                                 3]
 
 
 def box_in_base(message: PoseStamped, size: Vector3, robot: Robot, what: str,
@@ -56,17 +72,20 @@ def box_in_base(message: PoseStamped, size: Vector3, robot: Robot, what: str,
     :raises SkillError: as pose_in_base does, and for a size that no object has.
     """
     extent = np.array([size.x, size.y, size.z])
-    if not np.isfinite(extent).all() or extent[:2].min() <= 0 or extent[2] < 0 or (extent[2] == 0 and not flat):
+    if not np.isfinite(extent).all() or extent[:2].min() <= 0 or extent[2] < 0 or (extent[2] == 0
+                                                                                   and not flat):
         raise SkillError('{}: its size is {} m; each must be above 0'.format(what, list(extent)))
     if not flat and extent.max() > LARGEST:
-        raise SkillError('{}: its size is {} m; at most {} is allowed'.format(what, list(extent), LARGEST))
+        raise SkillError('{}: its size is {} m; at most {} is allowed'.format(
+            what, list(extent), LARGEST))
     pose = pose_in_base(message, robot, what)
     return UprightBox(pose[:3, 3], extent, yaw_of(pose))
 
 
 def pose_message(pose: np.ndarray, stamp: Optional[object] = None) -> PoseStamped:
     """A 4x4 in base_footprint as a message."""
-    header = Header(frame_id=BASE_FRAME) if stamp is None else Header(frame_id=BASE_FRAME, stamp=stamp)
+    header = Header(
+        frame_id=BASE_FRAME) if stamp is None else Header(frame_id=BASE_FRAME, stamp=stamp)
     return PoseStamped(header, Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
 
 
@@ -77,5 +96,6 @@ def box_messages(box: UprightBox, stamp: Optional[object] = None) -> Tuple[PoseS
 
 def _near(pose: np.ndarray, what: str) -> np.ndarray:
     if np.abs(pose[:3, 3]).max() > FARTHEST:
-        raise SkillError('{}: {} is more than {} m away'.format(what, list(np.round(pose[:3, 3], 2)), FARTHEST))
+        raise SkillError('{}: {} is more than {} m away'.format(what, list(np.round(pose[:3, 3],
+                                                                                    2)), FARTHEST))
     return pose

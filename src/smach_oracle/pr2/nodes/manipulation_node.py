@@ -1,22 +1,30 @@
 """Node: what the PR2's arms, hands and head can do, as actions."""
 import rospy
 
-from smach_oracle.msg import (BuildCollisionMapAction, CloseDoorAction, HandOverAction, MoveArmsAsideAction,
-                              OpenDoorAction, PickAction, PlaceAction, PointHeadAction)
+from smach_oracle.msg import (
+    BuildCollisionMapAction,
+    CloseDoorAction,
+    HandOverAction,
+    MoveArmsAsideAction,
+    OpenDoorAction,
+    PickAction,
+    PlaceAction,
+    PointHeadAction,
+)
 from smach_oracle.ros.command_line import parameters_only
 
-from .arm import Means
-from .collision import RobotModel, installed_model, model_from
+from ..model.pr2_model import ModelError
+from ..planning.arm import SkillContext
+from ..planning.collision import CollisionModel, installed_model, model_from
+from ..ros_robot import RosRobot
+from .collision_map_publisher import CollisionMapPublisher
 from .kitchen_skills import KitchenSkills
 from .perception_node import kitchen_at, snapshot_service
-from .pr2_model import ModelError
-from .ros_robot import RosRobot
-from .shown_maps import ShownMaps
 from .skill_server import SkillServer
 
 
-def robot_model() -> RobotModel:
-    """The model on the parameter server, where there is one with its semantics; else the installed PR2."""
+def robot_model() -> CollisionModel:
+    """The model on the parameter server, if its semantics are there too; else the installed PR2."""
     urdf = rospy.get_param('robot_description', '')
     srdf = rospy.get_param('robot_description_semantic', '')
     return model_from(urdf.replace('file://', ''), srdf) if urdf and srdf else installed_model()
@@ -26,7 +34,8 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
     """Offer all skills."""
     server.offer('move_arms_aside', MoveArmsAsideAction, skills.move_arms_aside)
     server.offer('point_head', PointHeadAction, skills.point_head)
-    server.offer('build_collision_map', BuildCollisionMapAction, ShownMaps(skills.build_collision_map, skills.maps))
+    server.offer('build_collision_map', BuildCollisionMapAction,
+                 CollisionMapPublisher(skills.build_collision_map, skills.maps))
     server.offer('pick', PickAction, skills.pick)
     server.offer('place', PlaceAction, skills.place)
     server.offer('open_door', OpenDoorAction, skills.open_door)
@@ -36,8 +45,10 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_only('Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, close_door and '
-                    'hand_over as actions. Parameters: ~snapshot, ~kitchen; see doc/simulation.md.')
+    parameters_only(
+        'Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, '
+        'close_door and '
+        'hand_over as actions. Parameters: ~snapshot, ~kitchen; see doc/simulation.md.')
     rospy.init_node('pr2_manipulation')
     try:
         snapshot, kitchen = snapshot_service(), kitchen_at('~kitchen')
@@ -47,6 +58,6 @@ def main() -> None:
         rospy.logfatal('pr2_manipulation: %s', err)
         raise SystemExit(2) from err
     server = SkillServer(robot.abort, robot.resume)
-    serve(KitchenSkills(Means(robot, model), kitchen), server)
+    serve(KitchenSkills(SkillContext(robot, model), kitchen), server)
     rospy.loginfo('pr2_manipulation: %d actions ready', server.names())
     rospy.spin()

@@ -1,17 +1,18 @@
 """Skills as actions: one at a time, each failure an aborted action with its reason."""
 import threading
 import traceback
-from typing import Any, Callable, List, Tuple, Type
+from typing import Callable, List, Tuple, Type
 
 import actionlib
+import genpy
 import rospy
 
-from .arm import SkillError
-from .interface import RobotError
-from .planner import PlanningError
+from ..planning.arm import SkillError
+from ..planning.planner import PlanningError
+from ..robot import RobotError
 
-Say = Callable[[str], None]
-Handler = Callable[[Any, Say], Any]
+ReportStatus = Callable[[str], None]
+Handler = Callable[[genpy.Message, ReportStatus], genpy.Message]
 
 
 class SkillServer:
@@ -19,7 +20,8 @@ class SkillServer:
 
     def __init__(self, abort: Callable[[], None], resume: Callable[[], None]) -> None:
         """
-        :param abort: makes what the robot does, now and until `resume`, end with a RobotError; called from any thread.
+        :param abort: makes what the robot does, now and until `resume`, end with a RobotError;
+            called from any thread.
         """
         self._abort = abort
         self._resume = resume
@@ -27,16 +29,20 @@ class SkillServer:
         self._running = ''
         self._servers: List[actionlib.SimpleActionServer] = []
 
-    def offer(self, name: str, spec: type, handler: Handler, errors: Tuple[Type[Exception], ...] = ()) -> None:
+    def offer(self, name: str, spec: type, handler: Handler, errors: Tuple[Type[Exception],
+                                                                           ...] = ()) -> None:
         """Serve an action.
 
-        :param spec: the Action type; its feedback has a field `status`, its result a field `reason`.
-        :param handler: takes the goal and a function that tells people what is being done; returns the result, or
-            raises SkillError, RobotError, PlanningError or one of `errors`, whose text becomes the reason.
+        :param spec: the Action type; its feedback has a field `status`, its result a field
+            `reason`.
+        :param handler: takes the goal and a function that reports what is being done; returns
+            the result, or raises SkillError, RobotError, PlanningError or one of `errors`, whose
+            text becomes the reason.
         """
         expected = (SkillError, RobotError, PlanningError) + errors
-        server = actionlib.SimpleActionServer(name, spec, lambda goal: self._serve(name, spec, server, handler, goal,
-                                                                                   expected), auto_start=False)
+        server: actionlib.SimpleActionServer = actionlib.SimpleActionServer(
+            name, spec, lambda goal: self._serve(name, spec, server, handler, goal, expected),
+            auto_start=False)
         server.register_preempt_callback(lambda: self._abort() if self._running == name else None)
         server.start()
         self._servers.append(server)
@@ -45,12 +51,12 @@ class SkillServer:
         """How many actions are served."""
         return len(self._servers)
 
-    def _serve(self, name: str, spec: type, server: actionlib.SimpleActionServer, handler: Handler, goal: Any,
-               expected: Tuple[Type[Exception], ...]) -> None:
+    def _serve(self, name: str, spec: type, server: actionlib.SimpleActionServer, handler: Handler,
+               goal: genpy.Message, expected: Tuple[Type[Exception], ...]) -> None:
         action = spec()
         feedback, result = action.action_feedback.feedback, action.action_result.result
 
-        def say(text: str) -> None:
+        def report(text: str) -> None:
             feedback.status = text
             server.publish_feedback(feedback)
 
@@ -63,7 +69,7 @@ class SkillServer:
                 server.set_preempted(result, result.reason)
                 return
             try:
-                server_result = handler(goal, say)
+                server_result = handler(goal, report)
             except expected as err:
                 result.reason = str(err)
                 if server.is_preempt_requested():

@@ -1,22 +1,23 @@
-"""What stands on a level surface in a camera frame: the surface, and the clusters of points above it."""
+"""What stands on a level surface in a camera image: clusters of points above the surface."""
 import zlib
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy import ndimage
 
-from ...geometry.box import UprightBox, upright_box
-from ...geometry.depth import points_of
-from ...geometry.pieces import standing_on
-from ...geometry.plane import Plane
-from .interface import Frame
+from smach_oracle.geometry.box import UprightBox, upright_box
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.pieces import standing_on
+from smach_oracle.geometry.plane import Plane
 
-STRIDE = 2  # every second row and column: a quarter of the work, and objects still have hundreds of points
+# every second row and column: a quarter of the work, and objects still have hundreds of points
+STRIDE = 2
 MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
 class NotSeen(Exception):
-    """What was looked for cannot be made out in the frame; the text is the reason, for people."""
+    """What was looked for cannot be made out in the image; the text is the reason, for people."""
 
 
 class Capsule(NamedTuple):
@@ -28,8 +29,8 @@ class Capsule(NamedTuple):
     radius: float  # m
 
 
-class View(NamedTuple):
-    """A frame as points in the frame of the base, thinned out."""
+class OrganizedCloud(NamedTuple):
+    """An image as points in the frame of the base, thinned out."""
 
     points: np.ndarray  # (h, w, 3) m, NaN where nothing was measured or where the robot sees itself
     colour: np.ndarray  # (h, w, 3) uint8
@@ -46,60 +47,64 @@ class Cluster(NamedTuple):
     box: UprightBox  # down to the surface
 
 
-def view_of(frame: Frame, limbs: Sequence[Capsule] = (), reach: float = 2.5) -> View:
-    """The points of a frame within `reach` m of depth, without those of the robot's own limbs."""
-    depth = frame.depth[::STRIDE, ::STRIDE]
+def cloud_of(image: CameraImage, limbs: Sequence[Capsule] = (),
+             reach: float = 2.5) -> OrganizedCloud:
+    """The points of an image within `reach` m of depth, without those of the robot's own limbs."""
+    depth = image.depth[::STRIDE, ::STRIDE]
     measured = np.isfinite(depth) & (depth > 0)
     near = np.where(measured & (depth < reach), depth, np.nan)
-    points = points_of(near, frame.intrinsics, frame.base_from_camera, stride=STRIDE)
+    points = points_of(near, image.intrinsics, image.base_from_camera, stride=STRIDE)
     hidden = np.full(depth.shape, -1)
     for index, limb in enumerate(limbs):
         hidden[_distance(points, limb) < limb.radius] = index
     points[hidden >= 0] = np.nan
-    return View(points, frame.colour[::STRIDE, ::STRIDE], hidden, tuple(limb.name for limb in limbs),
-                float(measured.mean()))
+    return OrganizedCloud(points, image.colour[::STRIDE, ::STRIDE], hidden,
+                          tuple(limb.name for limb in limbs), float(measured.mean()))
 
 
-def generator_of(frame: Frame) -> np.random.Generator:
-    """Random numbers that depend on nothing but what was seen: the same frame is always understood the same way."""
-    return np.random.default_rng(zlib.crc32(np.ascontiguousarray(frame.depth).tobytes()))
+def generator_of(image: CameraImage) -> np.random.Generator:
+    """Random numbers that depend on the image alone, so that it always gives the same result."""
+    return np.random.default_rng(zlib.crc32(np.ascontiguousarray(image.depth).tobytes()))
 
 
-def clusters_on(view: View, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
-                margin: float = MARGIN) -> List[Cluster]:
+def clusters_on(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, lowest: float,
+                highest: float, margin: float = MARGIN) -> List[Cluster]:
     """The clusters above a surface, in no order; a small one is taken for noise.
 
     :param patch: (n, 3) points of the surface; clusters stand within its convex hull.
     :param lowest: m above the surface from which points count, up to `highest`.
     """
-    seen = np.isfinite(view.points[..., 2])
-    points, pixels = view.points[seen], np.argwhere(seen)
+    seen = np.isfinite(cloud.points[..., 2])
+    points, pixels = cloud.points[seen], np.argwhere(seen)
     found = []
     for chosen in standing_on(points, plane, patch, lowest, highest, margin):
         own = points[chosen]
-        found.append(Cluster(own, pixels[chosen], upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))))
+        found.append(
+            Cluster(own, pixels[chosen], upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))))
     return found
 
 
-def limb_beside(view: View, cluster: Cluster) -> Optional[str]:
+def limb_beside(cloud: OrganizedCloud, cluster: Cluster) -> Optional[str]:
     """The limb that is seen right beside a cluster and so hides part of it, or None."""
-    own = np.zeros(view.hidden.shape, bool)
+    own = np.zeros(cloud.hidden.shape, bool)
     own[tuple(cluster.pixels.T)] = True
     around = ndimage.binary_dilation(own, iterations=4)
-    limbs = view.hidden[around & (view.hidden >= 0)]
-    return view.limbs[np.bincount(limbs).argmax()] if len(limbs) >= 8 else None
+    limbs = cloud.hidden[around & (cloud.hidden >= 0)]
+    return cloud.limbs[np.bincount(limbs).argmax()] if len(limbs) >= 8 else None
 
 
-def cut_off(view: View, cluster: Cluster) -> bool:
+def cut_off(cloud: OrganizedCloud, cluster: Cluster) -> bool:
     """Whether the edge of the image cuts a cluster off."""
-    height, width = view.hidden.shape
+    height, width = cloud.hidden.shape
     rows, columns = cluster.pixels.T
-    return bool(rows.min() < 2 or columns.min() < 2 or rows.max() > height - 3 or columns.max() > width - 3)
+    return bool(rows.min() < 2 or columns.min() < 2 or rows.max() > height - 3
+                or columns.max() > width - 3)
 
 
 def _distance(points: np.ndarray, limb: Capsule) -> np.ndarray:
     axis = limb.end - limb.start
     length = float(axis @ axis)
-    along = np.clip((points - limb.start) @ axis / length, 0.0, 1.0) if length > 1e-9 else np.zeros(points.shape[:-1])
+    along = np.clip((points - limb.start) @ axis /
+                    length, 0.0, 1.0) if length > 1e-9 else np.zeros(points.shape[:-1])
     distance = np.linalg.norm(points - limb.start - along[..., None] * axis, axis=-1)
     return np.where(np.isfinite(distance), distance, np.inf)

@@ -1,12 +1,13 @@
-"""Where the refrigerator's door stands, from what the camera sees: its angle, and its handle where it is in view."""
+"""The refrigerator's door in a camera image: its angle, and its handle where it is in view."""
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ...geometry.depth import points_of
-from ...geometry.transforms import apply, from_rpy, inverse
-from .interface import Frame
-from .kitchen import Kitchen, door_frame
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.transforms import apply, from_rpy, inverse
+
+from ..kitchen import Kitchen, door_frame
 
 STRIDE = 3
 MOST_OPEN = np.radians(125.0)
@@ -28,13 +29,13 @@ class DoorView(NamedTuple):
     base_from_fridge: np.ndarray  # 4x4, the map's, moved so that the door lies where it was seen
 
 
-def find_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> DoorView:
-    """Make out the door in a frame.
+def find_door(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray) -> DoorView:
+    """Make out the door in an image.
 
     :param base_from_fridge: 4x4, where the map has the fridge; right to some 0.1 m and 5 degrees.
     :raises DoorNotSeen: where no face of the door is in view.
     """
-    points = _points_of_door(frame, kitchen, base_from_fridge)
+    points = _points_of_door(image, kitchen, base_from_fridge)
     if len(points) < LEAST_POINTS:
         raise DoorNotSeen('the door is not in view: {} points where it may be'.format(len(points)))
     angle, offset, count = _best_angle(points, kitchen, inverse(base_from_fridge)[:3, 3])
@@ -46,10 +47,11 @@ def find_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> D
     return DoorView(angle, base_from_fridge @ from_rpy(shift))
 
 
-def _points_of_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
+def _points_of_door(image: CameraImage, kitchen: Kitchen,
+                    base_from_fridge: np.ndarray) -> np.ndarray:
     """(n, 3) points at the handle's height, within the door's swing, in the fridge's frame."""
-    points = points_of(frame.depth[::STRIDE, ::STRIDE], frame.intrinsics, inverse(base_from_fridge)
-                       @ frame.base_from_camera, stride=STRIDE).reshape(-1, 3)
+    points = points_of(image.depth[::STRIDE, ::STRIDE], image.intrinsics, inverse(base_from_fridge)
+                       @ image.base_from_camera, stride=STRIDE).reshape(-1, 3)
     points = points[np.isfinite(points[:, 2])]
     low, high = kitchen.handle_span
     level = (points[:, 2] > low + 0.02) & (points[:, 2] < high - 0.02)
@@ -59,7 +61,7 @@ def _points_of_door(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray
 
 
 def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[float, float, int]:
-    """The door's angle, how far its plane lies outside of where the map has it (m), and the points on it.
+    """The door's angle (rad), its plane's distance (m) beyond the map's, and the points on it.
 
     The outer face is known by its handle: edges of shelves and walls make planes, too.
     """
@@ -67,7 +69,8 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
     for angle in np.arange(0.0, MOST_OPEN, STEP):
         door_from_fridge = inverse(door_frame(kitchen, angle))
         local = apply(door_from_fridge, points)
-        # the camera sees the outer face of a door that is closed, the inner one of a door that is wide open
+        # the camera sees the outer face of a door that is closed, the inner one of a door that is
+        # wide open
         face = kitchen.door_thickness if apply(door_from_fridge, eye)[0] > 0 else 0.0
         on_it = (local[:, 1] > 0.05) & (local[:, 1] < kitchen.width + 0.02)
         offsets = local[on_it, 0] - face
@@ -75,15 +78,17 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
         pairs = counts[:-1] + counts[1:]
         peak = int(np.argmax(pairs))
         inside = offsets[(offsets >= edges[peak]) & (offsets < edges[peak + 2])]
-        if pairs[peak] > best[2] and not (face and _handle_shift(local, kitchen, float(np.median(inside))) is None):
+        if pairs[peak] > best[2] and not (face and _handle_shift(local, kitchen,
+                                                                 float(np.median(inside))) is None):
             best = (float(angle), float(np.median(inside)), int(pairs[peak]))
     return best
 
 
 def _handle_shift(local: np.ndarray, kitchen: Kitchen, offset: float) -> Optional[float]:
-    """How much farther from the hinge than the map says the handle is seen, m; None where it is not seen.
+    """How much farther from the hinge than in the map the handle is seen, m.
 
     :param local: (n, 3) points in the door's frame.
+    :returns: None where it is not seen.
     """
     out = local[:, 0] - offset - kitchen.door_thickness
     place = kitchen.width - kitchen.handle_inset

@@ -1,16 +1,27 @@
-"""A drink in the open refrigerator as the head camera sees it: the shelf, about where the map has it, what is on it."""
+"""A drink in the open refrigerator as the head camera sees it: the shelf, and what is on it."""
 from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from ...geometry.box import UprightBox
-from ...geometry.depth import pixels_of
-from ...geometry.pieces import largest_patch
-from ...geometry.plane import Plane, find_plane
-from ...geometry.transforms import apply, inverse
-from .clusters import Capsule, Cluster, NotSeen, View, clusters_on, cut_off, generator_of, limb_beside, view_of
-from .interface import Frame
-from .kitchen import Kitchen, shelf_region
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import pixels_of
+from smach_oracle.geometry.pieces import largest_patch
+from smach_oracle.geometry.plane import Plane, find_plane
+from smach_oracle.geometry.transforms import apply, inverse
+
+from ..kitchen import Kitchen, shelf_region
+from .clusters import (
+    Capsule,
+    Cluster,
+    NotSeen,
+    OrganizedCloud,
+    cloud_of,
+    clusters_on,
+    cut_off,
+    generator_of,
+    limb_beside,
+)
 from .touching import why_several
 
 SLACK = 0.12  # m that the map may be wrong, horizontally
@@ -25,8 +36,8 @@ HEIGHTS = (0.05, 0.32)  # m
 HIDDEN = 0.5  # share of the shelf from which its being hidden is the reason
 
 
-def find_drink(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray, min_height: float = 0.03,
-               limbs: Sequence[Capsule] = ()) -> UprightBox:
+def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
+               min_height: float = 0.03, limbs: Sequence[Capsule] = ()) -> UprightBox:
     """The foremost thing on the drinks' shelf that can be a drink, in the frame of the base.
 
     :param base_from_fridge: 4x4, where the map has the fridge; right to some 0.1 m.
@@ -34,41 +45,43 @@ def find_drink(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray, min
     :param limbs: where the robot's own arms are; they are taken out of what is seen.
     :raises NotSeen: where the shelf is not in view or hidden, or nothing on it can be a drink.
     """
-    view = view_of(frame, limbs)
-    points = _about_shelf(view, kitchen, base_from_fridge)
-    plane = find_plane(points, generator_of(frame), tolerance=OFF_SHELF, least=LEAST_SHELF)
-    patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SHELF]) if plane is not None else points[:0]
+    cloud = cloud_of(image, limbs)
+    points = _about_shelf(cloud, kitchen, base_from_fridge)
+    plane = find_plane(points, generator_of(image), tolerance=OFF_SHELF, least=LEAST_SHELF)
+    patch = largest_patch(
+        points[np.abs(plane.height(points)) < OFF_SHELF]) if plane is not None else points[:0]
     if plane is None or len(patch) < LEAST_SHELF:
-        raise NotSeen(_no_shelf(frame, kitchen, base_from_fridge, view))
-    clusters = _in_front(view, plane, patch, kitchen, base_from_fridge, min_height)
-    reasons = [_why_no_drink(view, each) for each in clusters]
+        raise NotSeen(_no_shelf(image, kitchen, base_from_fridge, cloud))
+    clusters = _in_front(cloud, plane, patch, kitchen, base_from_fridge, min_height)
+    reasons = [_why_no_drink(cloud, each) for each in clusters]
     drinks = [each.box for each, reason in zip(clusters, reasons) if not reason]
     if drinks:
         return drinks[0]
-    hidden = _share_hidden(frame, kitchen, base_from_fridge)[1]
+    hidden = _share_hidden(image, kitchen, base_from_fridge)[1]
     if hidden > HIDDEN:
         raise NotSeen('no drink in view: the door hides {:.0f}% of the shelf'.format(100 * hidden))
     raise NotSeen('no drink: ' + (reasons[0] if reasons else 'there is nothing on the shelf'))
 
 
-def things_on_shelf(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray,
+def things_on_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
                     limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
-    """Everything that is seen to stand on the drinks' shelf, foremost first; [] where the shelf is not seen.
+    """Everything seen on the drinks' shelf, foremost first; [] where the shelf is not seen.
 
     Parameters and boxes are as in find_drink().
     """
-    view = view_of(frame, limbs)
-    points = _about_shelf(view, kitchen, base_from_fridge)
-    plane = find_plane(points, generator_of(frame), tolerance=OFF_SHELF, least=LEAST_SHELF)
+    cloud = cloud_of(image, limbs)
+    points = _about_shelf(cloud, kitchen, base_from_fridge)
+    plane = find_plane(points, generator_of(image), tolerance=OFF_SHELF, least=LEAST_SHELF)
     if plane is None:
         return []
     patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SHELF])
-    return [each.box for each in _in_front(view, plane, patch, kitchen, base_from_fridge, 0.0)]
+    return [each.box for each in _in_front(cloud, plane, patch, kitchen, base_from_fridge, 0.0)]
 
 
-def _about_shelf(view: View, kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
+def _about_shelf(cloud: OrganizedCloud, kitchen: Kitchen,
+                 base_from_fridge: np.ndarray) -> np.ndarray:
     """(n, 3): the points that may be of the shelf, in the frame of the base."""
-    points = view.points[np.isfinite(view.points[..., 2])]
+    points = cloud.points[np.isfinite(cloud.points[..., 2])]
     local = apply(inverse(base_from_fridge), points)
     low, high = shelf_region(kitchen)
     slack = np.array([SLACK, SLACK])
@@ -76,59 +89,66 @@ def _about_shelf(view: View, kitchen: Kitchen, base_from_fridge: np.ndarray) -> 
     return points[near & (np.abs(local[:, 2] - low[2]) < SHELF_SLACK)]
 
 
-def _in_front(view: View, plane: Plane, patch: np.ndarray, kitchen: Kitchen, base_from_fridge: np.ndarray,
-              min_height: float) -> List[Cluster]:
+def _in_front(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, kitchen: Kitchen,
+              base_from_fridge: np.ndarray, min_height: float) -> List[Cluster]:
     """What stands on the shelf, foremost first."""
     low, high = shelf_region(kitchen)
     lowest = max(OFF_SHELF, min_height if min_height > 0 else 0.03)
-    found = clusters_on(view, plane, patch, lowest, float(high[2] - low[2]) - 0.02, MARGIN)
+    found = clusters_on(cloud, plane, patch, lowest, float(high[2] - low[2]) - 0.02, MARGIN)
     inwards = base_from_fridge[:3, 0]
     things = (each for each in found if each.box.narrow > SHEET)
     return sorted(things, key=lambda cluster: float(cluster.box.centre @ inwards))
 
 
-def _why_no_drink(view: View, cluster: Cluster) -> str:
+def _why_no_drink(cloud: OrganizedCloud, cluster: Cluster) -> str:
     """Why a cluster cannot be taken for a drink, or ''."""
     box = cluster.box
     extent = '{:.0f} x {:.0f} x {:.0f} cm'.format(*(100 * box.size))
-    limb = limb_beside(view, cluster)
+    limb = limb_beside(cloud, cluster)
     if limb is not None:
         return 'the {} hides part of what is foremost on the shelf'.format(limb)
-    if cut_off(view, cluster):
+    if cut_off(cloud, cluster):
         return 'what is foremost on the shelf is cut off by the edge of the image'
     if not HEIGHTS[0] <= box.size[2] <= HEIGHTS[1] or box.narrow < NARROW[0]:
         return 'what is foremost on the shelf, {}, has not the size of a drink'.format(extent)
     if box.narrow > NARROW[1] or box.wide > WIDEST:
-        return 'what is foremost on the shelf is too large, {}: one thing, or several that touch'.format(extent)
-    several = why_several(view, cluster)
+        return ('what is foremost on the shelf is too large, {}: '
+                'one thing, or several that touch'.format(extent))
+    several = why_several(cloud, cluster)
     return 'what is foremost on the shelf, {}, seems to be several things that touch: {}'.format(
         extent, several) if several else ''
 
 
-def _no_shelf(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray, view: View) -> str:
-    in_image, hidden = _share_hidden(frame, kitchen, base_from_fridge)
+def _no_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
+              cloud: OrganizedCloud) -> str:
+    in_image, hidden = _share_hidden(image, kitchen, base_from_fridge)
     if in_image < 0.3:
         return 'no shelf in view: the camera does not look into the refrigerator'
     if hidden > HIDDEN:
-        return 'the door hides the shelf: {:.0f}% of it is behind something nearer'.format(100 * hidden)
-    if view.known < 0.3:
-        return 'no shelf in view: depth is missing for {:.0f}% of the image'.format(100 * (1 - view.known))
+        return 'the door hides the shelf: {:.0f}% of it is behind something nearer'.format(100 *
+                                                                                           hidden)
+    if cloud.known < 0.3:
+        return 'no shelf in view: depth is missing for {:.0f}% of the image'.format(
+            100 * (1 - cloud.known))
     return 'no shelf in view where the map has it'
 
 
-def _share_hidden(frame: Frame, kitchen: Kitchen, base_from_fridge: np.ndarray) -> Tuple[float, float]:
-    """How much of the shelf's front half lies in the image, and how much of that is behind something else."""
+def _share_hidden(image: CameraImage, kitchen: Kitchen,
+                  base_from_fridge: np.ndarray) -> Tuple[float, float]:
+    """Share of the shelf's front half that is in the image, and share of that which is hidden."""
     low, high = shelf_region(kitchen)
-    across, inwards = np.meshgrid(np.linspace(low[1], high[1], 24)[2:-2], np.linspace(low[0], high[0] / 2, 10)[1:])
+    across, inwards = np.meshgrid(
+        np.linspace(low[1], high[1], 24)[2:-2],
+        np.linspace(low[0], high[0] / 2, 10)[1:])
     # a drink on the shelf hides some of that as well: so look a drink's height above the shelf
     grid = np.column_stack([inwards.ravel(), across.ravel(), np.full(inwards.size, low[2] + 0.15)])
-    seen = pixels_of(apply(base_from_fridge, grid), frame.intrinsics, frame.base_from_camera)
+    seen = pixels_of(apply(base_from_fridge, grid), image.intrinsics, image.base_from_camera)
     columns, rows = np.round(seen[:, :2]).T
-    height, width = frame.depth.shape
+    height, width = image.depth.shape
     inside = (seen[:, 2] > 0) & (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
     if not inside.any():
         return 0.0, 0.0
-    depth = frame.depth[rows[inside].astype(int), columns[inside].astype(int)]
+    depth = image.depth[rows[inside].astype(int), columns[inside].astype(int)]
     with np.errstate(invalid='ignore'):
         hidden = depth < seen[inside, 2] - SLACK / 2
     return float(inside.mean()), float(hidden.mean())

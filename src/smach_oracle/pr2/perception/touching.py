@@ -1,15 +1,16 @@
-"""Whether a cluster of points is one thing, or several that touch: by a waist in its footprint, or by two colours."""
+"""Whether a cluster of points is one thing or several that touch: by a waist, or two colours."""
 import numpy as np
 
-from .clusters import Cluster, View
+from .clusters import Cluster, OrganizedCloud
 
 SLICE = 0.006  # m along the longer side
 WAIST = 0.65  # a slice in the middle narrower than this share of both its sides is a waist
-CHROMA = 0.06  # difference of the shares of red, green and blue from which two sides have two colours
+# difference of the shares of red, green and blue from which two sides have two colours
+CHROMA = 0.06
 LEAST_LENGTH = 0.06  # m: shorter things are one
 
 
-def why_several(view: View, cluster: Cluster) -> str:
+def why_several(cloud: OrganizedCloud, cluster: Cluster) -> str:
     """What shows that this is more than one thing, or ''."""
     box = cluster.box
     if box.wide < LEAST_LENGTH:
@@ -19,12 +20,12 @@ def why_several(view: View, cluster: Cluster) -> str:
         along = along[:, ::-1]
     if _has_waist(along):
         return 'it has a waist'
-    colours = view.colour[tuple(cluster.pixels.T)].astype(float)
+    colours = cloud.colour[tuple(cluster.pixels.T)].astype(float)
     return 'it has two colours, side by side' if _two_colours(along[:, 0], colours) else ''
 
 
 def _has_waist(flat: np.ndarray) -> bool:
-    """Whether a footprint (n, 2) is narrower somewhere in the middle of its length than on both sides of that."""
+    """Whether a footprint (n, 2) is narrower somewhere in its middle than on both sides of that."""
     slices = np.floor((flat[:, 0] - flat[:, 0].min()) / SLICE).astype(int)
     widths = np.array([_width(flat[slices == index, 1]) for index in range(slices.max() + 1)])
     quarter = len(widths) // 4

@@ -1,21 +1,24 @@
-"""One arm for the time of one skill: where it is, what it can reach, ways for it, and the motions themselves."""
+"""One arm for the time of one skill: its position, its reach, paths for it, and its motions."""
 import zlib
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
-from ...geometry.transforms import apply, from_rpy
-from .collision import CollisionWorld, RobotModel
-from .interface import ARM_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
-from .kitchen import MapBox
+from smach_oracle.geometry.transforms import apply, from_rpy
+
+from ..kitchen import MapBox
+from ..robot import ARM_JOINTS, ARMS, FINGER_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
+from .collision import CollisionModel, CollisionWorld
 from .planner import BUDGET, PlanningError, plan, straight, timed
 
 FAST, SLOW = 0.45, 0.2  # of the joints' velocity limits
 FEEL_EFFORT = 40.0  # N with which the gripper closes
 LEAST_GAP = 0.012  # m between the tips, below which there is nothing in the hand
 WIDE_OPEN = 0.0025  # m that the gap may lack
-READY = {'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
-         'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])}  # rad, a posture for work in front of the robot
+READY = {
+    'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
+    'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])
+}  # rad, a posture for work in front of the robot
 ENOUGH = 3  # solutions of the inverse kinematics that are tried for one pose
 
 
@@ -23,15 +26,18 @@ class SkillError(Exception):
     """The robot could not do what it was asked to; the text is the reason, for people."""
 
 
-class Means(NamedTuple):
-    """What skills work with."""
+class SkillContext(NamedTuple):
+    """What a skill works with: the robot, and the model of its body."""
 
     robot: Robot
-    model: RobotModel
+    model: CollisionModel
 
 
-def seed_of(*parts: Any) -> int:
-    """A seed made of what is asked and how things stand (arrays, numbers, text, dictionaries), never of the time."""
+def seed_of(*parts: object) -> int:
+    """A seed made of the request and the state of things, never of the time.
+
+    :param parts: arrays, numbers, text, dictionaries.
+    """
     state = 0
     for part in parts:
         if isinstance(part, Mapping):
@@ -47,17 +53,19 @@ class Arm:
     Joint positions are (7,), rad; poses are 4x4, base_footprint from tool.
     """
 
-    def __init__(self, means: Means, arm: str, boxes: Mapping[str, MapBox], seed: int) -> None:
-        """
+    def __init__(self, context: SkillContext, arm: str, boxes: Mapping[str, MapBox],
+                 seed: int) -> None:
+        """Build the arm's collision world.
+
         :param arm: 'left' or 'right'.
         :param boxes: obstacles by name, in base_footprint.
-        :raises SkillError: for an unknown arm, or where the robot does not tell its joints.
+        :raises SkillError: for an unknown arm, or where the joints cannot be read.
         """
         self.name = arm
-        self._robot = means.robot
-        joints = read_joints(self._robot)
+        self._robot = context.robot
+        joints = encoder_readings(self._robot)
         try:
-            self.space = CollisionWorld(means.model, arm, joints)
+            self.space = CollisionWorld(context.model, arm, joints)
         except ValueError as err:
             raise SkillError(str(err)) from err
         try:
@@ -77,16 +85,18 @@ class Arm:
 
     def now(self) -> np.ndarray:
         """Joint positions (7,), by the encoders."""
-        return arm_positions(read_joints(self._robot), self.name)
+        return arm_positions(encoder_readings(self._robot), self.name)
 
     def pose(self) -> np.ndarray:
         """4x4, base_footprint from tool, by the encoders."""
         return self.chain.forward(self.now())
 
-    def reach(self, pose: np.ndarray, near: Optional[np.ndarray] = None, restarts: int = 12) -> List[np.ndarray]:
-        """Joint positions free of collision that take the tool to `pose`, nearest to `near` first; [] for none.
+    def reach(self, pose: np.ndarray, near: Optional[np.ndarray] = None,
+              restarts: int = 12) -> List[np.ndarray]:
+        """Joint positions free of collision that take the tool to `pose`, nearest to `near` first.
 
         :param near: where None, the arm's usual posture.
+        :returns: (7,) each; [] where all of them collide.
         :raises Unreachable: where no joint positions at all take it there.
         """
         seed = READY[self.name] if near is None else near
@@ -99,39 +109,57 @@ class Arm:
                 distinct.append(q)
         return [q for q in distinct[:2 * ENOUGH] if self.space.is_free(q)][:ENOUGH]
 
-    def way(self, goal: np.ndarray, start: Optional[np.ndarray] = None, budget: int = BUDGET) -> np.ndarray:
-        """A way (m, 7) around the obstacles, by at most `budget` collision checks. Raises PlanningError."""
-        return plan(self.space, self.now() if start is None else start, goal, int(self.generator.integers(1, 2 ** 31)),
-                    budget)
+    def path(self, goal: np.ndarray, start: Optional[np.ndarray] = None,
+             budget: int = BUDGET) -> np.ndarray:
+        """A path (m, 7) around the obstacles.
+
+        :param start: (7,); where None, where the arm is now.
+        :param budget: collision checks at most.
+        :raises PlanningError: where none is found.
+        """
+        return plan(self.space,
+                    self.now() if start is None else start, goal,
+                    int(self.generator.integers(1, 2**31)), budget)
 
     def line(self, start: np.ndarray, goal: np.ndarray) -> Optional[np.ndarray]:
-        """A straight way (m, 7) of the tool from joint positions to a pose; None where there is none."""
+        """A straight path (m, 7) of the tool from joint positions to a pose.
+
+        :returns: None where there is none.
+        """
         return straight(self.space, start, goal)
 
-    def follow(self, way: np.ndarray, speed: float = FAST) -> None:
-        """Move along a way (m, 7).
+    def follow(self, path: np.ndarray, speed: float = FAST) -> None:
+        """Move along a path (m, 7).
 
         :param speed: share of the joints' velocity limits.
         :raises SkillError: where the arm does not get there.
         """
-        positions, times = timed(self.chain, way, speed)
+        positions, times = timed(self.chain, path, speed)
         try:
             self._robot.follow(ARM_JOINTS[self.name], positions, times)
         except RobotError as err:
-            raise SkillError('the {} arm did not follow its way: {}'.format(self.name, err)) from err
+            raise SkillError('the {} arm did not follow its way: {}'.format(self.name,
+                                                                            err)) from err
 
     def go(self, goal: np.ndarray, speed: float = FAST) -> None:
-        """Plan and move to joint positions, as `follow` does. Raises SkillError, also where there is no way."""
+        """Plan and move to joint positions, as `follow` does.
+
+        :raises SkillError: where no path is found, or the arm does not get there.
+        """
         try:
-            way = self.way(goal)
+            path = self.path(goal)
         except PlanningError as err:
             raise SkillError(str(err)) from err
-        self.follow(way, speed)
+        self.follow(path, speed)
 
     def open(self, gap: float = GRIPPER_OPEN) -> None:
-        """Open the gripper to `gap` m between the tips. Raises SkillError where it does not open as far."""
+        """Open the gripper to `gap` m between the tips.
+
+        :raises SkillError: where it does not open as far.
+        """
         state = self._gripper(gap)
-        if state.position < gap - 0.015:  # something that it held may have got in the way of a finger
+        # something that it held may have got in the way of a finger
+        if state.position < gap - 0.015:
             state = self._gripper(gap)
         if state.position < gap - 0.015:
             raise SkillError('the {} gripper opened only {:.1f} of {:.1f} cm'.format(
@@ -139,8 +167,9 @@ class Arm:
         self._set_fingers()
 
     def close(self, effort: float = FEEL_EFFORT) -> float:
-        """Close the gripper with `effort` N; the gap (m) that something keeps open, 0 where there is nothing.
+        """Close the gripper with `effort` N.
 
+        :returns: m, the gap that something keeps open; 0 where there is nothing.
         :raises SkillError: where the gripper fails.
         """
         state = self._gripper(0.0, effort)
@@ -154,17 +183,32 @@ class Arm:
             raise SkillError('the {} gripper: {}'.format(self.name, err)) from err
 
     def _set_fingers(self) -> None:
-        """The collision world's fingers go where the encoders say."""
-        joints = read_joints(self._robot)
-        self.space.place_rest({name: value for name, value in joints.items() if '_finger_joint' in name})
+        """Take the collision world's fingers to the encoders' readings."""
+        joints = encoder_readings(self._robot)
+        self.space.place_rest(
+            {name: value
+             for name, value in joints.items() if '_finger_joint' in name})
+
+
+def known_arm(arm: str) -> str:
+    """The arm, if there is one of this name.
+
+    :raises SkillError: for an unknown one.
+    """
+    if arm not in ARMS:
+        raise SkillError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+    return arm
 
 
 class Unreachable(Exception):
     """No joint positions take the tool to a pose."""
 
 
-def read_joints(robot: Robot) -> Dict[str, float]:
-    """Encoder readings, rad or m by joint. Raises SkillError where there are none."""
+def encoder_readings(robot: Robot) -> Dict[str, float]:
+    """Encoder readings, rad or m by joint.
+
+    :raises SkillError: where there are none.
+    """
     try:
         return dict(robot.joints())
     except RobotError as err:
@@ -172,7 +216,10 @@ def read_joints(robot: Robot) -> Dict[str, float]:
 
 
 def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
-    """(7,) rad of an arm out of encoder readings. Raises SkillError where one is missing."""
+    """(7,) rad of an arm out of encoder readings.
+
+    :raises SkillError: where one is missing.
+    """
     missing = [name for name in ARM_JOINTS[arm] if name not in joints]
     if missing:
         raise SkillError('no encoder reading of {}'.format(', '.join(missing)))
@@ -180,9 +227,12 @@ def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
 
 
 def stands_open(joints: Mapping[str, float], arm: str) -> bool:
-    """Whether a gripper is as wide open as it gets, by its encoders: nothing that it can hold is as wide."""
-    fingers = [joints.get('{}_gripper_{}_finger_joint'.format(arm[0], side), 0.0) for side in 'lr']
-    return sum(fingers) > GRIPPER_OPEN - WIDE_OPEN
+    """Whether a gripper is as wide open as it gets, by its encoders.
+
+    Nothing that it can hold is as wide.
+    """
+    gap = sum(joints.get(name, 0.0) for name in FINGER_JOINTS[arm])
+    return gap > GRIPPER_OPEN - WIDE_OPEN
 
 
 def lifted(pose: np.ndarray, height: float) -> np.ndarray:
@@ -198,9 +248,10 @@ def backed_off(pose: np.ndarray, distance: float) -> np.ndarray:
 
 
 def summary(reasons: Iterable[str]) -> str:
-    """How often each reason came up, the most frequent first: '5 times out of reach, 2 times ...'."""
+    """How often each reason came up: '5 times out of reach, 2 times ...', most frequent first."""
     counted: Dict[str, int] = {}
     for reason in reasons:
         counted[reason] = counted.get(reason, 0) + 1
-    return ', '.join('{} times {}'.format(number, reason)
-                     for reason, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])))
+    return ', '.join(
+        '{} times {}'.format(number, reason)
+        for reason, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])))

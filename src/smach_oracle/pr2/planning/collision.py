@@ -1,22 +1,37 @@
-"""What an arm would touch: the robot at its encoder readings and a map of boxes, in a PyBullet client of its own.
+"""What an arm would touch: the robot at its encoder readings among boxes, in a PyBullet client.
 
-The client has nothing to do with the world's; it knows what the robot has measured. It is made anew for each skill,
-so that no answer depends on what was asked before. Lengths in m, angles in rad, frame: base_footprint.
+The client is apart from the world's: it knows what the robot has measured. It is made anew for each
+skill, so that no answer depends on what was asked before. Lengths in m, angles in rad, frame:
+base_footprint.
 """
 import contextlib
 import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from typing import Dict, FrozenSet, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import (
+    Dict,
+    FrozenSet,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+)
 
 import numpy as np
 import pybullet
 
-from ...geometry.chain import Chain, read_joints
-from ...geometry.transforms import quaternion
-from .interface import ARM_JOINTS, ARMS, BASE_FRAME, TOOL_FRAME
-from .kitchen import MapBox
-from .pr2_model import pr2_urdf, srdf_pairs
+from smach_oracle.geometry.chain import JointChain
+from smach_oracle.geometry.joints import read_joints
+from smach_oracle.geometry.transforms import VectorLike, quaternion
+
+from ..kitchen import MapBox
+from ..model.pr2_model import pr2_urdf, srdf_pairs
+from ..robot import ARM_JOINTS, ARMS, BASE_FRAME, TOOL_FRAME
 
 TOUCH = 0.001  # m that hulls may overlap: they are somewhat larger than the links
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION
@@ -24,19 +39,22 @@ _MOVING, _RESTING = 1, 64  # collision groups; 1 is what PyBullet gives to all t
 _FAR = (0.0, 0.0, -50.0)
 
 
-class RobotModel(NamedTuple):
-    """What the robot knows of its own body."""
+class CollisionModel(NamedTuple):
+    """The robot's body as collision checks need it."""
 
     urdf: str  # XML text with absolute names of mesh files
     allowed: FrozenSet[FrozenSet[str]]  # pairs of links that may touch
 
 
-def installed_model() -> RobotModel:
-    """The PR2 as derived from the installed description. Raises ModelError, where there is none."""
-    return RobotModel(pr2_urdf().read_text(), srdf_pairs())
+def installed_model() -> CollisionModel:
+    """The PR2 as derived from the installed description.
+
+    :raises ModelError: where there is none.
+    """
+    return CollisionModel(pr2_urdf().read_text(), srdf_pairs())
 
 
-def model_from(urdf: str, srdf: str) -> RobotModel:
+def model_from(urdf: str, srdf: str) -> CollisionModel:
     """A model out of robot_description and robot_description_semantic.
 
     :raises ValueError: for text that is not XML.
@@ -46,14 +64,17 @@ def model_from(urdf: str, srdf: str) -> RobotModel:
         pairs = ElementTree.fromstring(srdf).iter('disable_collisions')
     except ElementTree.ParseError as err:
         raise ValueError('robot_description_semantic: {}'.format(err)) from err
-    return RobotModel(urdf, frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs))
+    return CollisionModel(
+        urdf,
+        frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs))
 
 
 class CollisionWorld:
-    """One arm of the robot among everything else: the rest of the robot, boxes, and what the hand holds."""
+    """One arm among everything else: the rest of the robot, boxes, and what the hand holds."""
 
-    def __init__(self, model: RobotModel, arm: str, joints: Mapping[str, float]) -> None:
-        """
+    def __init__(self, model: CollisionModel, arm: str, joints: Mapping[str, float]) -> None:
+        """Load the robot into a client of its own.
+
         :param arm: the arm that moves, 'left' or 'right'; all other joints stay as in `joints`.
         :param joints: encoder readings; joints that are missing stand at 0.
         :raises ValueError: for an unknown arm, or a description that cannot be loaded.
@@ -61,7 +82,8 @@ class CollisionWorld:
         if arm not in ARMS:
             raise ValueError('arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
         lift = 'torso_lift_joint'
-        self.chain = Chain.from_urdf(model.urdf, BASE_FRAME, TOOL_FRAME[arm], fixed={lift: joints.get(lift, 0.0)})
+        self.chain = JointChain.from_urdf(model.urdf, BASE_FRAME, TOOL_FRAME[arm],
+                                          fixed={lift: joints.get(lift, 0.0)})
         self.checks = 0  # how often a configuration was looked at, the measure of planning effort
         self._boxes: Dict[str, int] = {}
         self._held: Optional[Tuple[int, np.ndarray]] = None
@@ -74,12 +96,16 @@ class CollisionWorld:
             self.close()
             raise
 
-    def _build(self, model: RobotModel, arm: str) -> None:
+    def _build(self, model: CollisionModel, arm: str) -> None:
         self._robot = self._load(model.urdf)
-        self._links = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[12].decode(): k
-                       for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
-        self._joints = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
-                        for k in range(len(self._links))}
+        self._links = {
+            pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[12].decode(): k
+            for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))
+        }
+        self._joints = {
+            pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
+            for k in range(len(self._links))
+        }
         self._arm = [self._joints[name] for name in ARM_JOINTS[arm]]
         self._moving = _below(model.urdf, arm[0] + '_shoulder_pan_link')
         self._moving_links = {self._links[name] for name in self._moving}
@@ -100,14 +126,17 @@ class CollisionWorld:
 
     def place_rest(self, joints: Mapping[str, float]) -> None:
         """Set the joints of everything but the arm (and of the gripper) to encoder readings."""
-        known = [(self._joints[name], value) for name, value in sorted(joints.items()) if name in self._joints]
-        pybullet.resetJointStatesMultiDof(self._robot, [index for index, _ in known], [[value] for _, value in known],
+        known = [(self._joints[name], value) for name, value in sorted(joints.items())
+                 if name in self._joints]
+        pybullet.resetJointStatesMultiDof(self._robot, [index for index, _ in known],
+                                          [[value] for _, value in known],
                                           physicsClientId=self._client)
 
     def add_box(self, name: str, box: MapBox) -> None:
         """An obstacle. A box of the same name is replaced."""
         self.remove(name)
-        self._boxes[name] = self._body(box.half, 0.0, box.centre, (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)))
+        self._boxes[name] = self._body(box.half, 0.0, box.centre,
+                                       (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)))
 
     def remove(self, name: str) -> None:
         """Drop an obstacle, if it is there."""
@@ -120,8 +149,12 @@ class CollisionWorld:
         """Of all obstacles."""
         return sorted(self._boxes)
 
-    def attach(self, half: Sequence[float], tool_from_object: np.ndarray) -> None:
-        """From now on the hand holds a box of these half extents (m) at a pose (4x4), and may touch it."""
+    def attach(self, half: VectorLike, tool_from_object: np.ndarray) -> None:
+        """Let the hand hold a box, which it may touch.
+
+        :param half: (3,) m, half extents.
+        :param tool_from_object: 4x4.
+        """
         self.detach()
         self._held = (self._body(half, 0.1, _FAR, (0.0, 0.0, 0.0, 1.0)), tool_from_object)
 
@@ -133,7 +166,7 @@ class CollisionWorld:
 
     @contextlib.contextmanager
     def touchable(self, names: Iterable[str]) -> Iterator[None]:
-        """While this holds, hand and held object may touch these obstacles; the rest of the arm may not."""
+        """While this holds, hand and held object may touch these obstacles; the arm may not."""
         before = self._touchable
         self._touchable = before | {self._boxes[name] for name in names if name in self._boxes}
         try:
@@ -152,12 +185,16 @@ class CollisionWorld:
         found = set()
         for one, other in self._collisions(q):
             found.add(' touches '.join(
-                names.get(link, BASE_FRAME) if body == self._robot else bodies.get(body, 'the held object')
+                names.get(link, BASE_FRAME) if body ==
+                self._robot else bodies.get(body, 'the held object')
                 for body, link in (one, other)))
         return '; '.join(sorted(found))
 
     def distance(self, q: np.ndarray, reach: float = 0.1) -> float:
-        """The least distance (m, below 0 inside) of the arm to anything that it must not touch; at most `reach`."""
+        """The least distance (m, below 0 inside) of the arm to anything that it must not touch.
+
+        :param reach: m, the most that is returned.
+        """
         self._pose(q)
         least = reach
         for body in self._boxes.values():
@@ -195,7 +232,8 @@ class CollisionWorld:
         if held >= 0:
             for contact in pybullet.getContactPoints(bodyA=held, physicsClientId=self._client):
                 bodies = {contact[1], contact[2]} - {held}
-                if contact[8] <= -TOUCH and self._robot not in bodies and not bodies & self._touchable:
+                others = self._robot not in bodies and not bodies & self._touchable
+                if contact[8] <= -TOUCH and others:
                     yield (held, -1), (bodies.pop(), -1)
 
     def _pose(self, q: np.ndarray) -> None:
@@ -204,7 +242,8 @@ class CollisionWorld:
         if self._held is not None:
             body, tool_from_object = self._held
             pose = self.chain.forward(q) @ tool_from_object
-            pybullet.resetBasePositionAndOrientation(body, pose[:3, 3].tolist(), quaternion(pose).tolist(),
+            pybullet.resetBasePositionAndOrientation(body, pose[:3, 3].tolist(),
+                                                     quaternion(pose).tolist(),
                                                      physicsClientId=self._client)
 
     def _load(self, urdf: str) -> int:
@@ -213,7 +252,9 @@ class CollisionWorld:
         try:
             with os.fdopen(handle, 'w') as stream:
                 stream.write(urdf)
-            return int(pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS, physicsClientId=self._client))
+            return int(
+                pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS,
+                                  physicsClientId=self._client))
         except pybullet.error as err:
             raise ValueError('robot description: {}'.format(err)) from err
         finally:
@@ -222,11 +263,13 @@ class CollisionWorld:
     def _filter(self, allowed: FrozenSet[FrozenSet[str]]) -> List[Tuple[int, int]]:
         """Leave on the pairs with a moving link that must not touch; they are returned."""
         solid = [(name, index) for name, index in self._links.items()
-                 if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)]
+                 if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)
+                 ]
         moving = [each for each in solid if each[0] in self._moving]
         resting = [each for each in solid if each[0] not in self._moving]
         for _, index in resting:  # they meet what moves, not each other, nor the boxes
-            pybullet.setCollisionFilterGroupMask(self._robot, index, _RESTING, _MOVING, physicsClientId=self._client)
+            pybullet.setCollisionFilterGroupMask(self._robot, index, _RESTING, _MOVING,
+                                                 physicsClientId=self._client)
         pairs = []
         for k, (one, first) in enumerate(moving):
             for other, second in moving[k + 1:] + resting:
@@ -237,11 +280,14 @@ class CollisionWorld:
                                                     physicsClientId=self._client)
         return pairs
 
-    def _body(self, half: Sequence[float], mass: float, position: Sequence[float], xyzw: Sequence[float]) -> int:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[float(each) for each in half],
+    def _body(self, half: VectorLike, mass: float, position: VectorLike,
+              xyzw: Sequence[float]) -> int:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX,
+                                              halfExtents=[float(each) for each in half],
                                               physicsClientId=self._client)
-        return int(pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
-                                            [float(each) for each in xyzw], physicsClientId=self._client))
+        return int(
+            pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
+                                     [float(each) for each in xyzw], physicsClientId=self._client))
 
 
 def _below(urdf: str, link: str) -> Set[str]:

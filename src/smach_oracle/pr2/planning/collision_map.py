@@ -1,21 +1,23 @@
-"""Maps to plan in: boxes made of what was detected, or of what a frame shows anywhere; kept by name."""
+"""Maps to plan in: boxes made of what was detected, or of all that an image shows."""
 import collections
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ...geometry.box import UprightBox
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.camera_image import CameraImage
+
+from ..kitchen import MapBox
+from ..perception.clusters import Capsule, cloud_of
 from .arm import SkillError, seed_of
-from .clusters import Capsule, view_of
-from .interface import Frame
-from .kitchen import MapBox
 
 TABLE = 'table'
 THICK = 0.04  # m, of a table top of which only the upper face is seen
 PADDING = 0.004  # m around objects
 EDGE = 0.02  # m that the table goes on beyond what is seen of it
-CELL = 0.03  # m, of the boxes made of a frame
-REGION = (np.array([0.15, -1.0, 0.2]), np.array([1.5, 1.0, 1.6]))  # lowest and highest corner of what is looked at
+CELL = 0.03  # m, of the boxes made of an image
+# lowest and highest corner of what is looked at
+REGION = (np.array([0.15, -1.0, 0.2]), np.array([1.5, 1.0, 1.6]))
 MOST_BOXES = 600
 KEPT = 20  # maps
 
@@ -27,7 +29,7 @@ class CollisionMap(NamedTuple):
     objects: Tuple[UprightBox, ...]
 
 
-class MapBook:
+class CollisionMapStore:
     """The maps made last, by their ids."""
 
     def __init__(self) -> None:
@@ -35,8 +37,12 @@ class MapBook:
 
     def keep(self, made: CollisionMap) -> str:
         """Its id, which depends on its content alone."""
-        name = 'map_{:08x}'.format(seed_of(*[part for key in sorted(made.boxes) for part in (
-            key, np.asarray(made.boxes[key].centre), np.asarray(made.boxes[key].half), made.boxes[key].yaw)]))
+        name = 'map_{:08x}'.format(
+            seed_of(*[
+                part for key in sorted(made.boxes)
+                for part in (key, np.asarray(made.boxes[key].centre),
+                             np.asarray(made.boxes[key].half), made.boxes[key].yaw)
+            ]))
         self._maps.pop(name, None)
         self._maps[name] = made
         while len(self._maps) > KEPT:
@@ -44,9 +50,13 @@ class MapBook:
         return name
 
     def find(self, name: str) -> CollisionMap:
-        """The map of this id. Raises SkillError where there is none."""
+        """The map of this id.
+
+        :raises SkillError: where there is none.
+        """
         if name not in self._maps:
-            raise SkillError('no collision map {!r}; known: {}'.format(name, ', '.join(self._maps) or 'none'))
+            raise SkillError('no collision map {!r}; known: {}'.format(
+                name, ', '.join(self._maps) or 'none'))
         return self._maps[name]
 
 
@@ -55,14 +65,18 @@ def map_of(table: UprightBox, objects: Sequence[UprightBox]) -> CollisionMap:
 
     :raises SkillError: for a table or object without extent.
     """
-    for name, box in [('the table', table)] + [('object {}'.format(k), box) for k, box in enumerate(objects)]:
+    for name, box in [('the table', table)] + [('object {}'.format(k), box)
+                                               for k, box in enumerate(objects)]:
         flat = box.size[:2] if box is table else box.size
         if not np.all(np.asarray(flat) > 0.002) or np.max(box.size) > 3.0:
             raise SkillError('{} has the size {} m; 0.2 cm to 3 m are allowed'.format(
                 name, ' x '.join('{:.3f}'.format(each) for each in box.size)))
     top = table.centre[2] + table.size[2] / 2
-    boxes = {TABLE: MapBox(np.array([table.centre[0], table.centre[1], top - THICK / 2]),
-                           np.array([table.size[0] / 2 + EDGE, table.size[1] / 2 + EDGE, THICK / 2]), table.yaw)}
+    boxes = {
+        TABLE: MapBox(np.array([table.centre[0], table.centre[1], top - THICK / 2]),
+                      np.array([table.size[0] / 2 + EDGE, table.size[1] / 2 + EDGE, THICK / 2]),
+                      table.yaw)
+    }
     for k, box in enumerate(objects):
         boxes['object {}'.format(k)] = MapBox(box.centre, box.size / 2 + PADDING, box.yaw)
     return CollisionMap(boxes, tuple(objects))
@@ -71,24 +85,38 @@ def map_of(table: UprightBox, objects: Sequence[UprightBox]) -> CollisionMap:
 def around(made: CollisionMap, target: UprightBox) -> Dict[str, MapBox]:
     """The boxes of a map without the one of `target`."""
     near = nearest_object(made, target.centre)
-    return {name: box for name, box in made.boxes.items() if near is None or name != 'object {}'.format(near)}
+    return {
+        name: box
+        for name, box in made.boxes.items() if near is None or name != 'object {}'.format(near)
+    }
 
 
 def nearest_object(made: CollisionMap, point: np.ndarray, within: float = 0.05) -> Optional[int]:
-    """Index of the object at a point (3,) of base_footprint, at most `within` m beside it; None where there is none."""
+    """Index of the object at a point (3,) of base_footprint.
+
+    :param within: m that it may be beside the point.
+    :returns: None where there is none.
+    """
     distances = [float(np.hypot(*(box.centre - point)[:2])) for box in made.objects]
     if not distances or min(distances) > within:
         return None
     return int(np.argmin(distances))
 
 
-def map_of_frame(frame: Frame, limbs: Sequence[Capsule], target: Optional[UprightBox] = None) -> CollisionMap:
-    """The map of all that a frame shows within REGION, but for the robot's own limbs and the object to be picked."""
-    points = view_of(frame, limbs).points.reshape(-1, 3)
+def map_of_image(image: CameraImage, limbs: Sequence[Capsule],
+                 target: Optional[UprightBox] = None) -> CollisionMap:
+    """The map of all that an image shows within REGION.
+
+    :param limbs: of the robot; they are left out.
+    :param target: the object to be picked, left out as well.
+    """
+    points = cloud_of(image, limbs).points.reshape(-1, 3)
     points = points[np.all((points > REGION[0]) & (points < REGION[1]), axis=1)]
     if target is not None:
         points = points[~_inside(points, target)]
-    return CollisionMap({'seen {}'.format(k): box for k, box in enumerate(_columns(points)[:MOST_BOXES])}, ())
+    return CollisionMap(
+        {'seen {}'.format(k): box
+         for k, box in enumerate(_columns(points)[:MOST_BOXES])}, ())
 
 
 def _inside(points: np.ndarray, box: UprightBox, margin: float = 0.012) -> np.ndarray:
@@ -100,7 +128,11 @@ def _inside(points: np.ndarray, box: UprightBox, margin: float = 0.012) -> np.nd
 
 
 def _columns(points: np.ndarray, least: int = 3) -> List[MapBox]:
-    """Boxes of CELL in width, as long in y as cells lie side by side; cells with less than `least` points are noise."""
+    """Boxes of CELL in width, as long in y as cells lie side by side.
+
+    :param points: (n, 3).
+    :param least: points of a cell; fewer are noise.
+    """
     if not len(points):
         return []
     cells, counts = np.unique(np.floor(points / CELL).astype(int), axis=0, return_counts=True)

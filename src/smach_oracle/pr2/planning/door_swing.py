@@ -1,30 +1,33 @@
-"""Joint paths of a hand that goes with a door, free to turn about the vertical axis as the arm needs it."""
+"""Joint paths of a hand that goes with a door, and may turn about the vertical axis."""
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ...geometry.chain import Chain
+from smach_oracle.geometry.chain import JointChain
 
-TURNS = (-0.8, 0.0, 0.5, 1.0, 1.8)  # of the hand against the door, to choose from at each step; in units of that step
+# of the hand against the door, to choose from at each step; in units of that step
+TURNS = (-0.8, 0.0, 0.5, 1.0, 1.8)
 MAX_JOINT_STEP = 0.35  # rad between two points of the path
 ROOM = 0.35  # rad of distance to a joint's limit, beyond which more does not count
 GOOD_ENOUGH = 0.999
 
-ToolAt = Callable[[float, float], np.ndarray]  # (door angle, turn of the hand against the door) -> 4x4, base from tool
+# (door angle, turn of the hand against the door) -> 4x4, base from tool
+ToolAt = Callable[[float, float], np.ndarray]
 IsFree = Callable[[np.ndarray, float], bool]  # (joint positions, door angle) -> nothing collides
 
 
-class Swing(NamedTuple):
+class DoorSwing(NamedTuple):
     """A path of an arm along a door."""
 
     path: np.ndarray  # (n, 7) rad
     angles: np.ndarray  # (n,) rad, of the door at these points
-    share: float  # of the way that was asked for
+    share: float  # of the angle that was asked for
 
 
-def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tuple[float, float], seed: np.ndarray,
-               generator: np.random.Generator, is_free: IsFree,
-               may_begin: Callable[[np.ndarray], bool] = lambda q: True, tries: int = 45) -> Optional[Swing]:
+def best_swing(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, turns: Tuple[float, float],
+               seed: np.ndarray, generator: np.random.Generator, is_free: IsFree,
+               may_begin: Callable[[np.ndarray],
+                                   bool] = lambda q: True, tries: int = 45) -> Optional[DoorSwing]:
     """The longest path found along `angles` (rad, in order, evenly spaced).
 
     :param turns: rad, the least and most that the hand may be turned against the door.
@@ -32,7 +35,7 @@ def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tu
     :param may_begin: whether the arm can get to the first joint positions of a path at all.
     :returns: None where not even the first pose can be reached freely.
     """
-    best: Optional[Swing] = None
+    best: Optional[DoorSwing] = None
     for _ in range(tries):
         turn = float(generator.uniform(*turns))
         starts = chain.solutions(tool_at(angles[0], turn), seed, generator, restarts=6)
@@ -47,8 +50,8 @@ def best_swing(chain: Chain, tool_at: ToolAt, angles: Sequence[float], turns: Tu
     return best
 
 
-def _follow(chain: Chain, tool_at: ToolAt, angles: Sequence[float], limits: Tuple[float, float], start: np.ndarray,
-            turn: float, is_free: IsFree) -> Swing:
+def _follow(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, limits: Tuple[float, float],
+            start: np.ndarray, turn: float, is_free: IsFree) -> DoorSwing:
     path, turns = [start], [turn]
     for before, angle in zip(angles[:-1], angles[1:]):
         options = [turns[-1] + step * abs(angle - before) for step in TURNS]
@@ -58,25 +61,29 @@ def _follow(chain: Chain, tool_at: ToolAt, angles: Sequence[float], limits: Tupl
             break
         path.append(step[0])
         turns.append(step[1])
-    return Swing(np.array(path), np.array(angles[:len(path)]), len(path) / len(angles))
+    return DoorSwing(np.array(path), np.array(angles[:len(path)]), len(path) / len(angles))
 
 
-def _next(chain: Chain, tool_at: ToolAt, angle: float, turns: Sequence[float], q: np.ndarray,
+def _next(chain: JointChain, tool_at: ToolAt, angle: float, turns: Sequence[float], q: np.ndarray,
           is_free: IsFree) -> Optional[Tuple[np.ndarray, float]]:
-    """The next point of a path and the hand's turn there: of those in reach the one with most room for the joints."""
+    """The next point of a path, and the hand's turn there.
+
+    Of the points in reach, it is the one with most room for the joints.
+    """
     options = []
     for turn in turns:
         reached = chain.inverse(tool_at(angle, turn), q, iterations=15)
         if reached is not None and np.abs(reached - q).max() < MAX_JOINT_STEP:
-            options.append((_room(chain, reached) - 0.5 * float(np.abs(reached - q).max()), turn, reached))
+            options.append(
+                (_room(chain, reached) - 0.5 * float(np.abs(reached - q).max()), turn, reached))
     for _, turn, reached in sorted(options, key=lambda option: -option[0]):
         if is_free(reached, angle):
             return reached, turn
     return None
 
 
-def _room(chain: Chain, q: np.ndarray) -> float:
-    """How far the joints stay from their limits: the smallest distance and, a little, all of them, rad."""
+def _room(chain: JointChain, q: np.ndarray) -> float:
+    """How far the joints stay from their limits, rad: the least distance, and a little of each."""
     bounded = ~chain.continuous
     distance = np.minimum(q - chain.lower, chain.upper - q)[bounded]
     return float(np.minimum(distance, ROOM).min() + 0.1 * np.minimum(distance, ROOM).sum())

@@ -1,16 +1,20 @@
-"""From where a hand may take an upright thing: headings all round, and the hand level, inclined or from above."""
+"""Grasps of an upright thing: headings all round, with the hand level, inclined or from above."""
 from typing import Iterator, List
 
 import numpy as np
 
-from ...geometry.box import UprightBox
-from ...geometry.transforms import from_rpy
-from .interface import GRIPPER_OPEN
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.transforms import from_rpy
+
+from ..robot import GRIPPER_OPEN
 
 WIDEST = 0.085  # m between the tips that a thing may take up
-CORNERS = 0.6  # what a heading costs, as a turn in rad, from which fingers may come down on corners and squeeze it out
+# what a heading costs, as a turn in rad, from which fingers may come down on corners and squeeze it
+# out
+CORNERS = 0.6
 SPARE = 0.002  # m between the open tips and such corners that is enough
-SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}  # x, y in base_footprint, m
+# x, y in base_footprint, m
+SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}
 HEADINGS = np.linspace(-1.3, 1.3, 14)  # rad, beside the straight one from the shoulder
 PITCHES = (0.0, 0.4, 0.8, np.pi / 2)  # rad, of the hand downwards
 DEPTH = 0.012  # m that the tips go beyond the middle
@@ -41,8 +45,12 @@ def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
 
 
 def width_across(box: UprightBox, heading: float) -> float:
-    """How much (m) of the gap between the tips a thing takes up, for a hand that comes along `heading` (rad)."""
-    if box.wide - box.narrow < 0.012:  # as good as round, or square: its corners turn in between the tips
+    """How much of the gap between the tips a thing takes up, m.
+
+    :param heading: rad, of the hand that comes.
+    """
+    # as good as round, or square: its corners turn in between the tips
+    if box.wide - box.narrow < 0.012:
         return box.wide
     return _projected(box, heading)
 
@@ -53,10 +61,11 @@ def _projected(box: UprightBox, heading: float) -> float:
 
 
 def _middle(box: UprightBox, heading: float, pitch: float) -> np.ndarray:
-    """Where the tool frame goes: somewhat beyond the middle, at a height where the fingers hold well."""
+    """Where the tool frame goes: beyond the middle, at a height where the fingers hold well."""
     bottom, top = box.centre[2] - box.size[2] / 2, box.centre[2] + box.size[2] / 2
     if pitch > 1.2:
         return np.array([box.centre[0], box.centre[1], max(bottom + 0.02, top - 0.035)])
     height = min(max(box.centre[2], bottom + LOWEST + 0.03 * np.sin(pitch)), top - BELOW_TOP)
     ahead = min(DEPTH, box.narrow / 3)
-    return np.array([box.centre[0] + ahead * np.cos(heading), box.centre[1] + ahead * np.sin(heading), height])
+    return np.array(
+        [box.centre[0] + ahead * np.cos(heading), box.centre[1] + ahead * np.sin(heading), height])

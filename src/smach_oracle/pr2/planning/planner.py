@@ -1,7 +1,8 @@
-"""Ways for an arm: around obstacles (RRT-Connect of OMPL), along straight lines, and when to be where on them.
+"""Paths for an arm: around obstacles (RRT-Connect of OMPL), along straight lines, and their timing.
 
-Effort is counted in collision checks, never in seconds, and every random draw comes from a seed: the same question
-has the same answer on any day and under any load. One question at a time in a process: OMPL's seed is global.
+Effort is counted in collision checks, never in seconds, and every random draw comes from a seed:
+the same question has the same answer on any day and under any load. One question at a time in a
+process: OMPL's seed is global.
 """
 from typing import List, Optional, Tuple
 
@@ -10,30 +11,33 @@ from ompl import base as ompl_base
 from ompl import geometric as ompl_geometric
 from ompl import util as ompl_util
 
-from ...geometry.chain import Chain
-from ...geometry.transforms import inverse, rotation_vector, transform
+from smach_oracle.geometry.chain import JointChain
+from smach_oracle.geometry.transforms import inverse, rotation_about, rotation_vector, transform
+
 from .collision import CollisionWorld
 
-BUDGET = 6000  # collision checks for one way; most take less than 1000
-RESOLUTION = 0.05  # rad (norm over the joints) between checks along a way
+BUDGET = 6000  # collision checks for one path; most take less than 1000
+RESOLUTION = 0.05  # rad (norm over the joints) between checks along a path
 REACH = 0.6  # rad that a tree grows at once
 STRAIGHT_STEP = 0.01  # m between checks along a line
 LARGEST_JUMP = 0.35  # rad in a joint between those: more is another posture
 ACCELERATION = 4.0  # rad/s2, each joint
-CORNER = 0.25  # rad/s by which a joint's speed may jump where a way bends
+CORNER = 0.25  # rad/s by which a joint's speed may jump where a path bends
 SAMPLE = 0.04  # rad between points of a trajectory
 
 ompl_util.setLogLevel(ompl_util.LOG_NONE)
 
 
 class PlanningError(Exception):
-    """No way was found; the text says why."""
+    """No path was found; the text gives the reason."""
 
 
-def plan(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, budget: int = BUDGET) -> np.ndarray:
-    """A way free of collision.
+def plan(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
+         budget: int = BUDGET) -> np.ndarray:
+    """A path free of collision.
 
-    :param start: (7,), where the arm is; where it touches something by a little, it first steps out of it.
+    :param start: (7,), where the arm is; where it touches something by a little, it first steps out
+        of it.
     :param goal: (7,), within the limits; continuous joints go there by less than half a turn.
     :param seed: 1 or more.
     :param budget: collision checks to spend at most.
@@ -70,34 +74,39 @@ def step_out(space: CollisionWorld, start: np.ndarray, seed: int, tries: int = 2
 
 
 def straight(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Optional[np.ndarray]:
-    """A way that takes the tool along a straight line from where it is at `start` (7,) to a pose (4x4).
+    """A path that takes the tool along a straight line to a pose.
 
-    :param goal: base_footprint from tool.
-    :returns: (m, 7) from the start; None where the line leaves the reach, needs another posture, or meets something.
+    :param start: (7,), where the arm is.
+    :param goal: 4x4, base_footprint from tool.
+    :returns: (m, 7) from the start; None where the line leaves the reach, needs another posture, or
+        meets something.
     """
     chain = space.chain
     here = chain.forward(start)
     turn = rotation_vector(goal @ inverse(here))
-    length = max(np.linalg.norm(goal[:3, 3] - here[:3, 3]), 0.2 * float(np.linalg.norm(turn)))
+    length = max(float(np.linalg.norm(goal[:3, 3] - here[:3, 3])),
+                 0.2 * float(np.linalg.norm(turn)))
     steps = max(2, int(np.ceil(length / STRAIGHT_STEP)))
-    way = [np.asarray(start, dtype=float)]
+    path = [np.asarray(start, dtype=float)]
     for k in range(1, steps + 1):
-        q = chain.inverse(_between(here, goal, turn, k / steps), way[-1], iterations=25)
-        if q is None or np.abs(q - way[-1]).max() > LARGEST_JUMP or not space.is_free(q):
+        q = chain.inverse(_between(here, goal, turn, k / steps), path[-1], iterations=25)
+        if q is None or np.abs(q - path[-1]).max() > LARGEST_JUMP or not space.is_free(q):
             return None
-        way.append(q)
-    return np.array(way)
+        path.append(q)
+    return np.array(path)
 
 
-def timed(chain: Chain, way: np.ndarray, speed: float = 0.4) -> Tuple[np.ndarray, np.ndarray]:
-    """When to be where on a way: at most `speed` times the joints' velocity limits, and the acceleration bounded.
+def timed(chain: JointChain, path: np.ndarray, speed: float = 0.4) -> Tuple[np.ndarray, np.ndarray]:
+    """The times of a path's points, with speed and acceleration bounded.
 
-    :param way: (m, n), m >= 1; the arm starts at its first point, at rest.
-    :returns: positions (k, n) after the first point, and times (k,) in s, increasing; for Robot.follow().
+    :param path: (m, n), m >= 1; the arm starts at its first point, at rest.
+    :param speed: share of the joints' velocity limits, at most.
+    :returns: positions (k, n) after the first point, and times (k,) in s, increasing; for
+        Robot.follow().
     """
-    points = _sampled(way)
+    points = _sampled(path)
     if len(points) < 2:
-        return np.asarray(way[-1:], dtype=float), np.array([0.1])
+        return np.asarray(path[-1:], dtype=float), np.array([0.1])
     moves = np.diff(points, axis=0)
     lengths = np.linalg.norm(moves, axis=1)
     directions = moves / lengths[:, None]
@@ -105,7 +114,8 @@ def timed(chain: Chain, way: np.ndarray, speed: float = 0.4) -> Tuple[np.ndarray
     fastest = np.min(limits / np.maximum(np.abs(directions), 1e-9), axis=1)  # along each piece
     bend = np.abs(np.diff(directions, axis=0)).max(axis=1)
     speeds = np.zeros(len(points))
-    speeds[1:-1] = np.minimum(np.minimum(fastest[:-1], fastest[1:]), CORNER / np.maximum(bend, 1e-9))
+    speeds[1:-1] = np.minimum(np.minimum(fastest[:-1], fastest[1:]),
+                              CORNER / np.maximum(bend, 1e-9))
     push = np.min(ACCELERATION / np.maximum(np.abs(directions), 1e-9), axis=1)
     for k in range(len(lengths)):
         speeds[k + 1] = min(speeds[k + 1], np.sqrt(speeds[k] ** 2 + 2 * push[k] * lengths[k]))
@@ -115,10 +125,10 @@ def timed(chain: Chain, way: np.ndarray, speed: float = 0.4) -> Tuple[np.ndarray
     return points[1:], np.cumsum(durations)
 
 
-def _sampled(way: np.ndarray) -> np.ndarray:
-    """The way with points at most SAMPLE apart, and none twice."""
-    points: List[np.ndarray] = [np.asarray(way[0], dtype=float)]
-    for corner in way[1:]:
+def _sampled(path: np.ndarray) -> np.ndarray:
+    """The path with points at most SAMPLE apart, and none twice."""
+    points: List[np.ndarray] = [np.asarray(path[0], dtype=float)]
+    for corner in path[1:]:
         length = float(np.linalg.norm(corner - points[-1]))
         if length > 1e-6:
             pieces = max(1, int(np.ceil(length / SAMPLE)))
@@ -131,19 +141,19 @@ def _between(here: np.ndarray, goal: np.ndarray, turn: np.ndarray, share: float)
     angle = float(np.linalg.norm(turn))
     rotation = here[:3, :3]
     if angle > 1e-9:
-        x, y, z = turn / angle
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        rotation = (np.eye(3) + np.sin(share * angle) * cross + (1 - np.cos(share * angle)) * cross @ cross) @ rotation
+        rotation = rotation_about(turn / angle, share * angle) @ rotation
     return transform(here[:3, 3] + share * (goal[:3, 3] - here[:3, 3]), rotation)
 
 
-def _straight_in_joints(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Optional[List[np.ndarray]]:
+def _straight_in_joints(space: CollisionWorld, start: np.ndarray,
+                        goal: np.ndarray) -> Optional[List[np.ndarray]]:
     steps = max(2, int(np.ceil(np.linalg.norm(goal - start) / RESOLUTION)))
     free = all(space.is_free(q) for q in np.linspace(start, goal, steps + 1)[1:-1])
     return [start, goal] if free else None
 
 
-def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, budget: int) -> List[np.ndarray]:
+def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
+         budget: int) -> List[np.ndarray]:
     chain = space.chain
     states = ompl_base.RealVectorStateSpace(len(start))
     bounds = ompl_base.RealVectorBounds(len(start))
@@ -154,8 +164,10 @@ def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, 
     states.setBounds(bounds)
     ompl_util.RNG.setSeed(max(1, int(seed)))
     setup = ompl_geometric.SimpleSetup(states)
-    setup.setStateValidityChecker(lambda state: space.is_free([state[k] for k in range(len(start))]))
-    setup.getSpaceInformation().setStateValidityCheckingResolution(RESOLUTION / states.getMaximumExtent())
+    setup.setStateValidityChecker(
+        lambda state: space.is_free(np.array([state[k] for k in range(len(start))])))
+    setup.getSpaceInformation().setStateValidityCheckingResolution(RESOLUTION /
+                                                                   states.getMaximumExtent())
     ends = [states.allocState(), states.allocState()]
     for state, q in zip(ends, (start, chain.clip(goal))):
         for k in range(len(start)):
@@ -167,7 +179,8 @@ def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, 
     last = space.checks + budget
     setup.solve(ompl_base.PlannerTerminationCondition(lambda: space.checks >= last))
     if not setup.haveExactSolutionPath():
-        raise PlanningError('no way around the obstacles was found within {} collision checks'.format(budget))
+        raise PlanningError(
+            'no way around the obstacles was found within {} collision checks'.format(budget))
     path = setup.getSolutionPath()
     setup.getPathSimplifier().reduceVertices(path, 60, 30)
     return [np.array([state[k] for k in range(len(start))]) for state in path.getStates()]

@@ -1,12 +1,13 @@
-"""How the arms are held while the base drives: compact, clear of the doors of furniture and of the camera's view."""
+"""How the arms are held while the base drives: compact, clear of doors and of the camera's view."""
 from typing import Iterable, Mapping
 
 import numpy as np
 
-from ...geometry.transforms import from_rpy, transform, yaw_of
-from .arm import Arm, Means, SkillError, Unreachable, read_joints, seed_of
-from .interface import RobotError
-from .kitchen import MapBox
+from smach_oracle.geometry.transforms import from_rpy, transform, yaw_of
+
+from ..kitchen import MapBox
+from ..robot import RobotError
+from .arm import Arm, SkillContext, SkillError, Unreachable, encoder_readings, seed_of
 
 # rad; the left hand folded before the chest, the right arm at the robot's side
 TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
@@ -18,14 +19,14 @@ CARRY_HEIGHTS = (0.85, 1.00)  # m
 CARRY_SPEED = 0.3
 
 
-def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None:
+def stow(context: SkillContext, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None:
     """Take arms to their postures for driving.
 
     :param boxes: obstacles, in base_footprint.
     :raises SkillError: for an unknown arm, or where an arm does not get there.
     """
     for arm in arms:
-        with Arm(means, arm, boxes, seed_of(arm, read_joints(means.robot))) as limb:
+        with Arm(context, arm, boxes, seed_of(arm, encoder_readings(context.robot))) as limb:
             now = limb.now()
             if np.abs(limb.chain.nearest_turn(TRAVEL[arm], now) - now).max() > NEAR_ENOUGH:
                 limb.go(TRAVEL[arm])
@@ -34,17 +35,19 @@ def stow(means: Means, arms: Iterable[str], boxes: Mapping[str, MapBox]) -> None
 def carry(limb: Arm, level: bool = True) -> None:
     """Take the hand to the robot's side, the elbow low and out of the camera's view.
 
-    :param level: whether the hand is level in the end; if not, it is turned about the vertical alone, so that what it
-        holds is as upright as it is now.
+    :param level: whether the hand is level in the end; if not, it is turned about the vertical
+        alone, so that what it holds is as upright as it is now.
     :raises SkillError: where the arm does not get there.
     """
     now = limb.pose()
     height = min(max(now[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
-    tilt = np.eye(4) if level else transform(rotation=from_rpy((0, 0, 0), yaw=-yaw_of(now))[:3, :3] @ now[:3, :3])
+    tilt = np.eye(4) if level else transform(
+        rotation=from_rpy((0, 0, 0), yaw=-yaw_of(now))[:3, :3] @ now[:3, :3])
     for x, y, yaw in CARRIES:
         side = 1.0 if limb.name == 'right' else -1.0
         try:
-            found = limb.reach(from_rpy((x, side * y, height), yaw=side * yaw) @ tilt, near=TRAVEL[limb.name])
+            found = limb.reach(
+                from_rpy((x, side * y, height), yaw=side * yaw) @ tilt, near=TRAVEL[limb.name])
         except Unreachable:
             continue
         if found:
@@ -54,8 +57,9 @@ def carry(limb: Arm, level: bool = True) -> None:
 
 
 def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -> None:
-    """Draw the hand back along its own axis by up to `length` m, as far as there is a straight way.
+    """Draw the hand back along its own axis, as far as there is a straight path.
 
+    :param length: m, at most.
     :param touching: names of obstacles that the hand may touch meanwhile.
     :raises SkillError: where the arm does not follow it.
     """
@@ -64,15 +68,18 @@ def draw_back(limb: Arm, length: float, touching: Iterable[str], speed: float) -
         goal = here.copy()
         goal[:3, 3] -= share * length * here[:3, 0]
         with limb.space.touchable(touching):
-            way = limb.line(limb.now(), goal)
-        if way is not None:
-            limb.follow(way, speed)
+            path = limb.line(limb.now(), goal)
+        if path is not None:
+            limb.follow(path, speed)
             return
 
 
-def drive(means: Means, odom_from_goal: np.ndarray) -> None:
-    """Drive the base to a pose (4x4) in odom_combined. Raises SkillError where it does not get there."""
+def drive(context: SkillContext, odom_from_goal: np.ndarray) -> None:
+    """Drive the base to a pose (4x4) in odom_combined.
+
+    :raises SkillError: where it does not get there.
+    """
     try:
-        means.robot.drive(odom_from_goal)
+        context.robot.drive(odom_from_goal)
     except RobotError as err:
         raise SkillError('the base did not get where it should: {}'.format(err)) from err

@@ -3,9 +3,17 @@ from typing import Mapping, Sequence
 
 import numpy as np
 
-from .arm import FAST, Arm, Means, SkillError, arm_positions, read_joints, seed_of
-from .interface import ARMS
-from .kitchen import MapBox
+from ..kitchen import MapBox
+from ..planning.arm import (
+    FAST,
+    Arm,
+    SkillContext,
+    SkillError,
+    arm_positions,
+    encoder_readings,
+    seed_of,
+)
+from ..robot import ARMS
 
 ASIDE = {'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]),
          'left': np.array([1.6, 0.2, 1.5, -1.5, -0.5, -0.6, 0.0])}  # rad
@@ -18,7 +26,7 @@ def is_aside(joints: Mapping[str, float], arm: str) -> bool:
     return bool(np.abs(_turned(q, ASIDE[arm]) - ASIDE[arm]).max() < NEAR_ENOUGH)
 
 
-def arms_aside(means: Means, arms: Sequence[str], boxes: Mapping[str, MapBox]) -> None:
+def arms_aside(context: SkillContext, arms: Sequence[str], boxes: Mapping[str, MapBox]) -> None:
     """Move arms aside, one after the other.
 
     :param arms: 'left', 'right'; empty: both.
@@ -27,15 +35,17 @@ def arms_aside(means: Means, arms: Sequence[str], boxes: Mapping[str, MapBox]) -
     """
     unknown = sorted(set(arms) - set(ARMS))
     if unknown:
-        raise SkillError('arm {}; allowed: {}'.format(', '.join(map(repr, unknown)), ', '.join(ARMS)))
+        raise SkillError('arm {}; allowed: {}'.format(', '.join(map(repr, unknown)),
+                                                      ', '.join(ARMS)))
     wanted = [arm for arm in ARMS if arm in arms or not arms]
-    away = [arm for arm in wanted if not is_aside(read_joints(means.robot), arm)]
+    away = [arm for arm in wanted if not is_aside(encoder_readings(context.robot), arm)]
     for arm in away:
-        with Arm(means, arm, boxes, seed_of(arm, read_joints(means.robot))) as limb:
+        with Arm(context, arm, boxes, seed_of(arm, encoder_readings(context.robot))) as limb:
             limb.go(ASIDE[arm], FAST)
     for arm in wanted:
-        if not is_aside(read_joints(means.robot), arm):
-            raise SkillError('the {} arm is not at the side: something moved it, or holds it'.format(arm))
+        if not is_aside(encoder_readings(context.robot), arm):
+            raise SkillError(
+                'the {} arm is not at the side: something moved it, or holds it'.format(arm))
 
 
 def _turned(q: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -1,24 +1,41 @@
-"""Opening and closing the refrigerator by real contact: by the handle, or with the hand against the door.
+"""Open and close the refrigerator by contact: by the handle, or with the hand against the door.
 
-Opening does not look at its result: where the arm did not get far enough, the door stands half open and nobody knows
-until somebody looks into the fridge.
+Opening does not verify the final angle: where the arm did not get far enough, the door stands half
+open, and the failure surfaces in a later state.
 """
 from contextlib import contextmanager
 from typing import Callable, Dict, Iterator, Optional, Tuple
 
 import numpy as np
 
-from ...geometry.transforms import apply, from_rpy, inverse, yaw_of
-from .arm import READY, Arm, Means, SkillError, read_joints, seed_of
-from .door_view import DoorNotSeen, DoorView, find_door
-from .interface import ARMS, GRIPPER_OPEN, Robot
-from .kitchen import Kitchen, MapBox, base_from_fridge, door_frame, fridge_boxes, handle_point, odom_from_pose
-from .swing import Swing, best_swing
-from .travel import TRAVEL, carry, draw_back, drive, stow
+from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
+
+from ..kitchen import (
+    Kitchen,
+    MapBox,
+    base_from_fridge,
+    door_frame,
+    fridge_boxes,
+    handle_point,
+    odom_from_pose,
+)
+from ..perception.door_view import DoorNotSeen, DoorView, find_door
+from ..planning.arm import (
+    READY,
+    Arm,
+    SkillContext,
+    SkillError,
+    encoder_readings,
+    known_arm,
+    seed_of,
+)
+from ..planning.door_swing import DoorSwing, best_swing
+from ..planning.travel import TRAVEL, carry, draw_back, drive, stow
+from ..robot import ARMS, FINGER_JOINTS, GRIPPER_OPEN, Robot
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
-CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, for whoever drives in next
+CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, ready to drive in
 CLOSING = (-0.92, -0.30, 0.0)
 
 AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
@@ -26,122 +43,134 @@ PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on fr
 WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
-BEFORE_CHEST = (0.30, 0.20)  # m ahead at least, m to its side at most: a hand there is in the other arm's way
+# m ahead at least, m to its side at most: a hand there is in the other arm's way
+BEFORE_CHEST = (0.30, 0.20)
 AWAY = 0.16  # m that the base takes the hand back from the bar
 AWAY_FOR_GOOD = 0.40  # m, after a failure
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
-JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
 BEFORE = 0.10  # m that the hand comes straight
 PUSHES = 2  # until the door is shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
-RELEASE = 0.045  # m between the tips that lets go of the bar; there is no room for more between bar and door
+# m between the tips that lets go of the bar; there is no room for more between bar and door
+RELEASE = 0.045
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
 APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
 
 ToolAt = Callable[[float, float], np.ndarray]
 
 
-def open_door(means: Means, kitchen: Kitchen, arm: str) -> float:
-    """Open the fridge, from wherever the base stands in front of it, and leave the base ready to drive in.
+def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
+    """Open the fridge, from wherever the base stands before it; leave the base ready to drive in.
 
     :param arm: 'left' or 'right'.
     :returns: rad, the opening that the arm's motion should have brought about.
-    :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
+    :raises SkillError: with the reason.
+    :raises PlanningError: where no path is found.
+    :raises RobotError: where arm, head or gripper do not get somewhere.
     """
-    _check_arm(arm)
-    with _letting_be(means):
-        return _open(means, kitchen, arm)
+    known_arm(arm)
+    with _letting_be(context):
+        return _open(context, kitchen, arm)
 
 
-def _open(means: Means, kitchen: Kitchen, arm: str) -> float:
-    view = _stand_before(means, kitchen)
+def _open(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
+    view = _stand_before(context, kitchen)
     if view.angle < AJAR:
-        angle = _pull(means, kitchen, arm, view)
-        _step_back(means, AWAY)
-        _stow_beside(means, kitchen, angle)
-        view = _stand_before(means, kitchen)
+        angle = _pull(context, kitchen, arm, view)
+        _step_back(context, AWAY)
+        _stow_beside(context, kitchen, angle)
+        view = _stand_before(context, kitchen)
     if view.angle < WIDE - STEP:
-        view = view._replace(angle=_push_open(means, kitchen, arm, view))
-        _stow_beside(means, kitchen, view.angle)
-    drive(means, odom_from_pose(kitchen, *CLEAR))
+        view = view._replace(angle=_push_open(context, kitchen, arm, view))
+        _stow_beside(context, kitchen, view.angle)
+    drive(context, odom_from_pose(kitchen, *CLEAR))
     return view.angle
 
 
-def close_door(means: Means, kitchen: Kitchen, arm: str) -> None:
+def close_door(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
     """Push the door shut with the back of the hand, and look whether it is.
 
-    :raises SkillError: with the reason. PlanningError, RobotError where the arm or the base does not get somewhere.
+    :raises SkillError: with the reason.
+    :raises PlanningError: where no path is found.
+    :raises RobotError: where arm, head or gripper do not get somewhere.
     """
-    _check_arm(arm)
-    with _letting_be(means):
-        _close(means, kitchen, arm)
+    known_arm(arm)
+    with _letting_be(context):
+        _close(context, kitchen, arm)
 
 
-def _close(means: Means, kitchen: Kitchen, arm: str) -> None:
-    drive(means, odom_from_pose(kitchen, *CLOSING))
-    _clear_of_door(means, next(other for other in ARMS if other != arm))
-    view = look(means.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
+def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
+    drive(context, odom_from_pose(kitchen, *CLOSING))
+    _clear_of_door(context, next(other for other in ARMS if other != arm))
+    view = look(context.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
     for push in range(PUSHES):
         if view.angle >= STEP:
             try:
-                _push_shut(means, kitchen, arm, view)
+                _push_shut(context, kitchen, arm, view)
             except SkillError:
                 if push == PUSHES - 1:
                     raise
-            view = look(means.robot, kitchen, np.array([-0.2, 0.10, GRASP_HEIGHT]))
+            view = look(context.robot, kitchen, np.array([-0.2, 0.10, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
-        raise SkillError('the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle)))
+        raise SkillError('the door still stands open by {:.0f} degrees'.format(
+            np.degrees(view.angle)))
 
 
 @contextmanager
-def _letting_be(means: Means) -> Iterator[None]:
-    """After a failure in here the base takes the hands away from the door: one may be caught behind a part of it."""
+def _letting_be(context: SkillContext) -> Iterator[None]:
+    """After a failure, drive back: a hand may be caught behind a part of the door."""
     try:
         yield
     except SkillError:
         try:
-            _step_back(means, AWAY_FOR_GOOD)
+            _step_back(context, AWAY_FOR_GOOD)
         except SkillError:
-            pass  # the reason of the failure is the one to tell
+            pass  # the first failure is the one to report
         raise
 
 
-def _stand_before(means: Means, kitchen: Kitchen) -> DoorView:
+def _stand_before(context: SkillContext, kitchen: Kitchen) -> DoorView:
     """Drive to where the door is opened, with the arms out of the way, and look at it."""
-    here = inverse(base_from_fridge(kitchen, means.robot.odom_from_base()))
+    here = inverse(base_from_fridge(kitchen, context.robot.odom_from_base()))
     if here[0, 3] > CLEAR[0] + 0.05:  # within the door's swing
-        _step_back(means, here[0, 3] - CLEAR[0])
-    _stow_beside(means, kitchen, WIDE)
-    drive(means, odom_from_pose(kitchen, *OPENING))
-    return look(means.robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+        _step_back(context, here[0, 3] - CLEAR[0])
+    _stow_beside(context, kitchen, WIDE)
+    drive(context, odom_from_pose(kitchen, *OPENING))
+    return look(context.robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
 
 
-def _clear_of_door(means: Means, arm: str) -> None:
-    """Take a hand that is in the way of the door, or of the arm that pushes it, to its side, with what it may hold."""
-    with Arm(means, arm, {}, seed_of(arm, read_joints(means.robot))) as limb:
+def _clear_of_door(context: SkillContext, arm: str) -> None:
+    """Take a hand that is in the way of the door or of the pushing arm to its side.
+
+    It keeps what it holds.
+    """
+    with Arm(context, arm, {}, seed_of(arm, encoder_readings(context.robot))) as limb:
         ahead, left = limb.pose()[:2, 3]
         beside = left if arm == 'left' else -left
         if ahead > AHEAD or (ahead > BEFORE_CHEST[0] and beside < BEFORE_CHEST[1]):
             carry(limb, level=False)
 
 
-def _step_back(means: Means, length: float) -> None:
+def _step_back(context: SkillContext, length: float) -> None:
     """Drive straight back by `length` m."""
-    drive(means, means.robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
+    drive(context, context.robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
 
 
-def _stow_beside(means: Means, kitchen: Kitchen, angle: float) -> None:
+def _stow_beside(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
     """Take both arms to their postures for driving, with the door at `angle`."""
-    boxes = named_boxes(kitchen, base_from_fridge(kitchen, means.robot.odom_from_base()), angle)
-    stow(means, ARMS, boxes)
+    boxes = named_boxes(kitchen, base_from_fridge(kitchen, context.robot.odom_from_base()), angle)
+    stow(context, ARMS, boxes)
 
 
 def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> DoorView:
-    """Look for the door at a point (3,) of the fridge's frame. Raises SkillError where it is not seen."""
+    """Look for the door at a point (3,) of the fridge's frame.
+
+    :raises SkillError: where it is not seen.
+    """
     expected = base_from_fridge(kitchen, robot.odom_from_base())
     robot.look_at(apply(expected, point))
     for attempt in range(tries):
@@ -150,10 +179,10 @@ def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> D
         except DoorNotSeen as err:
             if attempt == tries - 1:
                 raise SkillError(str(err)) from err
-    raise SkillError('nobody looked')
+    raise SkillError('the door was not looked for: tries is {}'.format(tries))
 
 
-def _pull(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> float:
+def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
     """Grasp the handle and pull it around the hinge as far as the arm reaches."""
     fridge = view.base_from_fridge
 
@@ -161,59 +190,63 @@ def _pull(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> float:
         bar = apply(fridge, handle_point(kitchen, angle, GRASP_HEIGHT))
         return from_rpy(bar, yaw=turn - angle + yaw_of(fridge)) @ from_rpy((BEYOND, 0.0, 0.0))
 
-    with _limb(means, kitchen, arm, view) as limb:
-        swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45), ('handle',),
-                       lambda q: _approach(limb, q) is not None)
+    with _limb(context, kitchen, arm, view) as limb:
+        swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45),
+                       ('handle',), lambda q: _approach(limb, q) is not None)
         if swing is None or swing.angles[-1] < LEAST_PULL:
-            raise SkillError('the handle is out of reach of the {} arm, or cannot be pulled from here'.format(arm))
-        means.robot.gripper(arm, GRIPPER_OPEN)
+            raise SkillError(
+                'the handle is out of reach of the {} arm, or cannot be pulled from here'.format(
+                    arm))
+        context.robot.gripper(arm, GRIPPER_OPEN)
         _place_door(limb, kitchen, fridge, view.angle)
         approach = _approach(limb, swing.path[0])
+        if approach is None:
+            raise SkillError('no straight way to the handle')
         limb.go(approach[0])
         limb.follow(approach, APPROACH_SPEED)
-        held = means.robot.gripper(arm, 0.0, GRIP_EFFORT)
+        held = context.robot.gripper(arm, 0.0, GRIP_EFFORT)
         if held.position < LEAST_GAP:
             draw_back(limb, BEFORE, ('handle',), APPROACH_SPEED)
             raise SkillError('the hand closed on nothing: the handle is not where it was seen')
         _strain(limb, swing, PULL_SPEED)
-        if sum(read_joints(means.robot)[name] for name in JAWS[arm]) < LEAST_GAP:
+        if sum(encoder_readings(context.robot)[name] for name in FINGER_JOINTS[arm]) < LEAST_GAP:
             raise SkillError('the handle slipped out of the {} hand'.format(arm))
-        means.robot.gripper(arm, RELEASE)
+        context.robot.gripper(arm, RELEASE)
     return float(swing.angles[-1])
 
 
-def _push_open(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> float:
+def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
     """Reach behind the door's edge and push it from inside."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
         return _against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
-    with _limb(means, kitchen, arm, view) as limb:
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6), ('door',),
-                       lambda q: _is_beside(limb, kitchen, view, q))
+    with _limb(context, kitchen, arm, view) as limb:
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6),
+                       ('door',), lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
-        means.robot.gripper(arm, 0.0)
+        context.robot.gripper(arm, 0.0)
         _strain(limb, swing, PUSH_SPEED)
         _place_door(limb, kitchen, fridge, swing.angles[-1])
         draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
     return float(swing.angles[-1])
 
 
-def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None:
+def _push_shut(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> None:
     """Push the door from outside until it is shut."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
         return _against(kitchen, fridge, angle, turn, CLOSE_REACH, CLOSE_HEIGHT, inside=False)
 
-    with _limb(means, kitchen, arm, view) as limb:
-        means.robot.gripper(arm, 0.0)
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4), ('door',),
-                       lambda q: _is_beside(limb, kitchen, view, q))
+    with _limb(context, kitchen, arm, view) as limb:
+        context.robot.gripper(arm, 0.0)
+        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4),
+                       ('door',), lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle, BERTH)
@@ -224,10 +257,10 @@ def _push_shut(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> None
         limb.go(TRAVEL[arm])
 
 
-def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float, last: float,
-           turns: Tuple[float, float], touching: Tuple[str, ...],
-           may_begin: Callable[[np.ndarray], bool] = lambda q: True) -> Optional[Swing]:
-    """The best path of the hand along the door between two angles, with the door where the hand has it."""
+def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float,
+           last: float, turns: Tuple[float, float], touching: Tuple[str, ...],
+           may_begin: Callable[[np.ndarray], bool] = lambda q: True) -> Optional[DoorSwing]:
+    """The best path of the hand along the door between two angles (rad)."""
     count = int(np.ceil(abs(last - first) / STEP)) + 1
 
     def is_free(q: np.ndarray, angle: float) -> bool:
@@ -239,8 +272,8 @@ def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, fir
                       limb.generator, is_free, may_begin)
 
 
-def _strain(limb: Arm, swing: Swing, speed: float) -> None:
-    """Follow a swing against what resists; where the arm is held up in the end, it has done what it could."""
+def _strain(limb: Arm, swing: DoorSwing, speed: float) -> None:
+    """Follow a swing against resistance; an arm that is held up at the end has not failed."""
     here = limb.now()
     turns = limb.chain.nearest_turn(swing.path[0], here) - swing.path[0]
     try:
@@ -249,15 +282,11 @@ def _strain(limb: Arm, swing: Swing, speed: float) -> None:
         pass
 
 
-def _limb(means: Means, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
+def _limb(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
     """The arm among the parts of the fridge where they were seen."""
     boxes = named_boxes(kitchen, view.base_from_fridge, view.angle)
-    return Arm(means, arm, boxes, seed_of(arm, view.angle, view.base_from_fridge, read_joints(means.robot)))
-
-
-def _check_arm(arm: str) -> None:
-    if arm not in ARMS:
-        raise SkillError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
+    return Arm(context, arm, boxes,
+               seed_of(arm, view.angle, view.base_from_fridge, encoder_readings(context.robot)))
 
 
 def _is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bool:
@@ -267,18 +296,24 @@ def _is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bo
 
 
 def _approach(limb: Arm, grasp: np.ndarray) -> Optional[np.ndarray]:
-    """A straight way (m, 7) of the hand to joint positions at the handle; None where there is none."""
+    """A straight path (m, 7) of the hand to joint positions at the handle.
+
+    :returns: None where there is none.
+    """
     before = limb.chain.forward(grasp) @ from_rpy((-BEFORE, 0.0, 0.0))
     with limb.space.touchable(('handle',)):
-        way = limb.line(grasp, before)
-    return None if way is None or not limb.space.is_free(way[-1]) else way[::-1]
+        path = limb.line(grasp, before)
+    return None if path is None or not limb.space.is_free(path[-1]) else path[::-1]
 
 
-def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, reach: float, height: float,
-             inside: bool) -> np.ndarray:
-    """4x4, base from tool: the closed hand beside the door's inner or outer face, turned by `turn` against it.
+def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, reach: float,
+             height: float, inside: bool) -> np.ndarray:
+    """4x4, base from tool: the closed hand beside the door's inner or outer face.
 
-    At turn 0 it points straight at the face; the more it lies along it, the more room its width needs.
+    :param turn: rad, of the hand against the face. At 0 it points straight at it; the more it lies
+        along it, the more room its width needs.
+    :param reach: m from the hinge.
+    :param height: m.
     """
     room = 0.01 + 0.07 * abs(np.sin(turn))
     out = -room if inside else kitchen.door_thickness + room
@@ -295,7 +330,8 @@ def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str,
     return named
 
 
-def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float, berth: float = 0.0) -> None:
+def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float,
+                berth: float = 0.0) -> None:
     """Have the door at an angle in the arm's map, with `berth` m around it."""
     boxes = named_boxes(kitchen, fridge, angle)
     for name in ('door', 'handle'):

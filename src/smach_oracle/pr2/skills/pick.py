@@ -3,27 +3,41 @@ from typing import List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
-from ...geometry.box import UprightBox
-from ...geometry.transforms import inverse
-from .arm import FAST, FEEL_EFFORT, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
-from .grasps import grasps
-from .interface import GRIPPER_OPEN
-from .kitchen import MapBox
-from .planner import PlanningError
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.transforms import inverse
+
+from ..kitchen import MapBox
+from ..planning.arm import (
+    FAST,
+    FEEL_EFFORT,
+    SLOW,
+    Arm,
+    SkillContext,
+    SkillError,
+    Unreachable,
+    backed_off,
+    lifted,
+    seed_of,
+    summary,
+)
+from ..planning.grasps import grasps
+from ..planning.planner import PlanningError
+from ..robot import GRIPPER_OPEN
 
 APPROACH = 0.10  # m, straight, towards the object
 LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
-FIRM = 100.0  # N, the strongest grip there is: of what has slipped, and of what a person put into the hand
-MISSES = 2  # grasps that may close on nothing before the robot says so
+# N, the strongest grip there is: of what has slipped, and of what a person put into the hand
+FIRM = 100.0
+MISSES = 2  # grasps that may close on nothing before the skill fails
 EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 TARGET = 'the object'
 
 
-class Slipped(SkillError):
+class ObjectSlipped(SkillError):
     """The object did not come along when it was lifted."""
 
 
-class Held(NamedTuple):
+class HeldObject(NamedTuple):
     """What a hand holds."""
 
     grasp: np.ndarray  # 4x4, base_footprint from tool, when the gripper closed
@@ -32,15 +46,15 @@ class Held(NamedTuple):
     effort: float = FEEL_EFFORT  # N, of the grip
 
 
-class _Way(NamedTuple):
+class _GraspPath(NamedTuple):
     """How to get at a grasp."""
 
     there: np.ndarray  # (m, 7) to the place in front of the object
     approach: np.ndarray  # (k, 7) from there
 
 
-def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
-         effort: float = FEEL_EFFORT) -> Held:
+def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
+         effort: float = FEEL_EFFORT) -> HeldObject:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
@@ -49,31 +63,33 @@ def pick(means: Means, arm: str, target: UprightBox, boxes: Mapping[str, MapBox]
     :param effort: N, of the grip.
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
-    ways = grasps(target, arm) if arm in ('left', 'right') else []
+    candidates = grasps(target, arm) if arm in ('left', 'right') else []
     obstacles = dict(boxes)
     obstacles[TARGET] = MapBox(target.centre, target.size / 2, target.yaw)
-    with Arm(means, arm, obstacles, seed_of(arm, target.centre, target.size, means.robot.joints())) as hand:
-        if not ways:
-            raise SkillError('the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
-                100 * target.size[0], 100 * target.size[1]))
+    with Arm(context, arm, obstacles,
+             seed_of(arm, target.centre, target.size, context.robot.joints())) as hand:
+        if not candidates:
+            raise SkillError(
+                'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
+                    100 * target.size[0], 100 * target.size[1]))
         hand.open()
-        return _pick(hand, target, ways, effort)
+        return _pick(hand, target, candidates, effort)
 
 
-def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float) -> Held:
+def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float) -> HeldObject:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
-        way = _way_to(hand, grasp, reasons) if hand.space.checks < EFFORT else None
-        if way is None:
+        path = _path_to(hand, grasp, reasons) if hand.space.checks < EFFORT else None
+        if path is None:
             continue
-        hand.follow(way.there, FAST)
-        hand.follow(way.approach, SLOW)
+        hand.follow(path.there, FAST)
+        hand.follow(path.approach, SLOW)
         if hand.close(effort) > 0:
             return _lift(hand, target, effort)
         missed += 1
         hand.open()
-        hand.follow(way.approach[::-1], SLOW)
+        hand.follow(path.approach[::-1], SLOW)
         if missed == MISSES:
             raise SkillError('the gripper closed on nothing, {} times'.format(MISSES))
     if missed:
@@ -81,8 +97,8 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: f
     raise SkillError('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
 
 
-def _way_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Way]:
-    """A way to a grasp (4x4); None, with a reason more, where there is none."""
+def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_GraspPath]:
+    """A path to a grasp (4x4); where there is none, None and one more reason."""
     try:
         starts = hand.reach(backed_off(grasp, APPROACH))
     except Unreachable:
@@ -98,24 +114,24 @@ def _way_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Way]:
             reasons.append('no straight way to the object')
             continue
         try:
-            return _Way(hand.way(start), approach)
+            return _GraspPath(hand.path(start), approach)
         except PlanningError as err:
             reasons.append(str(err))
     return None
 
 
-def _lift(hand: Arm, target: UprightBox, effort: float) -> Held:
+def _lift(hand: Arm, target: UprightBox, effort: float) -> HeldObject:
     """Lift what the gripper has closed on, and feel whether it came along."""
     grasp = hand.pose()
-    held = Held(grasp, inverse(grasp) @ target.matrix, target.size / 2, effort)
+    held = HeldObject(grasp, inverse(grasp) @ target.matrix, target.size / 2, effort)
     hand.space.remove(TARGET)
     with hand.space.touchable(hand.space.names()):
         lines = (hand.line(hand.now(), lifted(grasp, height)) for height in LIFTS)
-        way = next((line for line in lines if line is not None), None)
-    if way is None:
+        path = next((line for line in lines if line is not None), None)
+    if path is None:
         hand.open(GRIPPER_OPEN)
         raise SkillError('the arm cannot lift the object from where it grasped it')
-    hand.follow(way, SLOW)
+    hand.follow(path, SLOW)
     if hand.close(effort) == 0:
-        raise Slipped('the object slipped out of the gripper when it was lifted')
+        raise ObjectSlipped('the object slipped out of the gripper when it was lifted')
     return held

@@ -1,30 +1,44 @@
-"""Put down what a hand holds: choose a heading, go above, lower, let go, back off, and see whether it stands there."""
+"""Put down what a hand holds: go above the place, lower, let go, back off, and look."""
 from typing import Iterator, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ...geometry.depth import points_of
-from ...geometry.transforms import from_rpy, inverse, transform
-from .arm import FAST, SLOW, Arm, Means, SkillError, Unreachable, backed_off, lifted, seed_of, summary
-from .interface import Frame
-from .kitchen import MapBox
-from .pick import Held
-from .planner import PlanningError
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.transforms import from_rpy, inverse, transform
 
-EFFORT = 40000  # collision checks for the choice of a way, about 3 s
+from ..kitchen import MapBox
+from ..planning.arm import (
+    FAST,
+    SLOW,
+    Arm,
+    SkillContext,
+    SkillError,
+    Unreachable,
+    backed_off,
+    lifted,
+    seed_of,
+    summary,
+)
+from ..planning.planner import PlanningError
+from .pick import HeldObject
+
+EFFORT = 40000  # collision checks for the choice of a path, about 3 s
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
-TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)  # rad, of the object about the vertical, against how it stood
-SHIFTS = ((0.0, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.0))  # m beside the place: near enough
+# rad, of the object about the vertical, against how it stood
+TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+# m beside the place: near enough
+SHIFTS = ((0.0, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.0))
 SLACK = 0.10  # m that the height asked for may differ from the one at which the object stands
 
-NEAR = 0.05  # m around the place, within which a frame must show the object
+NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
 LEAST_POINTS = 40
 
 
-class _Way(NamedTuple):
+class _PlacePath(NamedTuple):
     """How to put it down."""
 
     there: np.ndarray  # (m, 7), to above the place
@@ -32,49 +46,52 @@ class _Way(NamedTuple):
     back: np.ndarray  # (j, 7), without the object
 
 
-class Lost(SkillError):
+class ObjectLost(SkillError):
     """The hand turned out to be empty."""
 
 
-def place(means: Means, arm: str, centre: np.ndarray, held: Held, boxes: Mapping[str, MapBox],
-          support: str = 'table') -> np.ndarray:
+def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
+          boxes: Mapping[str, MapBox], support: str = 'table') -> np.ndarray:
     """Put the held object down upright.
 
     :param centre: (3,) m, where its centre shall be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it shall stand.
     :returns: (3,) where its centre should be now.
-    :raises SkillError: where nothing is held, no way is found, or the object is lost.
+    :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
-    with Arm(means, arm, boxes, seed_of(arm, centre, held.grasp, means.robot.joints())) as hand:
+    with Arm(context, arm, boxes, seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
         if support not in boxes:
-            raise SkillError('there is nothing to stand on: the collision map has no {}'.format(support))
+            raise SkillError(
+                'there is nothing to stand on: the collision map has no {}'.format(support))
         if hand.close(held.effort) == 0:
-            raise Lost('the {} hand holds nothing'.format(arm))
+            raise ObjectLost('the {} hand holds nothing'.format(arm))
         centre = _on_support(centre, held, boxes[support])
         hand.space.attach(held.half - 0.004, held.tool_from_object)
-        centre, way = _find_way(hand, centre, held, support)
-        hand.follow(way.there, FAST)
+        centre, path = _find_path(hand, centre, held, support)
+        hand.follow(path.there, FAST)
         if hand.close(held.effort) == 0:
-            raise Lost('the object was lost on the way to its place')
-        hand.follow(way.down, SLOW)
+            raise ObjectLost('the object was lost on the way to its place')
+        hand.follow(path.down, SLOW)
         hand.open()
         hand.space.detach()
-        hand.follow(way.back, SLOW)
+        hand.follow(path.back, SLOW)
         return centre
 
 
-def put_back(means: Means, arm: str, held: Held, boxes: Mapping[str, MapBox]) -> None:
-    """Let go of an object where it was taken, if the arm is still above that; elsewhere, where it is.
+def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[str,
+                                                                               MapBox]) -> None:
+    """Let go of an object where it was taken, if the arm is above that; elsewhere, where it is.
 
-    :raises SkillError: where the hand does not open, or the arm does not follow its way.
+    :raises SkillError: where the hand does not open, or the arm does not follow its path.
     """
-    with Arm(means, arm, boxes, seed_of(arm, held.grasp)) as hand:
+    with Arm(context, arm, boxes, seed_of(arm, held.grasp)) as hand:
         now = hand.pose()
         if np.hypot(*(now - held.grasp)[:2, 3]) < NEAR:
             with hand.space.touchable(hand.space.names()):
                 down = hand.line(hand.now(), held.grasp)
-                back = None if down is None else hand.line(down[-1], backed_off(held.grasp, RETREAT))
+                back = None if down is None else hand.line(down[-1], backed_off(
+                    held.grasp, RETREAT))
             if down is not None and back is not None:
                 hand.follow(down, SLOW)
                 hand.open()
@@ -83,30 +100,38 @@ def put_back(means: Means, arm: str, held: Held, boxes: Mapping[str, MapBox]) ->
         hand.open()
 
 
-def stands_there(frame: Frame, centre: np.ndarray, held: Held) -> bool:
-    """Whether a frame shows something as high as the object, where its centre (3,), m in base_footprint, should be."""
-    points = points_of(frame.depth[::2, ::2], frame.intrinsics, frame.base_from_camera, stride=2).reshape(-1, 3)
+def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject) -> bool:
+    """Whether an image shows something as high as the object at its place.
+
+    :param centre: (3,) m in base_footprint, where the object's centre should be.
+    """
+    points = points_of(image.depth[::2, ::2], image.intrinsics, image.base_from_camera,
+                       stride=2).reshape(-1, 3)
     beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
     bottom = centre[2] - held.half[2]
-    there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) & (points[:, 2] < bottom + 3 * held.half[2])]
-    return len(there) >= LEAST_POINTS and np.percentile(there[:, 2], 90) > bottom + UPRIGHT * 2 * held.half[2]
+    there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) &
+                   (points[:, 2] < bottom + 3 * held.half[2])]
+    return len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
+                                                        90) > bottom + UPRIGHT * 2 * held.half[2]
 
 
-def _on_support(centre: np.ndarray, held: Held, support: MapBox) -> np.ndarray:
+def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.ndarray:
     """The place asked for, at the height at which the object stands."""
     top = support.centre[2] + support.half[2]
     inside = np.abs(transform(rotation=from_rpy((0, 0, 0), yaw=-support.yaw)[:3, :3])[:2, :2]
                     @ (centre[:2] - support.centre[:2])) - support.half[:2]
     height = top + held.half[2]
-    if max(inside) > 0 or abs(centre[2] - height) > SLACK:
-        raise SkillError('there is nothing to stand on at x {:.2f}, y {:.2f}, z {:.2f} m: the support is {:.2f} m high '
-                         'and the place is {:.0f} cm {} its edge'.format(
-                             *centre, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'))
-    return np.array([centre[0], centre[1], height + DROP])
+    x, y, z = centre
+    if max(inside) > 0 or abs(z - height) > SLACK:
+        raise SkillError(
+            'there is nothing to stand on at x {:.2f}, y {:.2f}, z {:.2f} m: the support is '
+            '{:.2f} m high and the place is {:.0f} cm {} its edge'.format(
+                x, y, z, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'))
+    return np.array([x, y, height + DROP])
 
 
-def _poses(centre: np.ndarray, held: Held) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
-    """Places near enough, with poses of the tool that bring the object there, the natural ones first."""
+def _poses(centre: np.ndarray, held: HeldObject) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """Places near enough, with poses of the tool that bring the object there, best first."""
     stood = held.grasp @ held.tool_from_object
     object_from_tool = inverse(held.tool_from_object)
     for shift in SHIFTS:
@@ -116,7 +141,8 @@ def _poses(centre: np.ndarray, held: Held) -> Iterator[Tuple[np.ndarray, np.ndar
             yield there, transform(there, rotation) @ object_from_tool
 
 
-def _find_way(hand: Arm, centre: np.ndarray, held: Held, support: str) -> Tuple[np.ndarray, _Way]:
+def _find_path(hand: Arm, centre: np.ndarray, held: HeldObject,
+               support: str) -> Tuple[np.ndarray, _PlacePath]:
     reasons: List[str] = []
     start = hand.now()
     for there, pose in _poses(centre, held):
@@ -135,19 +161,20 @@ def _find_way(hand: Arm, centre: np.ndarray, held: Held, support: str) -> Tuple[
             if down is None:
                 reasons.append('no straight way down')
                 continue
-            back = _way_back(hand, down[-1], pose, held)
+            back = _path_back(hand, down[-1], pose, held)
             if back is None:
                 reasons.append('no way back')
                 continue
             try:
-                return there, _Way(hand.way(q, start), down, back)
+                return there, _PlacePath(hand.path(q, start), down, back)
             except PlanningError as err:
                 reasons.append(str(err))
     raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
         centre[0], centre[1], summary(reasons)))
 
 
-def _way_back(hand: Arm, start: np.ndarray, pose: np.ndarray, held: Held) -> Optional[np.ndarray]:
+def _path_back(hand: Arm, start: np.ndarray, pose: np.ndarray,
+               held: HeldObject) -> Optional[np.ndarray]:
     hand.space.detach()
     try:
         return hand.line(start, backed_off(pose, RETREAT))

@@ -1,52 +1,65 @@
 """The PR2's controllers: actions whose goals move parts of the robot."""
 from functools import partial
-from typing import Any, Callable, Dict, Tuple
+from typing import Callable, Dict, Optional, Tuple
 
 import actionlib
+import genpy
 import rospy
-from control_msgs.msg import (FollowJointTrajectoryAction, GripperCommandAction, PointHeadAction,
-                              SingleJointPositionAction)
-from move_base_msgs.msg import MoveBaseAction
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from trajectory_msgs.msg import JointTrajectory
 
-from smach_oracle.simulation.robot.interface import ARM_JOINTS, ARMS, CAMERA_FRAME
-from smach_oracle.simulation.world.motions import Drive, Gripper, Head, Torso
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.trajectory import Motion, Trajectory
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    GripperCommandAction,
+    GripperCommandGoal,
+    PointHeadAction,
+    PointHeadGoal,
+    SingleJointPositionAction,
+    SingleJointPositionGoal,
+)
+from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, CAMERA_FRAME
 
+from ..physics.motions import BaseMotion, GripperMotion, HeadMotion, TorsoMotion
+from ..physics.trajectory import Motion, Trajectory
+from ..physics.world import World
 from . import feedback, goals
 from .loop import WorldLoop
-from .motion_table import Ending, MotionTable
-from .streamed import Streamed
+from .motion_table import MotionEnd, MotionTable
+from .streamed_target import StreamedTarget
 
 DEFAULT_EFFORT = 50.0  # N
 TORSO_JOINT = 'torso_lift_joint'
 CAMERA_FRAMES = (CAMERA_FRAME, 'high_def_optical_frame', 'head_plate_frame')
 NEWER = 'a newer command took its place'
 
+MakeMotion = Callable[[genpy.Message], Motion]  # of a goal
+MakeMessage = Callable[..., genpy.Message]  # of a motion, and for a result of its end
+
 
 class Controller:
-    """An action for one part of the robot. All but the two callbacks run in the world's thread.
+    """An action for one part of the robot.
 
-    :param make: the motion of a goal; raises ValueError where it can be none, and the goal is rejected.
-    :param report: (motion, ending) to the action's result.
+    All but the two callbacks run in the world's thread.
+
+    :param make: the motion of a goal; a ValueError from it rejects the goal.
+    :param report: (motion, end) to the action's result.
     :param feed: a motion to the action's feedback.
     """
 
-    def __init__(self, name: str, spec: Any, part: str, loop: WorldLoop, motions: MotionTable,
-                 make: Callable[[Any], Motion], report: Callable[[Motion, Ending], Any],
-                 feed: Callable[[Motion], Any]) -> None:
+    def __init__(self, name: str, spec: type, part: str, loop: WorldLoop, motions: MotionTable,
+                 make: MakeMotion, report: MakeMessage, feed: MakeMessage) -> None:
         self._part = part
         self._motions = motions
         self._make, self._report, self._feed = make, report, feed
         self._refusal = type(spec().action_result.result)
-        self._handle: Any = None
+        self._handle: Optional[actionlib.ServerGoalHandle] = None
         self._server = actionlib.ActionServer(
-            name, spec, lambda handle: loop.tell(partial(self._begin, handle)),
-            lambda handle: loop.tell(partial(self._cancel, handle)), auto_start=False)
+            name, spec, lambda handle: loop.post(partial(self._begin, handle)),
+            lambda handle: loop.post(partial(self._cancel, handle)), auto_start=False)
         self._server.start()
 
-    def _begin(self, handle: Any) -> None:
+    def _begin(self, handle: actionlib.ServerGoalHandle) -> None:
         try:
             motion = self._make(handle.get_goal())
         except ValueError as err:
@@ -60,83 +73,94 @@ class Controller:
         self._motions.start(self._part, motion, partial(self._end, handle, motion), NEWER)
         self._handle = handle
 
-    def _cancel(self, handle: Any) -> None:
-        if self._handle is not None and handle == self._handle:  # else it has ended since it was cancelled
+    def _cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        # else it has ended since it was cancelled
+        if self._handle is not None and handle == self._handle:
             self._motions.stop(self._part, 'preempted')
 
-    def _end(self, handle: Any, motion: Motion, ending: Ending) -> None:
+    def _end(self, handle: actionlib.ServerGoalHandle, motion: Motion, end: MotionEnd) -> None:
         self._handle = None
-        result = self._report(motion, ending)
-        if ending.result is not None and ending.result.ok:
-            handle.set_succeeded(result, ending.text)
-        elif ending.result is not None or ending.aborted:
-            handle.set_aborted(result, ending.text)
+        result = self._report(motion, end)
+        if end.result is not None and end.result.ok:
+            handle.set_succeeded(result, end.text)
+        elif end.result is not None or end.aborted:
+            handle.set_aborted(result, end.text)
         else:
-            handle.set_canceled(result, ending.text)
+            handle.set_canceled(result, end.text)
 
     def publish_feedback(self) -> None:
-        """Tell who commanded the motion that is under way how it goes."""
+        """Publish how far the motion under way is."""
         if self._handle is not None:
             self._handle.publish_feedback(self._feed(self._motions.motion(self._part)))
 
 
 class Controllers:
-    """All of them, and the topics on which joint targets for the arms come in a stream.
+    """All controllers, and the topics on which joint targets for the arms come in a stream.
 
-    :param streamed: called in the world's thread when a target of a stream has been reached, or was refused.
+    :param streamed: called in the world's thread when a target of a stream has been reached, or was
+        refused.
     """
 
-    def __init__(self, world: World, loop: WorldLoop, motions: MotionTable, now_s: Callable[[], float],
-                 streamed: Callable[[], Any]) -> None:
+    def __init__(self, world: World, loop: WorldLoop, motions: MotionTable,
+                 now_s: Callable[[], float], streamed: Callable[[], object]) -> None:
         self._world, self._loop, self._motions, self._now_s = world, loop, motions, now_s
         self._streamed = streamed
         self._limits: Dict[str, Dict[str, Tuple[float, float]]] = {
             arm: {name: world.robot.limits[name] for name in ARM_JOINTS[arm]} for arm in ARMS}
-        self._all = [self._one('head_traj_controller/point_head_action', PointHeadAction, 'head', self._head,
-                               feedback.head_result, feedback.head),
-                     self._one('torso_controller/position_joint_action', SingleJointPositionAction, 'torso',
-                               self._torso, feedback.torso_result, feedback.torso),
-                     self._one('move_base', MoveBaseAction, 'base', self._base, feedback.base_result, feedback.base)]
+        self._all = [
+            self._one('head_traj_controller/point_head_action', PointHeadAction, 'head', self._head,
+                      feedback.head_result, feedback.head),
+            self._one('torso_controller/position_joint_action', SingleJointPositionAction, 'torso',
+                      self._torso, feedback.torso_result, feedback.torso),
+            self._one('move_base', MoveBaseAction, 'base', self._base, feedback.base_result,
+                      feedback.base)
+        ]
         for arm in ARMS:
             self._add_arm(arm)
 
     def _add_arm(self, arm: str) -> None:
         side = arm[0]
-        self._all.append(self._one(side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction,
-                                   arm + '_arm', partial(self._arm, arm), feedback.arm_result, feedback.arm))
-        self._all.append(self._one(side + '_gripper_controller/gripper_action', GripperCommandAction,
-                                   arm + '_gripper', partial(self._gripper, arm),
-                                   partial(feedback.gripper_result, arm), partial(feedback.gripper, arm)))
+        self._all.append(
+            self._one(side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction,
+                      arm + '_arm', partial(self._arm, arm), feedback.arm_result, feedback.arm))
+        self._all.append(
+            self._one(side + '_gripper_controller/gripper_action', GripperCommandAction,
+                      arm + '_gripper', partial(self._gripper, arm),
+                      partial(feedback.gripper_result, arm), partial(feedback.gripper, arm)))
         rospy.Subscriber(side + '_arm_controller/command', JointTrajectory,
-                         lambda message: self._loop.tell(partial(self._stream, arm, message)),
+                         lambda message: self._loop.post(partial(self._stream, arm, message)),
                          queue_size=10, tcp_nodelay=True)
 
-    def _one(self, name: str, spec: Any, part: str, make: Any, report: Any, feed: Any) -> Controller:
-        return Controller(name, spec, part, self._loop, self._motions, make, partial(report, self._world),
-                          partial(feed, self._world))
+    def _one(self, name: str, spec: type, part: str, make: MakeMotion, report: MakeMessage,
+             feed: MakeMessage) -> Controller:
+        return Controller(name, spec, part, self._loop, self._motions, make,
+                          partial(report, self._world), partial(feed, self._world))
 
     def publish_feedback(self) -> None:
         """Of every motion that is under way."""
         for controller in self._all:
             controller.publish_feedback()
 
-    def _head(self, goal: Any) -> Motion:
+    def _head(self, goal: PointHeadGoal) -> Motion:
         goals.check_axis(goal.pointing_axis, goal.pointing_frame, CAMERA_FRAMES)
-        return Head(self._world, goals.point_in_base(goal.target, self._world.odom_from_base()))
+        return HeadMotion(self._world, goals.point_in_base(goal.target,
+                                                           self._world.odom_from_base()))
 
-    def _torso(self, goal: Any) -> Motion:
-        return Torso(self._world, goals.height_of(goal.position, self._world.robot.limits[TORSO_JOINT]))
+    def _torso(self, goal: SingleJointPositionGoal) -> Motion:
+        return TorsoMotion(self._world,
+                           goals.height_of(goal.position, self._world.robot.limits[TORSO_JOINT]))
 
-    def _base(self, goal: Any) -> Motion:
-        return Drive(goals.odom_from_pose(goal.target_pose, self._world.odom_from_base()))
+    def _base(self, goal: MoveBaseGoal) -> Motion:
+        return BaseMotion(goals.odom_from_pose(goal.target_pose, self._world.odom_from_base()))
 
-    def _gripper(self, arm: str, goal: Any) -> Motion:
-        return Gripper(arm, *goals.gap_of(goal.command.position, goal.command.max_effort, DEFAULT_EFFORT))
+    def _gripper(self, arm: str, goal: GripperCommandGoal) -> Motion:
+        return GripperMotion(
+            arm, *goals.gap_of(goal.command.position, goal.command.max_effort, DEFAULT_EFFORT))
 
-    def _arm(self, arm: str, goal: Any) -> Motion:
-        course = goals.course_of(goal, self._limits[arm], self._now_s())
-        motion = Trajectory(course.joints, course.positions, course.times, course.velocities,
-                            tolerances=course.tolerances)
+    def _arm(self, arm: str, goal: FollowJointTrajectoryGoal) -> Motion:
+        checked = goals.checked_trajectory(goal, self._limits[arm], self._now_s())
+        motion = Trajectory(checked.joints, checked.positions, checked.times, checked.velocities,
+                            tolerances=checked.tolerances)
         wrong = motion.refusal(self._world)
         if wrong:
             raise goals.BadGoal(wrong)
@@ -145,7 +169,8 @@ class Controllers:
     def _stream(self, arm: str, message: JointTrajectory) -> None:
         part = arm + '_arm'
         if not message.points:
-            self._motions.stop(part, NEWER)  # a PR2's controllers take an empty trajectory for a stop
+            # a PR2's controllers take an empty trajectory for a stop
+            self._motions.stop(part, NEWER)
             return
         try:
             joints, positions, times = goals.points_of_trajectory(message, self._limits[arm])
@@ -156,9 +181,9 @@ class Controllers:
         if len(times) > 1:
             motion: Motion = Trajectory(joints, positions, times)
         else:
-            motion = Streamed(dict(zip(joints, positions[0].tolist())), float(times[0]))
-        self._motions.start(part, motion, lambda ending: self._streamed(), NEWER)
+            motion = StreamedTarget(dict(zip(joints, positions[0].tolist())), float(times[0]))
+        self._motions.start(part, motion, lambda end: self._streamed(), NEWER)
 
     def streaming(self) -> bool:
         """Whether a target of a stream is on its way."""
-        return any(isinstance(self._motions.motion(arm + '_arm'), Streamed) for arm in ARMS)
+        return any(isinstance(self._motions.motion(arm + '_arm'), StreamedTarget) for arm in ARMS)

@@ -1,23 +1,30 @@
-"""What the controllers tell about a motion, while it goes on and at its end."""
-from typing import Any, List
+"""Feedback and results of the controllers' actions."""
+from typing import List
 
 import numpy as np
 import rospy
-from control_msgs.msg import (FollowJointTrajectoryFeedback, FollowJointTrajectoryResult, GripperCommandFeedback,
-                              GripperCommandResult, PointHeadFeedback, PointHeadResult, SingleJointPositionFeedback,
-                              SingleJointPositionResult)
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseFeedback, MoveBaseResult
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from control_msgs.msg import (
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryResult,
+    GripperCommandFeedback,
+    GripperCommandResult,
+    PointHeadFeedback,
+    PointHeadResult,
+    SingleJointPositionFeedback,
+    SingleJointPositionResult,
+)
 from smach_oracle.geometry.transforms import inverse, quaternion
-from smach_oracle.simulation.robot.interface import CAMERA_FRAME, ODOM_FRAME
-from smach_oracle.simulation.world.motions import Gripper, Head, Torso
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.trajectory import Trajectory
+from smach_oracle.pr2.robot import CAMERA_FRAME, ODOM_FRAME
 
-from .motion_table import Ending
+from ..physics.motions import GripperMotion, HeadMotion, TorsoMotion
+from ..physics.trajectory import Motion, Trajectory
+from ..physics.world import World
+from .motion_table import MotionEnd
 
 CODES = {'': FollowJointTrajectoryResult.INVALID_GOAL,
          'path': FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
@@ -40,57 +47,60 @@ def _point(positions: List[float]) -> JointTrajectoryPoint:
     return JointTrajectoryPoint(positions=positions)
 
 
-def arm_result(_world: World, _motion: Trajectory, ending: Ending) -> FollowJointTrajectoryResult:
+def arm_result(_world: World, _motion: Trajectory, end: MotionEnd) -> FollowJointTrajectoryResult:
     """By whether it failed on the way or at its end."""
-    if ending.result is None or ending.result.ok:
-        return FollowJointTrajectoryResult(FollowJointTrajectoryResult.SUCCESSFUL, ending.text)
-    return FollowJointTrajectoryResult(CODES[ending.result.missed], ending.text)
+    if end.result is None or end.result.ok:
+        return FollowJointTrajectoryResult(FollowJointTrajectoryResult.SUCCESSFUL, end.text)
+    return FollowJointTrajectoryResult(CODES[end.result.missed], end.text)
 
 
-def gripper(name: str, world: World, _motion: Gripper) -> GripperCommandFeedback:
+def gripper(name: str, world: World, _motion: GripperMotion) -> GripperCommandFeedback:
     """Where the fingers are."""
     return GripperCommandFeedback(world.gap(name), world.robot.finger_force(name), False, False)
 
 
-def gripper_result(name: str, world: World, _motion: Gripper, ending: Ending) -> GripperCommandResult:
+def gripper_result(name: str, world: World, _motion: GripperMotion,
+                   end: MotionEnd) -> GripperCommandResult:
     """Where the fingers came to rest."""
-    state = ending.result.gripper if ending.result else None
+    state = end.result.gripper if end.result else None
     if state is None:
         return GripperCommandResult(world.gap(name), world.robot.finger_force(name), False, False)
     return GripperCommandResult(state.position, state.effort, state.stalled, state.reached)
 
 
-def head(world: World, motion: Head) -> PointHeadFeedback:
+def head(world: World, motion: HeadMotion) -> PointHeadFeedback:
     """The angle that is left."""
     camera = inverse(world.true_base()) @ world.link_pose(CAMERA_FRAME)
-    way = motion.point - camera[:3, 3]
-    cosine = float(way @ camera[:3, 2]) / max(float(np.linalg.norm(way)), 1e-9)
+    direction = motion.point - camera[:3, 3]
+    cosine = float(direction @ camera[:3, 2]) / max(float(np.linalg.norm(direction)), 1e-9)
     return PointHeadFeedback(float(np.arccos(min(1.0, max(-1.0, cosine)))))
 
 
-def head_result(_world: World, _motion: Head, _ending: Ending) -> PointHeadResult:
+def head_result(_world: World, _motion: HeadMotion, _end: MotionEnd) -> PointHeadResult:
     """Nothing."""
     return PointHeadResult()
 
 
-def torso(world: World, motion: Torso) -> SingleJointPositionFeedback:
+def torso(world: World, motion: TorsoMotion) -> SingleJointPositionFeedback:
     """How far it is."""
     name = motion.joints[0]
     position = world.robot.position(name)
-    return SingleJointPositionFeedback(_header(), position, world.joint_velocities()[name], motion.height - position)
+    return SingleJointPositionFeedback(_header(), position,
+                                       world.joint_velocities()[name], motion.height - position)
 
 
-def torso_result(_world: World, _motion: Torso, _ending: Ending) -> SingleJointPositionResult:
+def torso_result(_world: World, _motion: TorsoMotion, _end: MotionEnd) -> SingleJointPositionResult:
     """Nothing."""
     return SingleJointPositionResult()
 
 
-def base(world: World, _motion: Any) -> MoveBaseFeedback:
+def base(world: World, _motion: Motion) -> MoveBaseFeedback:
     """Where the robot believes to be."""
     pose = world.odom_from_base()
-    return MoveBaseFeedback(PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))))
+    return MoveBaseFeedback(
+        PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))))
 
 
-def base_result(_world: World, _motion: Any, _ending: Ending) -> MoveBaseResult:
+def base_result(_world: World, _motion: Motion, _end: MotionEnd) -> MoveBaseResult:
     """Nothing."""
     return MoveBaseResult()

@@ -1,9 +1,9 @@
-"""The one thread that owns the physics: it carries out what others ask for, moves the robot, and keeps the time."""
+"""The one thread that owns the physics: it does jobs, moves the robot, and keeps the time."""
 import queue
 import threading
 import time
 from concurrent.futures import Future, wait
-from typing import Any, Callable, Dict, Optional, TypeVar
+from typing import Callable, Dict, Optional, TypeVar
 
 from .motion_table import MotionTable
 from .settings import WorldSettings
@@ -16,7 +16,7 @@ T = TypeVar('T')
 
 
 class WorldStopped(Exception):
-    """The world is no longer there to be asked."""
+    """The world has shut down and does no more jobs."""
 
 
 class Stopwatch:
@@ -39,9 +39,9 @@ class Stopwatch:
 
 
 class WorldLoop:
-    """Runs `after_tick` after each control period and everything that is asked for in between, in one thread.
+    """Steps the world, and does jobs between two control periods, all in one thread.
 
-    :param after_tick: publishes what is due.
+    :param after_tick: called after each control period; publishes what is due.
     """
 
     def __init__(self, motions: MotionTable, clock: SimClock, settings: WorldSettings,
@@ -56,17 +56,21 @@ class WorldLoop:
         self._busy_until = time.monotonic()
         self.watch = Stopwatch()
 
-    def ask(self, question: Callable[[], T]) -> T:
-        """What `question` returns, called in the world's thread; raises what it raises, or WorldStopped."""
-        answer: 'Future[T]' = Future()
-        self._jobs.put(lambda: _answer(answer, question))
-        while not answer.done():
+    def call(self, function: Callable[[], T]) -> T:
+        """Call a function in the world's thread and return what it returns.
+
+        :raises WorldStopped: where the world shuts down first. What `function` raises is raised
+            here.
+        """
+        result: 'Future[T]' = Future()
+        self._jobs.put(lambda: _fulfil(result, function))
+        while not result.done():
             if self._stopping.is_set():
                 raise WorldStopped('the world is shutting down')
-            wait([answer], timeout=0.1)
-        return answer.result()
+            wait([result], timeout=0.1)
+        return result.result()
 
-    def tell(self, job: Callable[[], None]) -> None:
+    def post(self, job: Callable[[], None]) -> None:
         """Have the world's thread call `job` soon; returns at once."""
         self._jobs.put(job)
 
@@ -77,7 +81,10 @@ class WorldLoop:
             self._clock.advance(PERIOD_S)
 
     def run(self, closed: Callable[[], None]) -> None:
-        """Until stop(); `closed` is called at the end, in this thread. Raises what a motion or a job raises."""
+        """Run until stop(). What a motion or a job raises ends it.
+
+        :param closed: called at the end, in this thread.
+        """
         self._thread = threading.current_thread()
         try:
             if self._settings.lock_step:
@@ -89,7 +96,7 @@ class WorldLoop:
             closed()
 
     def stop(self, limit_s: float) -> None:
-        """End it, and wait at most so long for its last words."""
+        """End it, and wait at most `limit_s` for its last jobs."""
         self._stopping.set()
         self._jobs.put(lambda: None)
         if self._thread and self._thread is not threading.current_thread():
@@ -140,8 +147,8 @@ class WorldLoop:
         return True
 
 
-def _answer(answer: 'Future[Any]', question: Callable[[], Any]) -> None:
+def _fulfil(result: 'Future[T]', function: Callable[[], T]) -> None:
     try:
-        answer.set_result(question())
-    except Exception as err:  # goes on to whoever asked
-        answer.set_exception(err)
+        result.set_result(function())
+    except Exception as err:  # raised again where the result is waited for
+        result.set_exception(err)

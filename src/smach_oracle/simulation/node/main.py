@@ -1,9 +1,8 @@
-"""The world node: physics, the PR2's controllers and camera, and the book on each trial's truth."""
-import importlib
+"""The world node: physics, controllers, camera, and the record of each trial's truth."""
 import sys
 import threading
 import traceback
-from typing import Dict, Optional
+from typing import Optional
 
 import rosgraph
 import rospy
@@ -11,17 +10,29 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
 from smach_oracle.msg import TrialCause
-from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.pr2.model.pr2_model import ModelError
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.shutdown import ShutdownGuard
-from smach_oracle.simulation.robot.pr2_model import ModelError
-from smach_oracle.simulation.world.camera import FRAME_PERIODS, shoot
-from smach_oracle.simulation.world.judge import Verdict, judge
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Scene
-from smach_oracle.srv import (Judge, JudgeRequest, JudgeResponse, ResetWorld, ResetWorldRequest, ResetWorldResponse,
-                              Reveal, RevealRequest, RevealResponse, Snapshot, SnapshotRequest, SnapshotResponse)
+from smach_oracle.srv import (
+    Judge,
+    JudgeRequest,
+    JudgeResponse,
+    ResetWorld,
+    ResetWorldRequest,
+    ResetWorldResponse,
+    Reveal,
+    RevealRequest,
+    RevealResponse,
+    Snapshot,
+    SnapshotRequest,
+    SnapshotResponse,
+)
 
+from ..physics.camera import IMAGE_PERIODS, take_image
+from ..physics.judge import TrialVerdict, judge
+from ..physics.world import World
+from ..scenes.tasks import draw
 from .camera_publisher import CameraPublisher
 from .controllers import Controllers
 from .loop import PERIOD_S, WorldLoop, WorldStopped
@@ -30,42 +41,39 @@ from .reveal import reveal
 from .settings import WorldSettings, read_settings
 from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
-from .trial import Trial, append_line
+from .truth import TrialTruth, append_line
 
-SCENES: Dict[str, str] = {'pick_and_place': 'tabletop_scene', 'drink_retrieval': 'kitchen_scene'}
-SETTLING_S = 1.0  # after a trial, before it is judged
+REST_S = 1.0  # after a trial, before it is judged
 LAST_WORDS_S = 1.5  # for the last trial's line, at the end
 UNREGISTERING_S = 0.7  # for taking back some sixty topics from a master that may be busy, or gone
 SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
-
-
-def draw(task: str, seed: int, benign: bool) -> Scene:
-    """A trial's scene."""
-    module = importlib.import_module('smach_oracle.simulation.world.' + SCENES[task])
-    scene: Scene = module.draw(seed, benign=benign)
-    return scene
 
 
 class WorldNode:
     """The node's topics, services and actions around one world; `run` serves until `close`."""
 
     def __init__(self, settings: WorldSettings) -> None:
-        """Raises ModelError where the PR2's model cannot be had, ValueError where a scene cannot be built."""
+        """Build the first scene and offer everything.
+
+        :raises ModelError: where the PR2's model cannot be had.
+        :raises ValueError: where a scene cannot be built.
+        """
         self._settings = settings
         self.exit_code = 0  # of the process; 1 where the world failed
         self._world = World(draw(settings.task, settings.seed, settings.benign))
-        self._trial: Optional[Trial] = None
+        self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
-        self._state = StatePublisher(publish_description(), list(self._world.joints()), settings.lock_step)
+        self._state = StatePublisher(publish_description(), list(self._world.joints()),
+                                     settings.lock_step)
         self._camera = CameraPublisher()
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
-        self._state_due = self._frame_due = 0.0
+        self._state_due = self._image_due = 0.0
         self._published = -1  # the world's periods at the last state that was published
-        self._controllers = Controllers(self._world, self._loop, self._motions, lambda: self._clock.now_ns / 1e9,
-                                        self._publish_state)
+        self._controllers = Controllers(self._world, self._loop, self._motions,
+                                        lambda: self._clock.now_ns / 1e9, self._publish_state)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
@@ -78,9 +86,10 @@ class WorldNode:
         self._loop.run(self._end)
 
     def close(self) -> None:
-        """Stop serving; when the last trial's line is written, the process has UNREGISTERING_S left."""
+        """Stop serving, and end the process within UNREGISTERING_S of the last trial's line."""
         self._loop.stop(LAST_WORDS_S)
-        ShutdownGuard(lambda: None, lambda limit_s: None, limit_s=UNREGISTERING_S).arm(self.exit_code)
+        ShutdownGuard(lambda: None, lambda limit_s: None,
+                      limit_s=UNREGISTERING_S).arm(self.exit_code)
 
     # in the world's thread
 
@@ -90,12 +99,15 @@ class WorldNode:
         if came_to_rest or (now >= self._state_due and not self._between_targets()):
             self._publish_state()
             self._controllers.publish_feedback()
-        if self._settings.camera_rate and now >= self._frame_due and self._camera.wanted:
-            self._frame_due = now + 1.0 / self._settings.camera_rate
-            self._publish_frame(self._publish_state(), counted=False)
+        if self._settings.camera_rate and now >= self._image_due and self._camera.wanted:
+            self._image_due = now + 1.0 / self._settings.camera_rate
+            self._publish_image(self._publish_state(), counted=False)
 
     def _between_targets(self) -> bool:
-        """A stream of targets is answered by the state at each of them, and by no other."""
+        """Whether a target of a stream is on its way in lock-step.
+
+        Then only the state at the target is published, as the answer to it.
+        """
         return self._settings.lock_step and self._controllers.streaming()
 
     def _publish_state(self) -> rospy.Time:
@@ -105,44 +117,45 @@ class WorldNode:
         self._state_due = stamp.to_sec() + 1.0 / self._settings.state_rate - PERIOD_S / 2
         return stamp
 
-    def _publish_frame(self, stamp: rospy.Time, counted: bool) -> None:
+    def _publish_image(self, stamp: rospy.Time, counted: bool) -> None:
         self._loop.watch.lap('publish')
-        frame = shoot(self._world, counted)
+        image = take_image(self._world, counted)
         self._loop.watch.lap('camera')
-        self._camera.publish(frame.colour, frame.depth, frame.intrinsics, stamp)
+        self._camera.publish(image.colour, image.depth, image.intrinsics, stamp)
         self._loop.watch.lap('publish')
 
     def _snapshot(self, camera: bool) -> rospy.Time:
         if camera:
-            self._loop.pass_time(FRAME_PERIODS * PERIOD_S)
+            self._loop.pass_time(IMAGE_PERIODS * PERIOD_S)
         stamp = self._publish_state()
         if camera:
-            self._publish_frame(stamp, counted=True)
+            self._publish_image(stamp, counted=True)
         return stamp
 
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
         self._finish_trial()
         self._world.reset(draw(self._settings.task, seed, self._settings.benign))
-        self._trial = Trial(self._world.scene, self._world.time)
+        self._truth = TrialTruth(self._world.scene, self._world.time)
         self._loop.watch.restart()
         causes = self._world.scene.causes
-        self._cause.publish(TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
-                                       [cause.kind for cause in causes], [cause.text for cause in causes]))
+        self._cause.publish(
+            TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
+                       [cause.kind for cause in causes], [cause.text for cause in causes]))
         self._publish_state()
 
-    def _judge(self) -> Verdict:
+    def _judge(self) -> TrialVerdict:
         return judge(self._world, self._world.scene.goal)
 
     def _finish_trial(self) -> None:
-        """Write down what came of the trial, once."""
-        trial, self._trial = self._trial, None
-        if trial is None or self._settings.truth_file == 'none':
+        """Write down how the trial ended, once."""
+        truth, self._truth = self._truth, None
+        if truth is None or self._settings.truth_file == 'none':
             return
         sim_s = self._world.time
-        self._world.step(round(SETTLING_S / PERIOD_S))
+        self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = trial.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent)
+        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent)
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
@@ -156,20 +169,22 @@ class WorldNode:
 
     def _answer_reset(self, request: ResetWorldRequest) -> ResetWorldResponse:
         try:
-            self._loop.ask(lambda: self._reset(request.seed))
+            self._loop.call(lambda: self._reset(request.seed))
         except (ValueError, WorldStopped) as err:
             return ResetWorldResponse(False, str(err))
         return ResetWorldResponse(True, '')
 
     def _answer_snapshot(self, request: SnapshotRequest) -> SnapshotResponse:
         try:
-            return SnapshotResponse(True, '', self._loop.ask(lambda: self._snapshot(request.camera)))
+            return SnapshotResponse(True, '',
+                                    self._loop.call(lambda: self._snapshot(request.camera)))
         except WorldStopped as err:
             return SnapshotResponse(False, str(err), rospy.Time())
 
     def _answer_reveal(self, request: RevealRequest) -> RevealResponse:
         try:
-            bodies = self._loop.ask(lambda: reveal(self._world, request.names, ros_time(self._clock.now_ns)))
+            bodies = self._loop.call(
+                lambda: reveal(self._world, request.names, ros_time(self._clock.now_ns)))
         except (ValueError, WorldStopped) as err:
             return RevealResponse(ok=False, message=str(err))
         scene = self._world.scene
@@ -177,7 +192,7 @@ class WorldNode:
 
     def _answer_judge(self, _request: JudgeRequest) -> JudgeResponse:
         try:
-            verdict = self._loop.ask(self._judge)
+            verdict = self._loop.call(self._judge)
         except WorldStopped as err:
             return JudgeResponse(ok=False, message=str(err))
         return JudgeResponse(True, '', verdict.success, verdict.why)
@@ -185,18 +200,21 @@ class WorldNode:
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_only('Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
-                    '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate; see '
-                    'doc/simulation.md.')
+    parameters_only(
+        'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
+        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate; see '
+        'doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:
-        rospy.set_param('/use_sim_time', True)  # before the node is made: rospy looks at it only then
+        # before the node is made: rospy looks at it only then
+        rospy.set_param('/use_sim_time', True)
     except OSError as err:
-        raise SystemExit('pr2_world: no ROS master at {}: {}'.format(rosgraph.get_master_uri(), err)) from err
+        raise SystemExit('pr2_world: no ROS master at {}: {}'.format(rosgraph.get_master_uri(),
+                                                                     err)) from err
     rospy.init_node('pr2_world')
     try:
         node = WorldNode(read_settings(rospy.get_param))
-    except (ConfigError, ModelError, ValueError) as err:
+    except (SettingsError, ModelError, ValueError) as err:
         rospy.logfatal('pr2_world: %s', err)
         raise SystemExit(2) from err
     thread = threading.Thread(target=_run, args=(node,), name='world')
@@ -208,7 +226,7 @@ def main() -> None:
 
 
 def _run(node: WorldNode) -> None:
-    """A world that fails takes its node along: it must not stand there without answering."""
+    """Run the world; where it fails, its node ends too."""
     try:
         node.run()
     except Exception:  # whatever it is, the node cannot go on

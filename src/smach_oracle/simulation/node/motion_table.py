@@ -1,45 +1,48 @@
 """What moves now: at most one motion for each part of the robot."""
-from typing import Any, Callable, Dict, List, NamedTuple, Optional
+from typing import Callable, Dict, List, NamedTuple, Optional
 
-from smach_oracle.simulation.world.trajectory import Result
+from ..physics.trajectory import Motion, MotionResult
+from ..physics.world import World
 
 PARTS = ('base', 'head', 'left_arm', 'left_gripper', 'right_arm', 'right_gripper', 'torso')
 
 
-class Ending(NamedTuple):
+class MotionEnd(NamedTuple):
     """How a motion ended: with its result, or because it was stopped (None)."""
 
-    result: Optional[Result]
+    result: Optional[MotionResult]
     text: str = ''  # why it was stopped, or failed
     aborted: bool = False  # stopped by the world, not by who commanded it or by a newer command
 
 
 class _Running(NamedTuple):
-    motion: Any
-    ended: Callable[[Ending], None]
-    result: Optional[Result] = None  # done, but what its end set off in the world has not come to rest yet
+    motion: Motion
+    ended: Callable[[MotionEnd], object]
+    # done, but what its end set off in the world has not come to rest yet
+    result: Optional[MotionResult] = None
 
 
 class MotionTable:
-    """Advances the motions of all parts together, in the order of the parts' names.
+    """Advances the motions of all parts together, in the order of the parts' names."""
 
-    A motion is what world/motions.py has: ``tick(world)``, ``events()``, ``stop(world)``.
-    """
-
-    def __init__(self, world: Any) -> None:
+    def __init__(self, world: World) -> None:
         self._world = world
         self._running: Dict[str, _Running] = {}
 
     def __bool__(self) -> bool:
         return bool(self._running)
 
-    def motion(self, part: str) -> Any:
+    def motion(self, part: str) -> Optional[Motion]:
         """What moves this part, or None."""
         running = self._running.get(part)
         return running.motion if running else None
 
-    def start(self, part: str, motion: Any, ended: Callable[[Ending], None], newer: str = '') -> None:
-        """Begin a motion; `ended` is called once. An older one of the same part ends with the text `newer`."""
+    def start(self, part: str, motion: Motion, ended: Callable[[MotionEnd], object],
+              newer: str = '') -> None:
+        """Begin a motion; an older one of the same part ends with the text `newer`.
+
+        :param ended: called once, when it has ended.
+        """
         self.stop(part, newer)
         self._running[part] = _Running(motion, ended)
 
@@ -49,10 +52,10 @@ class MotionTable:
         if running is None:
             return
         if running.result is not None:
-            running.ended(Ending(running.result, running.result.text))
+            running.ended(MotionEnd(running.result, running.result.text))
             return
         running.motion.stop(self._world)
-        running.ended(Ending(None, text, aborted))
+        running.ended(MotionEnd(None, text, aborted))
 
     def stop_all(self, text: str) -> None:
         """End every motion where it is, as the world's own doing."""
@@ -60,7 +63,7 @@ class MotionTable:
             self.stop(part, text, aborted=True)
 
     def tick(self) -> None:
-        """Have every motion send its joints on, or end; then let a control period pass, unless all have ended."""
+        """Advance or end every motion; then let a control period pass, unless all have ended."""
         for part in sorted(self._running):
             running = self._running[part]
             if running.result is None:
@@ -69,10 +72,13 @@ class MotionTable:
                     self._world.happened(*running.motion.events())
                     self._running[part] = running._replace(result=result)
         over: List[str] = []
-        if not self._world.unrest:
-            over = [part for part, running in sorted(self._running.items()) if running.result is not None]
+        if not self._world.disturbed:
+            over = [
+                part for part, running in sorted(self._running.items())
+                if running.result is not None
+            ]
         ended = [self._running.pop(part) for part in over]
         if self._running or not over:
             self._world.step()
         for running in ended:
-            running.ended(Ending(running.result, running.result.text if running.result else ''))
+            running.ended(MotionEnd(running.result, running.result.text if running.result else ''))

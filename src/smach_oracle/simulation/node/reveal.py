@@ -1,6 +1,6 @@
-"""What an expert would see standing beside the robot: the bodies as they truly are, and where the camera has them."""
+"""The truth for an expert: the bodies as they are, and where the camera has them."""
 import xml.etree.ElementTree as ElementTree
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -10,12 +10,14 @@ from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import Header
 
 from smach_oracle.geometry.depth import pixels_of
-from smach_oracle.geometry.transforms import from_rpy, inverse, quaternion
+from smach_oracle.geometry.joints import origin_of
+from smach_oracle.geometry.transforms import inverse, quaternion
 from smach_oracle.msg import RevealedBody
-from smach_oracle.simulation.robot.interface import BASE_FRAME, CAMERA_FRAME
-from smach_oracle.simulation.world.camera import HEIGHT, INTRINSICS, WIDTH, View
-from smach_oracle.simulation.world.fridge import DOOR_JOINT
-from smach_oracle.simulation.world.physics import World
+from smach_oracle.pr2.robot import BASE_FRAME, CAMERA_FRAME
+
+from ..physics.camera import HEIGHT, INTRINSICS, WIDTH, RenderedView
+from ..physics.world import World
+from ..scenes.fridge import DOOR_JOINT
 
 PARTS = {'door': 'box', 'handle': 'cylinder'}  # of a door's link: the first shape of each kind
 
@@ -36,8 +38,9 @@ def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[Reveal
     things = _things(world)
     unknown = [name for name in names if name not in things]
     if unknown:
-        raise ValueError('no body {!r} in this scene; there: {}'.format(unknown[0], ', '.join(things) or 'none'))
-    seen = View(world, world.link_pose(CAMERA_FRAME)).bodies
+        raise ValueError('no body {!r} in this scene; there: {}'.format(
+            unknown[0], ', '.join(things) or 'none'))
+    seen = RenderedView(world, world.link_pose(CAMERA_FRAME)).bodies
     return [_message(world, name, things[name], seen, stamp) for name in names or things]
 
 
@@ -46,7 +49,8 @@ def _things(world: World) -> Dict[str, _Thing]:
     for name in world.body_names:
         body = world.body(name)
         size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
-        found[name] = _Thing(name, world.body_pose(name), np.zeros(3) if body.shape == 'urdf' else size)
+        found[name] = _Thing(name, world.body_pose(name),
+                             np.zeros(3) if body.shape == 'urdf' else size)
         if dict(body.joint_friction).get(DOOR_JOINT) is not None:
             for part, (pose, extent) in _door_parts(body.urdf).items():
                 found[part] = _Thing(name, world.body_pose(name, 'door') @ pose, extent)
@@ -59,34 +63,30 @@ def _door_parts(urdf: str) -> Dict[str, Tuple[np.ndarray, np.ndarray]]:
     for name, shape in PARTS.items():
         for part in ElementTree.fromstring(urdf).findall("./link[@name='door']/visual"):
             solid = part.find('geometry/' + shape)
-            origin = part.find('origin')
-            if solid is not None and origin is not None:
-                parts[name] = (from_rpy(_numbers(origin.get('xyz'))), _extent(solid))
+            if solid is not None:
+                parts[name] = (origin_of(part), _extent(solid))
                 break
     return parts
 
 
 def _extent(solid: ElementTree.Element) -> np.ndarray:
     if solid.tag == 'box':
-        return np.array(_numbers(solid.get('size')))
+        return np.array([float(word) for word in solid.get('size', '0 0 0').split()])
     across = 2 * float(solid.get('radius', 0))
     return np.array([across, across, float(solid.get('length', 0))])
 
 
-def _numbers(text: Optional[str]) -> List[float]:
-    return [float(word) for word in (text or '0 0 0').split()]
-
-
-def _message(world: World, name: str, thing: _Thing, seen: np.ndarray, stamp: rospy.Time) -> RevealedBody:
+def _message(world: World, name: str, thing: _Thing, seen: np.ndarray,
+             stamp: rospy.Time) -> RevealedBody:
     pose = inverse(world.true_base()) @ thing.pose
     body = world.body(thing.body)
     region, visible = _region(world, thing, seen) if thing.size.any() else (RegionOfInterest(), 0.0)
     return RevealedBody(
-        name=name, size=Vector3(*thing.size), movable=name in world.movable(), region=region, visible=visible,
-        pose=PoseStamped(Header(stamp=stamp, frame_id=BASE_FRAME),
-                         Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))),
-        held=world.holding(thing.body) if name == thing.body else '',
-        angle=world.body_joint(thing.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
+        name=name, size=Vector3(*thing.size), movable=name in world.movable(), region=region,
+        visible=visible, pose=PoseStamped(Header(stamp=stamp, frame_id=BASE_FRAME),
+                                          Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))),
+        held=world.holding(thing.body) if name == thing.body else '', angle=world.body_joint(
+            thing.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
 
 
 def _region(world: World, thing: _Thing, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
@@ -98,7 +98,8 @@ def _region(world: World, thing: _Thing, seen: np.ndarray) -> Tuple[RegionOfInte
     if (pixels[:, 2] <= 0).any():
         return RegionOfInterest(), 0.0
     left, top = np.maximum(np.floor(pixels[:, :2].min(axis=0)).astype(int), 0)
-    right, bottom = np.minimum(np.ceil(pixels[:, :2].max(axis=0)).astype(int), (WIDTH - 1, HEIGHT - 1))
+    right, bottom = np.minimum(
+        np.ceil(pixels[:, :2].max(axis=0)).astype(int), (WIDTH - 1, HEIGHT - 1))
     if right < left or bottom < top:
         return RegionOfInterest(), 0.0
     window = seen[top:bottom + 1, left:right + 1]

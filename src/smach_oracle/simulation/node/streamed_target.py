@@ -1,14 +1,15 @@
 """Joint targets that come in a stream, as from a person who drives an arm."""
-from typing import Any, Dict, Optional, Sequence
+from typing import Dict, Optional, Sequence
 
-from smach_oracle.simulation.world.pr2_body import PERIOD
-from smach_oracle.simulation.world.trajectory import Result
+from ..physics.pr2_body import PERIOD
+from ..physics.trajectory import MotionResult
+from ..physics.world import World
 
 FAST = 1.1  # times its limit that a joint may go at most
 
 
-class Streamed:
-    """Goes straight to one target in a given time and holds it; what is too fast for a joint is cut off.
+class StreamedTarget:
+    """Goes straight to one target in a given time and holds it; no joint goes too fast.
 
     :param targets: rad, by joint.
     :param seconds: rounded to control periods, at least one.
@@ -20,12 +21,12 @@ class Streamed:
         self._left = self._periods
         self._here: Dict[str, float] = {}
 
-    def tick(self, world: Any) -> Optional[Result]:
+    def tick(self, world: World) -> Optional[MotionResult]:
         """See Motion."""
         if not self._here:
             self._begin(world)
         if not self._left:
-            return Result(True)
+            return MotionResult(True)
         for name, target in self._targets.items():
             step = (target - self._here[name]) / self._left
             self._here[name] += step
@@ -33,7 +34,7 @@ class Streamed:
         self._left -= 1
         return None
 
-    def _begin(self, world: Any) -> None:
+    def _begin(self, world: World) -> None:
         for name, target in self._targets.items():
             here = world.robot.target(name)
             most = FAST * world.robot.speeds[name] * self._periods * PERIOD
@@ -44,7 +45,7 @@ class Streamed:
         """See Motion: a stream is no event."""
         return ()
 
-    def stop(self, world: Any) -> None:
+    def stop(self, world: World) -> None:
         """See Motion."""
         for name in self._targets:
             world.set_target(name, world.robot.position(name))

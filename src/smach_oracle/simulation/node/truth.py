@@ -1,14 +1,14 @@
-"""The book on a trial's truth: one line of JSON on each trial that has ended."""
+"""The record of a trial's truth: one line of JSON for each trial that has ended."""
 import json
 import os
 import time
 from typing import Any, Dict, Mapping
 
-from smach_oracle.simulation.world.scene import Scene
+from ..scenes.scene import Scene
 
 
-class Trial:
-    """A trial that is under way.
+class TrialTruth:
+    """The record of a trial that is under way.
 
     :param sim_s: simulated s that have passed in the world when it begins.
     """
@@ -18,20 +18,28 @@ class Trial:
         self._sim_s = sim_s
         self._began = time.monotonic()
 
-    def record(self, success: bool, why: str, sim_s: float, spent: Mapping[str, float]) -> Dict[str, Any]:
+    def record(self, success: bool, why: str, sim_s: float,
+               spent: Mapping[str, float]) -> Dict[str, Any]:
         """What is to be written at its end.
 
         :param spent: wall s by what the world's process did in them.
         """
         wall = time.monotonic() - self._began
-        return {'seed': self._scene.seed, 'task': self._scene.task, 'success': success, 'why': why,
-                'causes': [{'kind': cause.kind, 'text': cause.text} for cause in self._scene.causes],
-                'sim_s': round(sim_s - self._sim_s, 3), 'wall_s': round(wall, 3),
-                'share': {what: round(seconds / max(wall, 1e-9), 4) for what, seconds in sorted(spent.items())}}
+        return {
+            'seed': self._scene.seed, 'task': self._scene.task, 'success': success, 'why': why,
+            'causes': [{'kind': cause.kind, 'text': cause.text} for cause in self._scene.causes],
+            'sim_s': round(sim_s - self._sim_s, 3), 'wall_s': round(wall, 3), 'share': {
+                what: round(seconds / max(wall, 1e-9), 4)
+                for what, seconds in sorted(spent.items())
+            }
+        }
 
 
 def append_line(path: str, record: Mapping[str, Any]) -> None:
-    """Append a line that is on the disk when this returns. Raises OSError."""
+    """Append a line that is on the disk when this returns.
+
+    :raises OSError: where it cannot be written.
+    """
     with open(path, 'a', encoding='utf-8') as file:
         file.write(json.dumps(record, allow_nan=False) + '\n')
         file.flush()

@@ -1,15 +1,15 @@
-"""The things of a scene, as bodies of a physics client; and the checks that a scene must pass before."""
+"""The bodies of a scene in a physics client, and the checks that a scene must pass before."""
 import math
 import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from typing import Any, Dict, List, NamedTuple, Sequence
+from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 import pybullet
 
+from ..scenes.scene import Body, Scene
 from .meshes import drum, egg
-from .scene import Body, Scene
 
 RESERVED = ('robot', 'floor')  # names that no body of a scene may have
 SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH}
@@ -18,11 +18,11 @@ FLOOR_SIZE = 12.0  # m, of what is seen of it
 TURNING_FRICTION = 0.002  # m, against spinning and rolling
 
 
-class SceneError(ValueError):
-    """A scene that cannot be built; the text names the body or setting, what is wrong with it, and what is allowed."""
+class SceneBuildError(ValueError):
+    """A scene that cannot be built; the text names the setting, its value and what is allowed."""
 
 
-class Placed(NamedTuple):
+class PlacedBody(NamedTuple):
     """A body that stands in the world."""
 
     number: int  # in the physics client
@@ -32,59 +32,73 @@ class Placed(NamedTuple):
 
 
 def check_scene(scene: Scene) -> None:
-    """Raise SceneError where a scene has a name twice, a number that is none, a size or a mass that cannot be."""
+    """Check a scene before it is built.
+
+    :raises SceneBuildError: for a name that occurs twice, a number that is not finite, a size or a
+        mass that cannot be.
+    """
     seen: List[str] = []
     for body in scene.bodies:
         if not body.name or body.name in seen or body.name in RESERVED:
-            raise SceneError('body {!r}: the name is empty, taken, or one of {}'.format(
+            raise SceneBuildError('body {!r}: the name is empty, taken, or one of {}'.format(
                 body.name, ', '.join(RESERVED)))
         seen.append(body.name)
         _check_body(body)
     if scene.goal.body and scene.goal.body not in seen:
-        raise SceneError('the goal is about a body {!r} that is not in the scene; there: {}'.format(
-            scene.goal.body, ', '.join(seen) or 'none'))
+        raise SceneBuildError(
+            'the goal is about a body {!r} that is not in the scene; there: {}'.format(
+                scene.goal.body, ', '.join(seen) or 'none'))
     for name, values in (('goal.position', scene.goal.position), ('robot.base', scene.robot.base),
-                         ('robot.drive_error', scene.robot.drive_error), ('sensor', scene.sensor)):
+                         ('robot.drive_error', scene.robot.drive_error), ('camera', scene.camera)):
         if not _finite(values):
-            raise SceneError('{} is {}; allowed: finite numbers'.format(name, tuple(values)))
-    sensor = scene.sensor
-    least = min(sensor.noise, sensor.brightness, sensor.colour_noise, *scene.robot.drive_error)
-    if least < 0 or not 0 <= sensor.dropout <= 1:
-        raise SceneError('sensor {} or drive_error {}: a negative value, or a dropout outside 0 to 1'.format(
-            tuple(scene.sensor), scene.robot.drive_error))
+            raise SceneBuildError('{} is {}; allowed: finite numbers'.format(name, tuple(values)))
+    camera = scene.camera
+    least = min(camera.noise, camera.brightness, camera.colour_noise, *scene.robot.drive_error)
+    if least < 0 or not 0 <= camera.dropout <= 1:
+        raise SceneBuildError(
+            'camera {} or drive_error {}: a negative value, or a dropout outside 0 to 1'.format(
+                tuple(scene.camera), scene.robot.drive_error))
 
 
 def _check_body(body: Body) -> None:
     if body.shape != 'urdf' and body.shape not in SHAPES:
-        raise SceneError('body {!r}: shape is {!r}; allowed: {}'.format(
+        raise SceneBuildError('body {!r}: shape is {!r}; allowed: {}'.format(
             body.name, body.shape, ', '.join(sorted(SHAPES) + ['urdf'])))
     numbers = (*body.position, body.yaw, body.roll, body.pitch, *body.colour)
     if len(body.position) != 3 or not _finite(numbers):
-        raise SceneError('body {!r}: position {}, angles or colour are not finite'.format(body.name, body.position))
+        raise SceneBuildError('body {!r}: position {}, angles or colour are not finite'.format(
+            body.name, body.position))
     if not (_finite((body.mass, body.friction)) and body.mass >= 0 and body.friction >= 0):
-        raise SceneError('body {!r}: mass {} or friction {}; allowed: 0 or more'.format(
+        raise SceneBuildError('body {!r}: mass {} or friction {}; allowed: 0 or more'.format(
             body.name, body.mass, body.friction))
     for joint, value in body.joints + body.joint_friction:
         if not _finite([value]):
-            raise SceneError('body {!r}: joint {!r} is given {}; allowed: finite numbers'.format(
-                body.name, joint, value))
-    if body.shape != 'urdf' and not (len(body.size) == 3 and _finite(body.size) and min(body.size) > 0):
-        raise SceneError('body {!r}: size is {}; allowed: three lengths above 0 m'.format(body.name, body.size))
+            raise SceneBuildError(
+                'body {!r}: joint {!r} is given {}; allowed: finite numbers'.format(
+                    body.name, joint, value))
+    if body.shape != 'urdf' and not (len(body.size) == 3 and _finite(body.size)
+                                     and min(body.size) > 0):
+        raise SceneBuildError('body {!r}: size is {}; allowed: three lengths above 0 m'.format(
+            body.name, body.size))
 
 
 def add_floor(client: int) -> int:
     """The floor at z = 0; what is seen of it is a plate a millimetre below."""
     shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    seen = pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=[FLOOR_SIZE / 2, FLOOR_SIZE / 2, 0.01],
-                                      visualFramePosition=[0, 0, -0.011], rgbaColor=FLOOR_COLOUR,
-                                      physicsClientId=client)
+    seen = pybullet.createVisualShape(pybullet.GEOM_BOX,
+                                      halfExtents=[FLOOR_SIZE / 2, FLOOR_SIZE / 2,
+                                                   0.01], visualFramePosition=[0, 0, -0.011],
+                                      rgbaColor=FLOOR_COLOUR, physicsClientId=client)
     floor: int = pybullet.createMultiBody(0, shape, seen, physicsClientId=client)
     pybullet.changeDynamics(floor, -1, lateralFriction=0.8, physicsClientId=client)
     return floor
 
 
-def add_body(client: int, body: Body) -> Placed:
-    """Put a body of a scene into the client. Raises SceneError where its model cannot be read."""
+def add_body(client: int, body: Body) -> PlacedBody:
+    """Put a body of a scene into the client.
+
+    :raises SceneBuildError: where its model cannot be read, or has not the joints that are named.
+    """
     turn = pybullet.getQuaternionFromEuler([body.roll, body.pitch, body.yaw])
     index = _load(client, body, turn) if body.shape == 'urdf' else _create(client, body, turn)
     links, joints = {'': -1}, {}
@@ -92,17 +106,18 @@ def add_body(client: int, body: Body) -> Placed:
         info = pybullet.getJointInfo(index, number, physicsClientId=client)
         joints[info[1].decode()] = number
         links[info[12].decode()] = number
-    placed = Placed(index, body, links, joints)
+    placed = PlacedBody(index, body, links, joints)
     for link in links.values():
-        pybullet.changeDynamics(index, link, lateralFriction=body.friction, spinningFriction=TURNING_FRICTION,
-                                rollingFriction=TURNING_FRICTION, physicsClientId=client)
+        pybullet.changeDynamics(index, link, lateralFriction=body.friction,
+                                spinningFriction=TURNING_FRICTION, rollingFriction=TURNING_FRICTION,
+                                physicsClientId=client)
     _set_joints(client, placed)
     return placed
 
 
 def _create(client: int, body: Body, turn: Sequence[float]) -> int:
-    solid: Dict[str, Any] = {}
-    seen: Dict[str, Any] = {}
+    solid: Dict[str, object] = {}
+    seen: Dict[str, object] = {}
     if body.shape == 'box':
         half = [extent / 2 for extent in body.size]
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
@@ -112,9 +127,11 @@ def _create(client: int, body: Body, turn: Sequence[float]) -> int:
         solid = {'radius': body.size[0], 'height': body.size[2]}
         seen = {'fileName': drum(), 'meshScale': list(body.size[:1] * 2 + body.size[2:])}
     shape = pybullet.createCollisionShape(SHAPES[body.shape], physicsClientId=client, **solid)
-    skin = pybullet.createVisualShape(pybullet.GEOM_BOX if body.shape == 'box' else pybullet.GEOM_MESH,
-                                      rgbaColor=[*body.colour, 1.0], physicsClientId=client, **seen)
-    index: int = pybullet.createMultiBody(body.mass, shape, skin, list(body.position), turn, physicsClientId=client)
+    skin = pybullet.createVisualShape(
+        pybullet.GEOM_BOX if body.shape == 'box' else pybullet.GEOM_MESH,
+        rgbaColor=[*body.colour, 1.0], physicsClientId=client, **seen)
+    index: int = pybullet.createMultiBody(body.mass, shape, skin, list(body.position), turn,
+                                          physicsClientId=client)
     return index
 
 
@@ -122,31 +139,35 @@ def _load(client: int, body: Body, turn: Sequence[float]) -> int:
     try:
         ElementTree.fromstring(body.urdf)
     except ElementTree.ParseError as err:
-        raise SceneError('body {!r}: its urdf cannot be read: {}'.format(body.name, err)) from err
+        raise SceneBuildError('body {!r}: its urdf cannot be read: {}'.format(body.name,
+                                                                              err)) from err
     handle, path = tempfile.mkstemp(suffix='.urdf')
     try:
         with os.fdopen(handle, 'w', encoding='utf-8') as file:
             file.write(body.urdf)
         index: int = pybullet.loadURDF(path, list(body.position), turn, useFixedBase=body.mass == 0,
-                                       flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
+                                       flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                                       physicsClientId=client)
     except pybullet.error as err:
-        raise SceneError('body {!r}: its urdf cannot be loaded: {}'.format(body.name, err)) from err
+        raise SceneBuildError('body {!r}: its urdf cannot be loaded: {}'.format(body.name,
+                                                                                err)) from err
     finally:
         os.unlink(path)
     return index
 
 
-def _set_joints(client: int, placed: Placed) -> None:
+def _set_joints(client: int, placed: PlacedBody) -> None:
     """Where its joints start, and their dry friction; nothing else drives them."""
     friction = dict(placed.body.joint_friction)
     start = dict(placed.body.joints)
     for name in list(friction) + list(start):
         if name not in placed.joints:
-            raise SceneError('body {!r}: no joint {!r}; there: {}'.format(
+            raise SceneBuildError('body {!r}: no joint {!r}; there: {}'.format(
                 placed.body.name, name, ', '.join(placed.joints) or 'none'))
     for name, joint in placed.joints.items():
-        pybullet.setJointMotorControl2(placed.number, joint, pybullet.VELOCITY_CONTROL, targetVelocity=0.0,
-                                       force=friction.get(name, 0.0), physicsClientId=client)
+        pybullet.setJointMotorControl2(placed.number, joint, pybullet.VELOCITY_CONTROL,
+                                       targetVelocity=0.0, force=friction.get(name, 0.0),
+                                       physicsClientId=client)
         if name in start:
             pybullet.resetJointState(placed.number, joint, start[name], physicsClientId=client)
 

@@ -1,4 +1,4 @@
-"""The head camera: colour and depth from PyBullet's software renderer, with the errors of a depth camera."""
+"""The head camera: PyBullet's software renderer, with the errors of a depth camera."""
 import math
 from typing import List, Tuple
 
@@ -6,96 +6,119 @@ import numpy as np
 import pybullet
 from scipy import ndimage
 
-from ...geometry.transforms import inverse
-from ..robot.interface import CAMERA_FRAME, Frame
-from .physics import World
-from .scene import Sensor
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.transforms import inverse
+from smach_oracle.pr2.robot import CAMERA_FRAME
+
+from ..scenes.scene import CameraQuality
+from .world import World
 
 WIDTH, HEIGHT = 640, 480
 FIELD_OF_VIEW = 45.0  # degrees, from top to bottom
 NEAR, FAR = 0.2, 5.0  # m
 FOCAL = HEIGHT / 2 / math.tan(math.radians(FIELD_OF_VIEW) / 2)  # pixels
-INTRINSICS = np.array([[FOCAL, 0.0, (WIDTH - 1) / 2], [0.0, FOCAL, (HEIGHT - 1) / 2], [0.0, 0.0, 1.0]])
+INTRINSICS = np.array([[FOCAL, 0.0, (WIDTH - 1) / 2], [0.0, FOCAL, (HEIGHT - 1) / 2],
+                       [0.0, 0.0, 1.0]])
 LIGHT = {'lightDirection': [1.0, 1.5, 3.0], 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.5,
          'lightSpecularCoeff': 0.05, 'shadow': 0}
-FRAME_PERIODS = 2  # control periods that a frame takes
+IMAGE_PERIODS = 2  # control periods that an image takes
 BASELINE = 0.075  # m, between projector and sensor: gives the steps in which depth comes
 EDGE = 0.03  # m: a jump of depth between neighbours from which the edge is lost, mostly
 DIMMED = 0.6  # brightness below which depth suffers, too
 
 
-class View:
-    """What a camera that knows no noise sees: `colour` (h, w, 3) uint8 RGB, `depth` (h, w), `bodies` (h, w)."""
+class RenderedView:
+    """What a camera without noise sees.
 
-    def __init__(self, world: World, world_from_camera: np.ndarray, size: Tuple[int, int] = (WIDTH, HEIGHT),
-                 field_of_view: float = FIELD_OF_VIEW, far: float = FAR, **light: object) -> None:
-        """
+    It has `colour` (h, w, 3) uint8 RGB, `depth` (h, w) m, and `bodies` (h, w) by their numbers.
+    """
+
+    def __init__(self, world: World, world_from_camera: np.ndarray,
+                 size: Tuple[int, int] = (WIDTH, HEIGHT), field_of_view: float = FIELD_OF_VIEW,
+                 far: float = FAR, **light: object) -> None:
+        """Render the world.
+
         :param world_from_camera: 4x4, m, z forward, x right, y down.
         :param size: width and height, pixels.
         :param field_of_view: degrees, from top to bottom.
         :param far: m, how far it sees.
-        :param light: of pybullet.getCameraImage, over what is usual here.
+        :param light: options of pybullet.getCameraImage that override LIGHT.
         """
         width, height = size
-        eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3, 2], -world_from_camera[:3, 1]
+        eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3,
+                                                                       2], -world_from_camera[:3, 1]
         matrix = pybullet.computeViewMatrix(eye.tolist(), (eye + forward).tolist(), up.tolist())
         projection = _projection(size, field_of_view, far)
-        image = pybullet.getCameraImage(width, height, matrix, projection, renderer=pybullet.ER_TINY_RENDERER,
+        image = pybullet.getCameraImage(width, height, matrix, projection,
+                                        renderer=pybullet.ER_TINY_RENDERER,
                                         physicsClientId=world.client, **dict(LIGHT, **light))
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
-        self.depth = far * NEAR / (far - (far - NEAR) * buffer)  # m along the axis; `far` where there is nothing
-        self.bodies = np.asarray(image[4], int).reshape(height, width)  # numbers in the client, -1 for none
+        # m along the axis; `far` where there is nothing
+        self.depth = far * NEAR / (far - (far - NEAR) * buffer)
+        # numbers in the client, -1 for none
+        self.bodies = np.asarray(image[4], int).reshape(height, width)
 
 
 def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List[float]:
-    """So that the axis goes through the middle between the pixels' centres: the renderer takes corners for centres."""
+    """The projection whose axis goes through the middle between the pixels' centres.
+
+    The renderer takes corners for centres.
+    """
     width, height = size
     pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
-    matrix: List[float] = pybullet.computeProjectionMatrix(
-        pixel * (1 - width) / 2, pixel * (width + 1) / 2, pixel * (1 - height) / 2, pixel * (height + 1) / 2, NEAR, far)
+    matrix: List[float] = pybullet.computeProjectionMatrix(pixel * (1 - width) / 2,
+                                                           pixel * (width + 1) / 2,
+                                                           pixel * (1 - height) / 2,
+                                                           pixel * (height + 1) / 2, NEAR, far)
     return matrix
 
 
-def see(world: World) -> Frame:
-    """A frame of the head camera; the world goes on for the time that it takes."""
-    world.step(FRAME_PERIODS)
-    return shoot(world)
+def see(world: World) -> CameraImage:
+    """An image of the head camera; the world goes on for the time that it takes."""
+    world.step(IMAGE_PERIODS)
+    return take_image(world)
 
 
-def shoot(world: World, counted: bool = True) -> Frame:
-    """A frame of what the head camera sees just now.
+def take_image(world: World, counted: bool = True) -> CameraImage:
+    """An image of what the head camera sees just now.
 
-    :param counted: False: a look that sets off nothing, and that no disturbance is used up by.
+    :param counted: False: sets off nothing, and uses up no disturbance.
     """
-    sensor = world.disturbances.sensor(world.scene.sensor)
+    quality = world.disturbances.camera_quality(world.scene.camera)
     pose = world.link_pose(CAMERA_FRAME)
-    view = View(world, pose)
+    rendered = RenderedView(world, pose)
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
-    frame = Frame(world.time, noisy_colour(view.colour, sensor, generator), noisy_depth(view.depth, sensor, generator),
-                  INTRINSICS.copy(), inverse(world.true_base()) @ pose)
+    image = CameraImage(world.time, noisy_colour(rendered.colour, quality, generator),
+                        noisy_depth(rendered.depth, quality, generator), INTRINSICS.copy(),
+                        inverse(world.true_base()) @ pose)
     if counted:
-        world.disturbances.frame_taken()
+        world.disturbances.image_taken()
         world.happened('see')
-    return frame
+    return image
 
 
-def noisy_colour(colour: np.ndarray, sensor: Sensor, generator: np.random.Generator) -> np.ndarray:
+def noisy_colour(colour: np.ndarray, quality: CameraQuality,
+                 generator: np.random.Generator) -> np.ndarray:
     """(h, w, 3) uint8, as dark as the light is and with noise in every channel."""
-    noise = generator.standard_normal(colour.shape, np.float32) * np.float32(sensor.colour_noise)
-    return np.clip(colour * np.float32(sensor.brightness) + noise, 0, 255).astype(np.uint8)
+    noise = generator.standard_normal(colour.shape, np.float32) * np.float32(quality.colour_noise)
+    return np.clip(colour * np.float32(quality.brightness) + noise, 0, 255).astype(np.uint8)
 
 
-def noisy_depth(depth: np.ndarray, sensor: Sensor, generator: np.random.Generator) -> np.ndarray:
-    """(h, w) float32 m: a Kinect's noise and steps; lost edges, lost pixels; NaN beyond FAR. Dim light adds to all."""
+def noisy_depth(depth: np.ndarray, quality: CameraQuality,
+                generator: np.random.Generator) -> np.ndarray:
+    """(h, w) float32 m, with a Kinect's noise, steps, lost edges and lost pixels.
+
+    NaN beyond FAR. Dim light adds to all of these.
+    """
     known = np.asarray(depth, np.float32)
-    dark = max(0.0, 1.0 - sensor.brightness / DIMMED)
-    spread = (sensor.noise + 3.0 * dark) * (0.0012 + 0.0019 * (known - 0.4) ** 2)
+    dark = max(0.0, 1.0 - quality.brightness / DIMMED)
+    spread = (quality.noise + 3.0 * dark) * (0.0012 + 0.0019 * (known - 0.4) ** 2)
     found = known + spread * generator.standard_normal(depth.shape, np.float32)
     steps = BASELINE * FOCAL * 8
     found = steps / np.round(steps / np.maximum(found, NEAR))
     chance = generator.random(depth.shape, np.float32)
     jumps = ndimage.maximum_filter(known, 3) - ndimage.minimum_filter(known, 3) > EDGE
-    lost = (jumps & (chance < 0.7)) | (chance > 1.0 - min(1.0, sensor.dropout + 0.9 * dark ** 2))
+    lost = (jumps & (chance < 0.7)) | (chance > 1.0 - min(1.0, quality.dropout + 0.9 * dark ** 2))
     found[lost | (known > 0.999 * FAR)] = np.nan
     return found.astype(np.float32)

@@ -1,26 +1,27 @@
-"""Whether a trial was a true success: read off the world's bodies, whatever the machine or the robot says."""
+"""Whether a trial was a true success, by the world's bodies alone."""
 from typing import List, NamedTuple, Tuple
 
 import numpy as np
 
-from .physics import World
-from .scene import Goal
+from ..scenes.scene import Goal
+from .world import World
 
 UPRIGHT = np.cos(np.radians(15.0))
 RESTING = (0.03, 0.3)  # m/s, rad/s: what is slower is at rest
 HEIGHT = 0.05  # m, that a body may be off the goal's height
-CARRIED = 0.08  # m from where the scene put it: what was merely pushed towards the goal was not brought there
+# m from where the scene put it: what was merely pushed towards the goal was not brought there
+CARRIED = 0.08
 RECEIVER = 'palm'  # the body that takes what is handed over
 
 
-class Verdict(NamedTuple):
+class TrialVerdict(NamedTuple):
     """The truth about a goal."""
 
     success: bool
     why: str
 
 
-def judge(world: World, goal: Goal) -> Verdict:
+def judge(world: World, goal: Goal) -> TrialVerdict:
     """Look at the world as it stands, without moving it.
 
     :raises ValueError: for a goal of an unknown kind, or about a body that is not there.
@@ -29,17 +30,19 @@ def judge(world: World, goal: Goal) -> Verdict:
         raise ValueError("goal: kind is {!r}; allowed: 'stands_at', 'in_hand'".format(goal.kind))
     names = [goal.body] if goal.body else world.movable()
     if not names:
-        return Verdict(False, 'there is nothing in the world that can be moved')
+        return TrialVerdict(False, 'there is nothing in the world that can be moved')
     found: List[Tuple[float, str, str]] = []
     for name in names:
         off = float(np.linalg.norm(world.body_pose(name)[:2, 3] - goal.position[:2]))
         faults = _faults(world, goal, name, off)
         if not faults:
-            return Verdict(True, '{} {}, {:.1f} cm off'.format(
-                name, 'stands at its goal' if goal.kind == 'stands_at' else 'is in the receiving hand', 100 * off))
+            return TrialVerdict(
+                True, '{} {}, {:.1f} cm off'.format(
+                    name, 'stands at its goal'
+                    if goal.kind == 'stands_at' else 'is in the receiving hand', 100 * off))
         found.append((off, name, ', '.join(faults)))
     _, name, text = min(found)
-    return Verdict(False, '{} {}'.format(name, text))
+    return TrialVerdict(False, '{} {}'.format(name, text))
 
 
 def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:
@@ -62,7 +65,8 @@ def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:
     if goal.kind == 'in_hand' and RECEIVER not in touching:
         faults.append('does not lie in the {}'.format(RECEIVER))
     if goal.kind == 'stands_at' and abs(height) > HEIGHT:
-        faults.append('is {:.0f} cm too {}'.format(100 * abs(height), 'high' if height > 0 else 'low'))
+        faults.append('is {:.0f} cm too {}'.format(100 * abs(height),
+                                                   'high' if height > 0 else 'low'))
     if goal.kind == 'stands_at' and not touching - {'robot'}:
         faults.append('stands on nothing')
     return faults

@@ -1,4 +1,4 @@
-"""What is seen of round things, as files of meshes: PyBullet shades its own badly, and loses the memory of others."""
+"""Mesh files of round things: PyBullet shades its own badly, and leaks the memory of others."""
 import os
 import tempfile
 from functools import lru_cache
@@ -6,7 +6,7 @@ from typing import List
 
 import numpy as np
 
-from ..robot.pr2_model import pr2_files
+from smach_oracle.pr2.model.pr2_model import pr2_files
 
 SIDES = 36  # of a cylinder
 ROUND_SIDES, ROUND_RINGS = 24, 11  # of something round
@@ -15,40 +15,59 @@ SQUARENESS = 3.0  # 2 is a ball, more is nearer to a cylinder
 
 @lru_cache(maxsize=1)
 def drum() -> str:
-    """A file with a cylinder of radius and height 1 whose edges are edges. Two processes may write it at once."""
+    """A file with a cylinder of radius and height 1 and sharp edges.
+
+    Two processes may write it at once.
+    """
     angles = np.arange(SIDES) * 2 * np.pi / SIDES
-    lines = ['v {:.6f} {:.6f} {}'.format(np.cos(angle), np.sin(angle), z) for z in (-0.5, 0.5) for angle in angles]
-    lines += ['vn {:.6f} {:.6f} 0'.format(np.cos(angle), np.sin(angle)) for angle in angles] + ['vn 0 0 -1', 'vn 0 0 1']
+    lines = [
+        'v {:.6f} {:.6f} {}'.format(np.cos(angle), np.sin(angle), z) for z in (-0.5, 0.5)
+        for angle in angles
+    ]
+    lines += ['vn {:.6f} {:.6f} 0'.format(np.cos(angle), np.sin(angle))
+              for angle in angles] + ['vn 0 0 -1', 'vn 0 0 1']
     for k in range(SIDES):
         low, after = k + 1, (k + 1) % SIDES + 1
         side = ['{}//{}'.format(point, normal) for point, normal in (
             (low, low), (after, after), (SIDES + after, after), (SIDES + low, low))]
-        lines += ['f {} {} {}'.format(side[0], side[1], side[2]), 'f {} {} {}'.format(side[0], side[2], side[3])]
+        lines += [
+            'f {} {} {}'.format(side[0], side[1], side[2]),
+            'f {} {} {}'.format(side[0], side[2], side[3])
+        ]
         if 0 < k < SIDES - 1:
             lines.append('f 1//{0} {2}//{0} {1}//{0}'.format(SIDES + 1, low, after))
-            lines.append('f {3}//{0} {1}//{0} {2}//{0}'.format(SIDES + 2, SIDES + low, SIDES + after, SIDES + 1))
+            lines.append('f {3}//{0} {1}//{0} {2}//{0}'.format(SIDES + 2, SIDES + low,
+                                                               SIDES + after, SIDES + 1))
     return _written('cylinder.obj', lines)
 
 
 @lru_cache(maxsize=1)
 def egg() -> str:
-    """A file with a rounded thing of 1 by 1 by 1, between a ball and a cylinder. Two processes may write it at once."""
+    """A file with a rounded thing of 1 by 1 by 1, between a ball and a cylinder.
+
+    Two processes may write it at once.
+    """
     heights = np.radians(np.linspace(-90.0, 90.0, ROUND_RINGS + 2))
     power = 2 / SQUARENESS
-    wide, high = np.cos(heights).clip(0.0) ** power / 2, np.sign(heights) * np.abs(np.sin(heights)) ** power / 2
+    wide, high = np.cos(heights).clip(0.0)**power / 2, np.sign(heights) * np.abs(
+        np.sin(heights))**power / 2
     points, normals = [], []
     for radius, z in zip(wide, high):
         for angle in np.arange(ROUND_SIDES) * 2 * np.pi / ROUND_SIDES:
             out = np.array([np.cos(angle), np.sin(angle), 0.0])
-            normal = out * radius ** (SQUARENESS - 1) + [0.0, 0.0, np.sign(z) * abs(z) ** (SQUARENESS - 1)]
+            normal = out * radius**(SQUARENESS - 1) + [
+                0.0, 0.0, np.sign(z) * abs(z)**(SQUARENESS - 1)
+            ]
             points.append('v {:.6f} {:.6f} {:.6f}'.format(*(radius * out + [0.0, 0.0, z])))
             normals.append('vn {:.6f} {:.6f} {:.6f}'.format(*(normal / np.linalg.norm(normal))))
     faces = []
     for ring in range(ROUND_RINGS + 1):
         for k in range(ROUND_SIDES):
             low, after = ring * ROUND_SIDES + k + 1, ring * ROUND_SIDES + (k + 1) % ROUND_SIDES + 1
-            faces += ['f {0}//{0} {1}//{1} {2}//{2}'.format(low, after, after + ROUND_SIDES),
-                      'f {0}//{0} {1}//{1} {2}//{2}'.format(low, after + ROUND_SIDES, low + ROUND_SIDES)]
+            faces += [
+                'f {0}//{0} {1}//{1} {2}//{2}'.format(low, after, after + ROUND_SIDES),
+                'f {0}//{0} {1}//{1} {2}//{2}'.format(low, after + ROUND_SIDES, low + ROUND_SIDES)
+            ]
     return _written('egg.obj', points + normals + faces)
 
 

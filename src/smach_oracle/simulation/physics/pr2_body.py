@@ -6,48 +6,60 @@ from typing import Collection, Dict, List, Optional
 import numpy as np
 import pybullet
 
-from ...geometry.transforms import from_rpy
-from ..robot.interface import ARM_JOINTS, ARMS
-from ..robot.pr2_model import BASE_JOINTS, JAW_OPEN, pr2_files
-from ..robot.rigid_links import fixed_frames
-from .bodies import SceneError, pose_of
-from .scene import RobotStart
+from smach_oracle.geometry.transforms import from_rpy
+from smach_oracle.pr2.model.pr2_model import BASE_JOINTS, JAW_OPEN, pr2_files
+from smach_oracle.pr2.model.rigid_links import fixed_frames
+from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
+
+from ..scenes.scene import RobotStart
+from .bodies import SceneBuildError, pose_of
 
 SUBSTEPS = 4  # steps of physics in a control period
 STEP = 1.0 / 240.0  # s
 PERIOD = SUBSTEPS * STEP
-JAWS = {arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS}
-FINGERS = {arm: [name.replace('_joint', '_link') for name in JAWS[arm]] for arm in ARMS}
+FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
 FORCE = 300.0  # N m; the effort limits of the URDF presume springs that carry the arms
 STRONG = dict({name: 5000.0 for name in BASE_JOINTS}, torso_lift_joint=10000.0)  # N
 GRIP = 20.0  # N, of each finger at the start
-LEAD = 0.003  # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep together
+# m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
+# together
+LEAD = 0.003
 STIFFNESS = 0.3  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
 STAND = {  # how a PR2 stands unless the scene says otherwise
-    'torso_lift_joint': 0.20, 'head_tilt_joint': 0.0,
-    'l_shoulder_pan_joint': 1.6, 'l_shoulder_lift_joint': 0.2, 'l_upper_arm_roll_joint': 1.5,
-    'l_elbow_flex_joint': -1.5, 'l_forearm_roll_joint': -0.5, 'l_wrist_flex_joint': -0.6, 'l_wrist_roll_joint': 0.0,
+    'torso_lift_joint': 0.20, 'head_tilt_joint': 0.0, 'l_shoulder_pan_joint': 1.6,
+    'l_shoulder_lift_joint': 0.2, 'l_upper_arm_roll_joint': 1.5, 'l_elbow_flex_joint': -1.5,
+    'l_forearm_roll_joint': -0.5, 'l_wrist_flex_joint': -0.6, 'l_wrist_roll_joint': 0.0,
     'r_shoulder_pan_joint': -1.6, 'r_shoulder_lift_joint': 0.2, 'r_upper_arm_roll_joint': -1.5,
-    'r_elbow_flex_joint': -1.5, 'r_forearm_roll_joint': 0.5, 'r_wrist_flex_joint': -0.6, 'r_wrist_roll_joint': 0.0,
-    **{jaw: JAW_OPEN for jaws in JAWS.values() for jaw in jaws}}
+    'r_elbow_flex_joint': -1.5, 'r_forearm_roll_joint': 0.5, 'r_wrist_flex_joint': -0.6,
+    'r_wrist_roll_joint': 0.0, **{jaw: JAW_OPEN
+                                  for jaws in FINGER_JOINTS.values()
+                                  for jaw in jaws}
+}
 
 
 class Pr2Body:
     """Loaded at its start, every joint held where it is."""
 
     def __init__(self, client: int, start: RobotStart) -> None:
-        """Raises SceneError where the start names a joint that is not there, or a position out of its limits."""
+        """Load the robot.
+
+        :raises SceneBuildError: where the start names a joint that is not there, or a position
+            outside its limits.
+        """
         self._client = client
         files = pr2_files()
         self.index: int = pybullet.loadURDF(str(files.mobile), useFixedBase=True,
-                                            flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
+                                            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                                            physicsClientId=client)
         infos = [pybullet.getJointInfo(self.index, number, physicsClientId=client)
                  for number in range(pybullet.getNumJoints(self.index, physicsClientId=client))]
         self.numbers = {info[1].decode(): number for number, info in enumerate(infos)}
         self.links = {info[12].decode(): number for number, info in enumerate(infos)}
-        self.limits = {info[1].decode(): (info[8], info[9]) if info[8] <= info[9] else (-math.inf, math.inf)
-                       for info in infos}
+        self.limits = {
+            info[1].decode(): (info[8], info[9]) if info[8] <= info[9] else (-math.inf, math.inf)
+            for info in infos
+        }
         self.speeds = {info[1].decode(): info[11] for info in infos}
         self.encoders = [name for name in self.numbers if name not in BASE_JOINTS]
         self._frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
@@ -57,28 +69,31 @@ class Pr2Body:
         self._moving: List[int] = []
         self._changed = set(range(len(infos)))
         self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
-        self._jaws = {arm: [self.numbers[name] for name in JAWS[arm]] for arm in ARMS}
+        self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
         self._stand(start)
         for arm in ARMS:
             for finger in FINGERS[arm]:
-                pybullet.changeDynamics(self.index, self.links[finger], lateralFriction=TIP_FRICTION,
-                                        spinningFriction=0.005, rollingFriction=0.0005, physicsClientId=client)
+                pybullet.changeDynamics(self.index, self.links[finger],
+                                        lateralFriction=TIP_FRICTION, spinningFriction=0.005,
+                                        rollingFriction=0.0005, physicsClientId=client)
 
     def _stand(self, start: RobotStart) -> None:
         wanted = dict(STAND)
         for name, position in start.joints:
             if name not in self.encoders:
-                raise SceneError('robot: no joint {!r}; there: {}'.format(name, ', '.join(self.encoders)))
+                raise SceneBuildError('robot: no joint {!r}; there: {}'.format(
+                    name, ', '.join(self.encoders)))
             wanted[name] = position
         wanted.update(zip(BASE_JOINTS, start.base))
         for name, position in wanted.items():
             wrong = self.refusal(name, position)
             if wrong:
-                raise SceneError('robot: ' + wrong)
-            pybullet.resetJointState(self.index, self.numbers[name], position, physicsClientId=self._client)
+                raise SceneBuildError('robot: ' + wrong)
+            pybullet.resetJointState(self.index, self.numbers[name], position,
+                                     physicsClientId=self._client)
             self._targets[self.numbers[name]] = position
         for arm in ARMS:
-            self._grips[arm] = (sum(wanted[jaw] for jaw in JAWS[arm]), GRIP)
+            self._grips[arm] = (sum(wanted[jaw] for jaw in FINGER_JOINTS[arm]), GRIP)
 
     def refusal(self, name: str, position: float) -> str:
         """Why a joint cannot be sent to a position, or ''."""
@@ -86,18 +101,23 @@ class Pr2Body:
             return 'no joint {!r}; there: {}'.format(name, ', '.join(self.numbers))
         lower, upper = self.limits[name]
         if not lower - 1e-3 <= position <= upper + 1e-3:
-            return '{} cannot be at {:.4g}; allowed: {:.4g} to {:.4g}'.format(name, position, lower, upper)
+            return '{} cannot be at {:.4g}; allowed: {:.4g} to {:.4g}'.format(
+                name, position, lower, upper)
         return ''
 
     def states(self, field: int) -> Dict[str, float]:
-        """Of every encoder: 0 positions (rad or m), 1 velocities (rad/s or m/s), 3 what its motor gives (N m or N)."""
+        """One field of every encoder's state.
+
+        :param field: 0: positions (rad or m), 1: velocities (rad/s or m/s), 3: efforts (N m or N).
+        """
         states = pybullet.getJointStates(self.index, [self.numbers[name] for name in self.encoders],
                                          physicsClientId=self._client)
         return {name: state[field] for name, state in zip(self.encoders, states)}
 
     def position(self, name: str) -> float:
         """rad or m of one joint, also of the base's."""
-        position: float = pybullet.getJointState(self.index, self.numbers[name], physicsClientId=self._client)[0]
+        position: float = pybullet.getJointState(self.index, self.numbers[name],
+                                                 physicsClientId=self._client)[0]
         return position
 
     def base(self) -> np.ndarray:
@@ -106,25 +126,32 @@ class Pr2Body:
         return from_rpy((x, y, 0.0), yaw=theta)
 
     def base_velocity(self) -> np.ndarray:
-        """(3,) of base_footprint in its own axes: m/s forward and to the left, rad/s about the vertical."""
-        (_, _, theta), (x, y, turn) = (
-            [pybullet.getJointState(self.index, self.numbers[name], physicsClientId=self._client)[field]
-             for name in BASE_JOINTS] for field in (0, 1))
+        """(3,) of base_footprint in its own axes: m/s forward, m/s to the left, rad/s of yaw."""
+        (_, _, theta), (x, y, turn) = ([
+            pybullet.getJointState(self.index, self.numbers[name],
+                                   physicsClientId=self._client)[field] for name in BASE_JOINTS
+        ] for field in (0, 1))
         cos, sin = math.cos(theta), math.sin(theta)
         return np.array([cos * x + sin * y, cos * y - sin * x, turn])
 
     def link_pose(self, link: str) -> np.ndarray:
-        """4x4, the world from a link of the URDF. Raises ValueError for one that is not there."""
+        """4x4, the world from a link of the URDF.
+
+        :raises ValueError: for one that is not there.
+        """
         if link not in self._frames:
-            raise ValueError('no link {!r} in the PR2; there: {}'.format(link, ', '.join(sorted(self._frames))))
+            raise ValueError('no link {!r} in the PR2; there: {}'.format(
+                link, ', '.join(sorted(self._frames))))
         holder, holder_from_link = self._frames[link]
         state = pybullet.getLinkState(self.index, self.links[holder], computeForwardKinematics=True,
                                       physicsClientId=self._client)
         return pose_of(state[4], state[5]) @ holder_from_link
 
-    def set_target(self, name: str, position: float, velocity: float, force: Optional[float]) -> None:
-        """Where a joint shall be (rad or m) at the end of the coming period, moving at `velocity` (per s) until then.
+    def set_target(self, name: str, position: float, velocity: float,
+                   force: Optional[float]) -> None:
+        """Send a joint to a position (rad or m) at the end of the coming control period.
 
+        :param velocity: rad/s or m/s until then.
         :param force: N m or N, at most; None: as before.
         """
         number = self.numbers[name]
@@ -174,12 +201,13 @@ class Pr2Body:
         chosen = sorted(numbers)
         rates = self._rates[chosen]
         pybullet.setJointMotorControlArray(
-            self.index, chosen, pybullet.POSITION_CONTROL, targetPositions=self._targets[chosen] - left * STEP * rates,
-            targetVelocities=rates, forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
+            self.index, chosen, pybullet.POSITION_CONTROL,
+            targetPositions=self._targets[chosen] - left * STEP * rates, targetVelocities=rates,
+            forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
             velocityGains=[1.0] * len(chosen), physicsClientId=self._client)
 
     def _drive_jaws(self, arm: str) -> None:
-        """Both fingers go the same way: neither is sent further than LEAD from the middle of the two."""
+        """Send both fingers the same way, neither further than LEAD from the middle of the two."""
         gap, force = self._grips[arm]
         middle = sum(self._jaw_positions(arm)) / 2
         target = min(max(gap / 2, middle - LEAD), middle + LEAD)

@@ -1,8 +1,9 @@
-"""Joint trajectories as a PR2's controllers follow them, and how every motion begins, goes on and ends.
+"""Joint trajectories as a PR2's controllers follow them, and the protocol of all motions.
 
     result = run(world, Trajectory(joints, positions, times))
 
-A motion is ticked before each control period and says None until it has ended. Several may be ticked side by side.
+A motion is ticked before each control period, and returns None until it has ended. Several may be
+ticked side by side.
 """
 import math
 from typing import List, Mapping, NamedTuple, Optional, Protocol, Sequence, Tuple
@@ -10,18 +11,20 @@ from typing import List, Mapping, NamedTuple, Optional, Protocol, Sequence, Tupl
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ..robot.interface import GripperState
-from .physics import World
+from smach_oracle.pr2.robot import GripperState
+
 from .pr2_body import PERIOD, arm_of
+from .world import World
 
 PATH_TOLERANCE = 0.2  # rad or m that a joint may be behind on the way
 GOAL_TOLERANCE = 0.01  # rad or m at the end
 BLEND_S = 0.1  # s in which the speed changes at a corner of a trajectory without velocities
-SETTLE_S = (0.1, 1.0)  # least and most time after the end in which joints may arrive and come to rest
+# least and most time after the end in which joints may arrive and come to rest
+ARRIVAL_S = (0.1, 1.0)
 SPEED_MARGIN = 1.1  # times the URDF's limit that a trajectory may ask for
 
 
-class Result(NamedTuple):
+class MotionResult(NamedTuple):
     """How a motion ended."""
 
     ok: bool
@@ -44,8 +47,8 @@ USUAL = Tolerances()
 class Motion(Protocol):
     """Something a controller does."""
 
-    def tick(self, world: World) -> Optional[Result]:
-        """Send the joints on for the coming period, or say how it has ended."""
+    def tick(self, world: World) -> Optional[MotionResult]:
+        """Send the joints on for the coming period; the result where it has ended."""
 
     def events(self) -> Sequence[str]:
         """What has happened when it has ended, for the world's disturbances."""
@@ -54,29 +57,35 @@ class Motion(Protocol):
         """Hold everything that it moved where it is."""
 
 
-def run(world: World, motion: Motion) -> Result:
+def run(world: World, motion: Motion) -> MotionResult:
     """Step the world until a motion has ended, and with it what its end set off."""
     result = motion.tick(world)
     while result is None:
         world.step()
         result = motion.tick(world)
     world.happened(*motion.events())
-    while world.unrest:
+    while world.disturbed:
         world.step()
     return result
 
 
 class Trajectory:
-    """Joints through points in time: straight between two, or cubic where velocities are given, as a PR2's do."""
+    """Takes joints through points in time, as a PR2's controllers do.
+
+    Between two points it goes straight, or cubic where velocities are given.
+    """
 
     def __init__(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray,
                  velocities: Optional[np.ndarray] = None, check_speed: bool = True,
                  tolerances: Tolerances = USUAL) -> None:
-        """
-        :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to the first point.
+        """Take a command.
+
+        :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to
+            the first point.
         :param times: (n,) s from the start, increasing; the first may be 0.
         :param velocities: (n, len(joints)), rad/s or m/s.
-        :raises ValueError: for shapes that do not fit, values that are not finite, times that do not increase.
+        :raises ValueError: for shapes that do not fit, values that are not finite, times that do
+            not increase.
         """
         self._joints = list(joints)
         self._tolerances = tolerances
@@ -85,7 +94,7 @@ class Trajectory:
         self._velocities = None if velocities is None else np.array(velocities, float)
         self._check_speed = check_speed
         self._begun = -1
-        self._settled = 0
+        self._arriving_since = 0
         _check_points(self._joints, self._positions, self._times, self._velocities)
 
     @property
@@ -130,74 +139,88 @@ class Trajectory:
                 positions[:, column] -= 2 * np.pi * turns
         return start, positions, self._times
 
-    def tick(self, world: World) -> Optional[Result]:
+    def tick(self, world: World) -> Optional[MotionResult]:
+        """See Motion."""
         if self._begun < 0:
             wrong = self.refusal(world)
             if wrong:
-                return Result(False, wrong)
+                return MotionResult(False, wrong)
             start, positions, times = self._from_here(world)
             self._begin(world, start, positions, times)
         done = world.periods - self._begun
         behind = self._behind(world, done)
         if behind:
             self.stop(world)
-            return Result(False, behind, missed='path')
-        if done >= len(self._way) - 1:
-            return self._settle(world)
-        for name, before, after in zip(self._joints, self._way[done], self._way[done + 1]):
+            return MotionResult(False, behind, missed='path')
+        if done >= len(self._setpoints) - 1:
+            return self._arrive(world)
+        for name, before, after in zip(self._joints, self._setpoints[done],
+                                       self._setpoints[done + 1]):
             world.robot.set_target(name, after, (after - before) / PERIOD, None)
         return None
 
-    def _begin(self, world: World, start: np.ndarray, positions: np.ndarray, times: np.ndarray) -> None:
+    def _begin(self, world: World, start: np.ndarray, positions: np.ndarray,
+               times: np.ndarray) -> None:
         self._begun = world.periods
         drop = int(times[0] <= 0.0 and len(times) > 1)
         knots = np.concatenate([[0.0], np.maximum(times[drop:], PERIOD)])
         points = np.vstack([start, positions[drop:]])
         moments = PERIOD * np.arange(math.ceil(knots[-1] / PERIOD - 1e-9) + 1)
         if self._velocities is None:
-            self._way = _blended(np.column_stack([np.interp(moments, knots, column) for column in points.T]))
+            self._setpoints = _blended(
+                np.column_stack([np.interp(moments, knots, column) for column in points.T]))
         else:
             slopes = np.vstack([np.zeros(len(start)), self._velocities[drop:]])
-            self._way = CubicHermiteSpline(knots, points, slopes)(np.minimum(moments, knots[-1]))
+            self._setpoints = CubicHermiteSpline(knots, points,
+                                                 slopes)(np.minimum(moments, knots[-1]))
 
     def _behind(self, world: World, done: int) -> str:
-        for name, wanted in zip(self._joints, self._way[min(done, len(self._way) - 1)]):
+        for name, wanted in zip(self._joints, self._setpoints[min(done, len(self._setpoints) - 1)]):
             error = abs(world.robot.position(name) - wanted)
             if error > self._tolerances.path.get(name, PATH_TOLERANCE):
                 return '{} is {:.2f} off its path after {:.1f} s: something is in its way'.format(
                     name, error, done * PERIOD)
         return ''
 
-    def _settle(self, world: World) -> Optional[Result]:
-        goal = self._way[-1]
-        if not self._settled:
-            self._settled = world.periods
+    def _arrive(self, world: World) -> Optional[MotionResult]:
+        goal = self._setpoints[-1]
+        if not self._arriving_since:
+            self._arriving_since = world.periods
             for name, position in zip(self._joints, goal):
                 world.robot.set_target(name, position, 0.0, None)
-        waited = (world.periods - self._settled) * PERIOD
+        waited = (world.periods - self._arriving_since) * PERIOD
         errors = [abs(world.robot.position(name) - end) for name, end in zip(self._joints, goal)]
-        shares = [error / self._tolerances.goal.get(name, GOAL_TOLERANCE) for name, error in zip(self._joints, errors)]
-        if waited >= SETTLE_S[0] and max(shares) < 1.0:
-            return Result(True)
-        if waited < SETTLE_S[1] + self._tolerances.late_s:
+        shares = [
+            error / self._tolerances.goal.get(name, GOAL_TOLERANCE)
+            for name, error in zip(self._joints, errors)
+        ]
+        if waited >= ARRIVAL_S[0] and max(shares) < 1.0:
+            return MotionResult(True)
+        if waited < ARRIVAL_S[1] + self._tolerances.late_s:
             return None
         worst = int(np.argmax(shares))
         self.stop(world)
-        return Result(False, '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]), missed='goal')
+        return MotionResult(
+            False, '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]),
+            missed='goal')
 
     def events(self) -> Sequence[str]:
+        """See Motion."""
         arms = sorted({arm_of(name) for name in self._joints} - {''})
         return ['follow'] + ['follow_' + arm for arm in arms] if arms else []
 
     def stop(self, world: World) -> None:
+        """See Motion."""
         for name in self._joints:
             world.robot.set_target(name, world.robot.position(name), 0.0, None)
 
 
 def _blended(way: np.ndarray) -> np.ndarray:
-    """A way (periods, joints) whose corners take BLEND_S, and which ends that much later."""
+    """A path (periods, joints) whose corners take BLEND_S, and which ends that much later."""
     width = max(1, round(BLEND_S / PERIOD))
-    padded = np.vstack([np.repeat(way[:1], width - 1, axis=0), way, np.repeat(way[-1:], width, axis=0)])
+    padded = np.vstack(
+        [np.repeat(way[:1], width - 1, axis=0), way,
+         np.repeat(way[-1:], width, axis=0)])
     total = np.cumsum(np.vstack([np.zeros(way.shape[1]), padded]), axis=0)
     return (total[width:] - total[:-width]) / width
 
@@ -212,8 +235,10 @@ def _check_points(joints: List[str], positions: np.ndarray, times: np.ndarray,
                   velocities: Optional[np.ndarray]) -> None:
     count = len(joints)
     if not count or len(set(joints)) != count:
-        raise ValueError('trajectory: joints are {}; allowed: at least one, none twice'.format(joints))
-    if positions.ndim != 2 or positions.shape[1] != count or not len(positions) or times.shape != positions.shape[:1]:
+        raise ValueError(
+            'trajectory: joints are {}; allowed: at least one, none twice'.format(joints))
+    if positions.ndim != 2 or positions.shape[1] != count or not len(
+            positions) or times.shape != positions.shape[:1]:
         raise ValueError('trajectory: positions {} and times {} do not fit to {} joints'.format(
             positions.shape, times.shape, count))
     if velocities is not None and velocities.shape != positions.shape:

@@ -1,7 +1,7 @@
-"""The world of a trial: the PR2, the things of the scene, physics. What is true, and the only place that knows it.
+"""The world of a trial: the PR2, the bodies of the scene, physics; the only place with the truth.
 
-The same scene and the same calls give the same states to the last bit: every reset begins in a fresh physics client,
-and nothing here reads a clock or shares a random generator.
+The same scene and the same calls give the same states to the last bit: every reset begins in a
+fresh physics client, and nothing here reads a clock or shares a random generator.
 """
 import math
 from typing import Dict, List, NamedTuple, Optional, Tuple
@@ -9,16 +9,17 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 import numpy as np
 import pybullet
 
-from ...geometry.transforms import from_rpy, inverse, yaw_of
-from ..robot.interface import ARMS, TOOL_FRAME
-from .bodies import Placed, add_body, add_floor, check_scene, pose_of
+from smach_oracle.geometry.transforms import from_rpy, inverse, yaw_of
+from smach_oracle.pr2.robot import ARMS, TOOL_FRAME
+
+from ..scenes.scene import Body, Goal, Scene
+from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
-from .scene import Body, Goal, Scene
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
 TURNING_FORCE = 30.0  # N m, of what swings a door
-SETTLING = 30  # control periods after a reset, in which things come to rest
+REST_PERIODS = 30  # control periods after a reset, in which things come to rest
 
 
 class Contact(NamedTuple):
@@ -31,7 +32,10 @@ class Contact(NamedTuple):
 
 
 class World:
-    """One PyBullet client, owned by one thread. Whoever names an arm or a body that is not there gets a ValueError."""
+    """One PyBullet client, owned by one thread.
+
+    An arm or a body that is not there raises a ValueError.
+    """
 
     def __init__(self, scene: Scene = EMPTY) -> None:
         self._client = -1
@@ -42,7 +46,7 @@ class World:
     def reset(self, scene: Scene) -> None:
         """Build a scene's world from nothing, and let it come to rest.
 
-        :raises SceneError: saying what is wrong with the scene; the world is as it was then.
+        :raises SceneBuildError: with what is wrong with the scene; the world is as it was then.
         """
         check_scene(scene)
         client = pybullet.connect(pybullet.DIRECT)
@@ -58,15 +62,15 @@ class World:
         self._names = {robot.index: 'robot', floor: 'floor'}
         self._names.update({each.number: name for name, each in placed.items()})
         self._periods_before += self.periods
-        self.periods = self.drives = self.frames = 0
+        self.periods = self.drives = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
-        self.step(SETTLING)
+        self.step(REST_PERIODS)
         self.happened('start')
 
-    def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, Placed]]:
+    def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, PlacedBody]]:
         pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=50, deterministicOverlappingPairs=1,
-                                           physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=50,
+                                           deterministicOverlappingPairs=1, physicsClientId=client)
         floor = add_floor(client)
         robot = Pr2Body(client, scene.robot)
         return floor, robot, {body.name: add_body(client, body) for body in scene.bodies}
@@ -92,13 +96,13 @@ class World:
             self.periods += 1
 
     def happened(self, *events: str) -> None:
-        """Tell what has come to its end, such as 'look_at'; it may set off a disturbance of the scene."""
+        """Count events, such as 'look_at'; they may set off a disturbance of the scene."""
         for event in events:
             self._disturbances.happened(event)
 
     @property
-    def unrest(self) -> bool:
-        """A disturbance is on its way: motions should not be called done before it has had its course."""
+    def disturbed(self) -> bool:
+        """Whether a disturbance moves something: motions should not count as done before."""
         return self._disturbances.moving
 
     @property
@@ -132,10 +136,11 @@ class World:
 
     def set_target(self, joint: str, position: float, velocity: float = 0.0,
                    max_force: Optional[float] = None) -> None:
-        """Send a joint to where it shall be at the end of the coming control period; there it is held.
+        """Send a joint to a position at the end of the coming control period, and hold it there.
 
         :param velocity: rad/s or m/s on the way; it holds for that one period.
-        :raises ValueError: for an unknown joint, a position outside its limits, or what is no finite number.
+        :raises ValueError: for an unknown joint, a position outside its limits, or what is not a
+            finite number.
         """
         wrong = self._robot.refusal(joint, position)
         if not wrong and not math.isfinite(velocity):
@@ -145,14 +150,16 @@ class World:
         self._robot.set_target(joint, position, velocity, max_force)
 
     def set_gripper(self, arm: str, gap: float, max_effort: float) -> None:
-        """Send a gripper to `gap` m between its tips; its fingers press with at most `max_effort` N each.
+        """Send a gripper to `gap` m between its tips.
 
+        :param max_effort: N, with which each finger presses at most.
         :raises ValueError: for an unknown arm, or a gap or effort that cannot be.
         """
         self._check_arm(arm)
         if not 0.0 <= gap <= 0.0901 or not 0.0 < max_effort <= 200.0:
-            raise ValueError('{} gripper: gap {} m with {} N; allowed: 0 to 0.09 m, above 0 to 200 N'.format(
-                arm, gap, max_effort))
+            raise ValueError(
+                '{} gripper: gap {} m with {} N; allowed: 0 to 0.09 m, above 0 to 200 N'.format(
+                    arm, gap, max_effort))
         self._robot.set_grip(arm, min(gap, 0.09), max_effort)
 
     def gap(self, arm: str) -> float:
@@ -165,22 +172,30 @@ class World:
         return self._robot.base()
 
     def odom_from_base(self) -> np.ndarray:
-        """4x4, where the robot believes to stand: odom_combined, which is the world's frame, from base_footprint."""
+        """4x4, where the robot believes to stand: odom_combined, the world's frame, from base."""
         return self._robot.base() @ inverse(self.belief_error)
 
     def drive_error(self, share: float = 1.0) -> np.ndarray:
-        """4x4, by how much the next drive will miss its goal unknown to the robot; the same for the same trial.
+        """4x4, by how much the next drive will miss its goal unknown to the robot.
 
-        :param share: of the error that is drawn anew: a short drive keeps most of what there was.
+        The same trial has the same errors.
+
+        :param share: of the error that is drawn anew: a short drive keeps most of the last one's.
         """
         self.drives += 1
-        drawn = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(0.0, self.scene.robot.drive_error)
-        before = np.array([self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)])
+        drawn = np.random.default_rng([self.scene.seed, 101,
+                                       self.drives]).normal(0.0, self.scene.robot.drive_error)
+        before = np.array(
+            [self.belief_error[0, 3], self.belief_error[1, 3],
+             yaw_of(self.belief_error)])
         x, y, yaw = (1.0 - share) * before + share * drawn
         return from_rpy((x, y, 0.0), yaw=yaw)
 
     def link_pose(self, link: str) -> np.ndarray:
-        """4x4, the world from a link of the PR2's URDF. Raises ValueError for an unknown one."""
+        """4x4, the world from a link of the PR2's URDF.
+
+        :raises ValueError: for an unknown one.
+        """
         return self._robot.link_pose(link)
 
     def tool_pose(self, arm: str) -> np.ndarray:
@@ -196,7 +211,7 @@ class World:
         return list(self._placed)
 
     def body(self, name: str) -> Body:
-        """What the scene says of a body."""
+        """A body as the scene has it."""
         return self._find(name).body
 
     def body_pose(self, name: str, link: str = '') -> np.ndarray:
@@ -209,7 +224,8 @@ class World:
             raise ValueError('no link {!r} in {!r}; there: {}'.format(
                 link, name, ', '.join(filter(None, placed.links))))
         if link:
-            state = pybullet.getLinkState(placed.number, placed.links[link], computeForwardKinematics=True,
+            state = pybullet.getLinkState(placed.number, placed.links[link],
+                                          computeForwardKinematics=True,
                                           physicsClientId=self._client)
             return pose_of(state[4], state[5])
         pose = pybullet.getBasePositionAndOrientation(placed.number, physicsClientId=self._client)
@@ -220,15 +236,21 @@ class World:
 
     def body_speed(self, name: str) -> Tuple[float, float]:
         """How fast a body moves and turns, m/s and rad/s."""
-        linear, angular = pybullet.getBaseVelocity(self._find(name).number, physicsClientId=self._client)
+        linear, angular = pybullet.getBaseVelocity(
+            self._find(name).number, physicsClientId=self._client)
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
 
     def body_joint(self, name: str, joint: str) -> float:
-        """rad or m of a joint of a body. Raises ValueError for one that is not there, with those that are."""
+        """rad or m of a joint of a body.
+
+        :raises ValueError: for one that is not there, with those that are.
+        """
         placed = self._find(name)
         if joint not in placed.joints:
-            raise ValueError('no joint {!r} in {!r}; there: {}'.format(joint, name, ', '.join(placed.joints) or 'none'))
-        position: float = pybullet.getJointState(placed.number, placed.joints[joint], physicsClientId=self._client)[0]
+            raise ValueError('no joint {!r} in {!r}; there: {}'.format(
+                joint, name, ', '.join(placed.joints) or 'none'))
+        position: float = pybullet.getJointState(placed.number, placed.joints[joint],
+                                                 physicsClientId=self._client)[0]
         return position
 
     def body_joints(self, name: str) -> List[str]:
@@ -236,15 +258,17 @@ class World:
         return list(self._find(name).joints)
 
     def slide_body(self, name: str, x: float, y: float, let_go: bool = False) -> None:
-        """Take a body over what it stands on, at m/s; held so that it does not topple, but what is in its way stops it.
+        """Push a body over what it stands on, at m/s; it does not topple, but obstacles stop it.
 
         :param let_go: leave it where it is, with its own friction again.
         """
         placed = self._find(name)
         friction = placed.body.friction if let_go else 0.0
-        pybullet.changeDynamics(placed.number, -1, lateralFriction=friction, physicsClientId=self._client)
+        pybullet.changeDynamics(placed.number, -1, lateralFriction=friction,
+                                physicsClientId=self._client)
         linear, _ = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], [0.0] * 3, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], [0.0] * 3,
+                                   physicsClientId=self._client)
 
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
         """Drive a joint of a body at rad/s with a person's strength; what is in its way stops it.
@@ -253,8 +277,10 @@ class World:
         """
         placed = self._find(name)
         strength = dict(placed.body.joint_friction).get(joint, 0.0) if let_go else TURNING_FORCE
-        pybullet.setJointMotorControl2(placed.number, placed.joints[joint], pybullet.VELOCITY_CONTROL, force=strength,
-                                       targetVelocity=0.0 if let_go else speed, physicsClientId=self._client)
+        pybullet.setJointMotorControl2(placed.number, placed.joints[joint],
+                                       pybullet.VELOCITY_CONTROL, force=strength,
+                                       targetVelocity=0.0 if let_go else speed,
+                                       physicsClientId=self._client)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""
@@ -262,21 +288,28 @@ class World:
         found = []
         for point in pybullet.getContactPoints(bodyA=index, physicsClientId=self._client):
             if point[8] <= 0:
-                found.append(Contact(self._names[point[2]], self._link_name(point[2], point[4]), np.array(point[6]),
-                                     point[9]))
+                found.append(
+                    Contact(self._names[point[2]], self._link_name(point[2], point[4]),
+                            np.array(point[6]), point[9]))
         return found
 
     def holding(self, name: str) -> str:
         """The arm both of whose fingers touch a body, or ''."""
-        touching = {contact.link for contact in self.contacts(name) if contact.other == 'robot' and contact.force > 0}
+        touching = {
+            contact.link
+            for contact in self.contacts(name) if contact.other == 'robot' and contact.force > 0
+        }
         return next((arm for arm in ARMS if touching.issuperset(FINGERS[arm])), '')
 
     def movable(self) -> List[str]:
         """The bodies that can be carried, in the scene's order."""
-        return [name for name, placed in self._placed.items() if placed.body.mass > 0 and placed.body.shape != 'urdf']
+        return [
+            name for name, placed in self._placed.items()
+            if placed.body.mass > 0 and placed.body.shape != 'urdf'
+        ]
 
     def seen_as(self, index: int) -> str:
-        """The name of a body by its number in the client: 'robot', 'floor', or a body of the scene."""
+        """The name of a body by its number in the client: 'robot', 'floor', or a scene's."""
         return self._names.get(index, '')
 
     def _link_name(self, index: int, link: int) -> str:
@@ -286,9 +319,10 @@ class World:
                 links = placed.links
         return next((name for name, number in links.items() if number == link), '')
 
-    def _find(self, name: str) -> Placed:
+    def _find(self, name: str) -> PlacedBody:
         if name not in self._placed:
-            raise ValueError('no body {!r} in this scene; there: {}'.format(name, ', '.join(self._placed) or 'none'))
+            raise ValueError('no body {!r} in this scene; there: {}'.format(
+                name, ', '.join(self._placed) or 'none'))
         return self._placed[name]
 
     @staticmethod

@@ -1,19 +1,22 @@
-"""The PR2 in the same process as its world: for unit tests, and for tuning. The Robot protocol without ROS."""
+"""The PR2 in the same process as its world, without ROS: for unit tests, and for tuning."""
 from typing import Callable, Dict, Sequence
 
 import numpy as np
 
-from ..robot.interface import Frame, GripperState, RobotError
-from .camera import see
-from .motions import Drive, Gripper, Head, Torso
-from .physics import World
-from .trajectory import Motion, Result, Trajectory, run
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.geometry.transforms import VectorLike
+from smach_oracle.pr2.robot import GripperState, RobotError
+
+from ..physics.camera import see
+from ..physics.motions import BaseMotion, GripperMotion, HeadMotion, TorsoMotion
+from ..physics.trajectory import Motion, MotionResult, Trajectory, run
+from ..physics.world import World
 
 
 class DirectRobot:
     """Drives the PR2 of a world; every call returns when the motion has ended.
 
-    Values that cannot be, and motions that do not get there, raise RobotError.
+    Values that are not allowed, and motions that do not get there, raise RobotError.
     """
 
     def __init__(self, world: World) -> None:
@@ -32,29 +35,32 @@ class DirectRobot:
         self._do(lambda: Trajectory(joints, positions, times))
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
-        """See Robot. Raises RobotError where the gripper does not tell how it ended, too."""
-        state = self._do(lambda: Gripper(arm, position, max_effort)).gripper
+        """See Robot.
+
+        :raises RobotError: also where the gripper has no state at its end.
+        """
+        state = self._do(lambda: GripperMotion(arm, position, max_effort)).gripper
         if state is None:
             raise RobotError('the {} gripper does not tell its state'.format(arm))
         return state
 
     def torso(self, height: float) -> None:
         """See Robot."""
-        self._do(lambda: Torso(self._world, height))
+        self._do(lambda: TorsoMotion(self._world, height))
 
-    def look_at(self, point: Sequence[float]) -> None:
+    def look_at(self, point: VectorLike) -> None:
         """See Robot."""
-        self._do(lambda: Head(self._world, point))
+        self._do(lambda: HeadMotion(self._world, point))
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
         """See Robot."""
-        self._do(lambda: Drive(odom_from_goal))
+        self._do(lambda: BaseMotion(odom_from_goal))
 
-    def see(self) -> Frame:
+    def see(self) -> CameraImage:
         """See Robot."""
         return see(self._world)
 
-    def _do(self, make: Callable[[], Motion]) -> Result:
+    def _do(self, make: Callable[[], Motion]) -> MotionResult:
         try:
             result = run(self._world, make())
         except ValueError as err:

@@ -5,38 +5,43 @@ The steps are those of tasks/drink_retrieval.py, done by the same code as behind
 import math
 from typing import Any, Callable, Dict, List, Tuple
 
+import genpy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
+from smach_oracle.geometry.joints import read_joints
+from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.msg import CloseDoorGoal, DetectDrinkGoal, HandOverGoal, OpenDoorGoal, PickGoal
+from smach_oracle.pr2.kitchen import Kitchen
+from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE, KitchenSkills
+from smach_oracle.pr2.nodes.perception_node import Perception
+from smach_oracle.pr2.planning.arm import SkillContext
+from smach_oracle.pr2.planning.collision import installed_model
+from smach_oracle.pr2.robot import ODOM_FRAME
 
-from ...geometry.chain import read_joints
-from ...geometry.transforms import from_rpy
-from ..robot.arm import Means
-from ..robot.collision import installed_model
-from ..robot.interface import ODOM_FRAME
-from ..robot.kitchen import Kitchen
-from ..robot.kitchen_skills import FRIDGE, KitchenSkills
-from ..robot.perception_node import Perception
-from .direct import DirectRobot
-from .person import PALM
-from .physics import World
+from ..physics.world import World
+from ..scenes.person import PALM
+from .direct_robot import DirectRobot
 
 TORSO_HEIGHT = 0.25  # m
 MIN_HEIGHT = 0.05  # m
-DRIVES = {'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.68, -0.30, 0.0), 'MOVE_HOME': (0.0, 0.0, math.pi / 2)}
+DRIVES = {
+    'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.68, -0.30, 0.0),
+    'MOVE_HOME': (0.0, 0.0, math.pi / 2)
+}
 
 
-class DrinkTrial:
+class DrinkRetrievalRehearsal:
     """The states of the task over one world, in order."""
 
     def __init__(self, world: World) -> None:
         self.robot = DirectRobot(world)
         model = installed_model()
-        self.skills = KitchenSkills(Means(self.robot, model), Kitchen())
+        self.skills = KitchenSkills(SkillContext(self.robot, model), Kitchen())
         self.eyes = Perception(self.robot, read_joints(model.urdf), Kitchen())
         self.data: Dict[str, Any] = {}
-        palm = PoseStamped(Header(frame_id=ODOM_FRAME), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
+        palm = PoseStamped(Header(frame_id=ODOM_FRAME),
+                           Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('RAISE_TORSO', lambda: self.robot.torso(TORSO_HEIGHT)),
             ('OPEN_FRIDGE', lambda: self._do('open_door', OpenDoorGoal('right'))),
@@ -48,7 +53,7 @@ class DrinkTrial:
             ('MOVE_HOME', lambda: self._drive('MOVE_HOME')),
             ('HAND_OVER', lambda: self._do('hand_over', HandOverGoal('right', palm)))]
 
-    def _do(self, skill: str, goal: Any) -> Any:
+    def _do(self, skill: str, goal: genpy.Message) -> genpy.Message:
         return getattr(self.skills, skill)(goal, lambda status: None)
 
     def _drive(self, state: str) -> None:
@@ -60,4 +65,5 @@ class DrinkTrial:
         self.data.update(drink=found.drink, size=found.size)
 
     def _pick(self) -> None:
-        self.data['grasp'] = self._do('pick', PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)).grasp
+        self.data['grasp'] = self._do(
+            'pick', PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)).grasp

@@ -1,4 +1,4 @@
-"""A picture and a video of the robot at work, for people: a trial of a task in one process, without ROS."""
+"""A picture and a video of the robot at work, for people: a trial in one process, without ROS."""
 import argparse
 import sys
 from pathlib import Path
@@ -7,14 +7,14 @@ from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 
-from smach_oracle.oracle.paths import path_of, why_not_writable
+from smach_oracle.oracle.settings.paths import path_of, why_not_writable
 
-from . import kitchen_scene, tabletop_scene
-from .drink_rehearsal import DrinkTrial
-from .physics import World
+from ..physics.world import World
+from ..scenes import kitchen_scene, tabletop_scene
+from ..scenes.scene import Scene
+from .drink_retrieval import DrinkRetrievalRehearsal
+from .pick_and_place import PickAndPlaceRehearsal, Rehearsal, rehearse
 from .portrait import portrait
-from .rehearsal import Steps, Trial, rehearse
-from .scene import Scene
 
 FRAME = (480, 320)  # pixels, of the video
 PICTURE = (960, 640)
@@ -22,26 +22,28 @@ PICTURES, VIDEOS = ('.png', '.jpg', '.jpeg'), ('.mp4',)  # how the names of file
 PERIODS_S = 60  # control periods in a simulated second
 
 
-class Filmed(NamedTuple):
-    """A task and when it is worth a picture."""
+class FilmedTask(NamedTuple):
+    """A task, and the moment for its picture."""
 
     draw: Callable[[int, bool], Scene]
-    steps: Callable[[World], Steps]
+    steps: Callable[[World], Rehearsal]
     carried_s: float  # of simulated time, for which something has been in the hand
     seed: int  # of a scene that looks well
 
 
-TASKS = {'pick_and_place': Filmed(tabletop_scene.draw, Trial, 2.0, 23),
-         'drink_retrieval': Filmed(kitchen_scene.draw, DrinkTrial, 3.2, 600)}
+TASKS = {'pick_and_place': FilmedTask(tabletop_scene.draw, PickAndPlaceRehearsal, 2.0, 23),
+         'drink_retrieval': FilmedTask(kitchen_scene.draw, DrinkRetrievalRehearsal, 3.2, 600)}
 
 
 class FilmedWorld(World):
-    """A world with somebody beside it who takes pictures of it while its time goes on."""
+    """A world of which images are taken while its time goes on."""
 
     def __init__(self, frames_s: float, carried_s: float) -> None:
-        """
-        :param frames_s: frames of the video per simulated s; 0: no video.
-        :param carried_s: simulated s for which something must have been carried when the picture is taken.
+        """Begin with an empty world.
+
+        :param frames_s: images of the video per simulated s; 0: no video.
+        :param carried_s: simulated s for which something must have been carried when the picture is
+            taken.
         """
         self._carried = int(round(carried_s * PERIODS_S))
         self._every = int(round(PERIODS_S / frames_s)) if frames_s else 0
@@ -69,10 +71,10 @@ class FilmedWorld(World):
             self.picture = portrait(self, PICTURE)
 
 
-def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
-    """The picture and the frames of one trial, each (h, w, 3) uint8 RGB.
+def film(task: FilmedTask, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
+    """The picture and the images of one trial, each (h, w, 3) uint8 RGB.
 
-    :param frames_s: frames per simulated s; 0: none.
+    :param frames_s: images per simulated s; 0: none.
     :raises RuntimeError: where nothing was carried in it.
     """
     world = FilmedWorld(frames_s, task.carried_s)
@@ -88,9 +90,13 @@ def film(task: Filmed, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.
 
 
 def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
-    """Write frames, (h, w, 3) uint8 RGB, one at least, as a video with `frames_s` a second; whether this OpenCV can."""
+    """Write images, (h, w, 3) uint8 RGB, one at least, as a video.
+
+    :param frames_s: images per s.
+    :returns: whether this OpenCV can.
+    """
     height, width = frames[0].shape[:2]
-    video = cv2.VideoWriter(path, cv2.VideoWriter_fourcc(*'mp4v'), frames_s, (width, height))
+    video = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*'mp4v'), frames_s, (width, height))
     if not video.isOpened():
         return False
     for frame in frames:
@@ -100,9 +106,13 @@ def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
 
 
 def check_file(path: str, suffixes: Sequence[str]) -> None:
-    """Find out before the work whether a picture or a video can be written. Raises ValueError."""
+    """Check before the work that a picture or a video can be written.
+
+    :raises ValueError: for another suffix, or a file that cannot be written.
+    """
     if not path.lower().endswith(tuple(suffixes)):
-        raise ValueError('{}: what kind of file? Its name may end in {}'.format(path, ', '.join(suffixes)))
+        raise ValueError('{}: what kind of file? Its name may end in {}'.format(
+            path, ', '.join(suffixes)))
     why = why_not_writable(path)
     if why:
         raise ValueError('{}: {}'.format(path, why))
@@ -111,11 +121,14 @@ def check_file(path: str, suffixes: Sequence[str]) -> None:
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(prog='pr2_film', description=__doc__)
-    parser.add_argument('picture', type=path_of, help='file of the picture ({})'.format(', '.join(PICTURES)))
+    parser.add_argument('picture', type=path_of,
+                        help='file of the picture ({})'.format(', '.join(PICTURES)))
     parser.add_argument('--video', metavar='FILE', type=path_of,
                         help='also write a video ({}), at simulated time'.format(', '.join(VIDEOS)))
-    parser.add_argument('--fps', type=float, default=5.0, help='frames of the video per simulated s (default: 5)')
-    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)')
+    parser.add_argument('--fps', type=float, default=5.0,
+                        help='frames of the video per simulated s (default: 5)')
+    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
+                        help='(default: %(default)s)')
     parser.add_argument('--seed', type=int, help='of the scene (default: one that looks well)')
     args = parser.parse_args(argv)
     task = TASKS[args.task]
@@ -138,5 +151,6 @@ def main(argv: Optional[List[str]] = None) -> int:
         return 1
     print('Picture: {}'.format(args.picture))
     if args.video:
-        print('Video: {}'.format(args.video if write_video(args.video, frames, args.fps) else 'no codec here for one'))
+        print('Video: {}'.format(
+            args.video if write_video(args.video, frames, args.fps) else 'no codec here for one'))
     return 0

@@ -5,33 +5,41 @@ The steps are those of tasks/pick_and_place.py, done by the same code as behind 
 import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
+import genpy
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
-from smach_oracle.msg import (BuildCollisionMapGoal, MoveArmsAsideGoal, PickGoal, PlaceGoal, PointHeadGoal)
+from smach_oracle.geometry.joints import read_joints
+from smach_oracle.msg import (
+    BuildCollisionMapGoal,
+    MoveArmsAsideGoal,
+    PickGoal,
+    PlaceGoal,
+    PointHeadGoal,
+)
+from smach_oracle.pr2.nodes.frames import box_messages
+from smach_oracle.pr2.nodes.manipulation import Manipulation
+from smach_oracle.pr2.perception.clusters import NotSeen
+from smach_oracle.pr2.perception.own_limbs import limbs_of
+from smach_oracle.pr2.perception.tabletop import find_tabletop
+from smach_oracle.pr2.planning.arm import SkillContext, SkillError
+from smach_oracle.pr2.planning.collision import installed_model
+from smach_oracle.pr2.planning.planner import PlanningError
+from smach_oracle.pr2.robot import RobotError
 
-from ...geometry.chain import read_joints
-from ..robot.arm import Means, SkillError
-from ..robot.clusters import NotSeen
-from ..robot.collision import installed_model
-from ..robot.frames import box_messages
-from ..robot.interface import RobotError
-from ..robot.manipulation import Manipulation
-from ..robot.own_limbs import limbs_of
-from ..robot.planner import PlanningError
-from ..robot.tabletop import find_tabletop
-from .direct import DirectRobot
-from .judge import judge
-from .physics import World
-from .scene import Scene
+from ..physics.judge import judge
+from ..physics.world import World
+from ..scenes.scene import Scene
+from .direct_robot import DirectRobot
 
 BASE = 'base_link'
 HEAD = PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75))
-PLACE = PoseStamped(Header(frame_id=BASE), Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+PLACE = PoseStamped(Header(frame_id=BASE),
+                    Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
 FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
 
 
-class Rehearsed(NamedTuple):
+class RehearsalResult(NamedTuple):
     """How a trial went."""
 
     seed: int
@@ -44,7 +52,7 @@ class Rehearsed(NamedTuple):
     sim_s: float
 
 
-class Steps(Protocol):
+class Rehearsal(Protocol):
     """A task over one world."""
 
     @property
@@ -52,21 +60,24 @@ class Steps(Protocol):
         """Names, in order, and what is done in them."""
 
 
-class Trial:
+class PickAndPlaceRehearsal:
     """The states of the task over one world."""
 
     def __init__(self, world: World) -> None:
         self.robot = DirectRobot(world)
-        self.skills = Manipulation(Means(self.robot, installed_model()))
-        self._links = read_joints(self.skills.means.model.urdf)
+        self.skills = Manipulation(SkillContext(self.robot, installed_model()))
+        self._links = read_joints(self.skills.context.model.urdf)
         self.data: Dict[str, Any] = {}
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('MOVE_ARMS_ASIDE', lambda: self._do('move_arms_aside', MoveArmsAsideGoal())),
             ('POINT_HEAD', lambda: self._do('point_head', PointHeadGoal(HEAD))),
-            ('DETECT_TABLETOP', self._detect), ('BUILD_COLLISION_MAP', self._map), ('PICK', self._pick),
-            ('PLACE', lambda: self._do('place', PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])))]
+            ('DETECT_TABLETOP', self._detect), ('BUILD_COLLISION_MAP', self._map),
+            ('PICK', self._pick),
+            ('PLACE', lambda: self._do(
+                'place', PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])))
+        ]
 
-    def _do(self, skill: str, goal: Any) -> Any:
+    def _do(self, skill: str, goal: genpy.Message) -> genpy.Message:
         return getattr(self.skills, skill)(goal, lambda status: None)
 
     def _detect(self) -> None:
@@ -81,11 +92,13 @@ class Trial:
         self.data['map_id'] = self._do('build_collision_map', goal).map_id
 
     def _pick(self) -> None:
-        goal = PickGoal('right', self.data['objects'][0], self.data['sizes'][0], self.data['map_id'])
+        goal = PickGoal('right', self.data['objects'][0], self.data['sizes'][0],
+                        self.data['map_id'])
         self.data['grasp'] = self._do('pick', goal).grasp
 
 
-def rehearse(scene: Scene, world: Optional[World] = None, task: Callable[[World], Steps] = Trial) -> Rehearsed:
+def rehearse(scene: Scene, world: Optional[World] = None,
+             task: Callable[[World], Rehearsal] = PickAndPlaceRehearsal) -> RehearsalResult:
     """One trial up to its first failure; in a world of its own, where none is given."""
     if world is None:
         world = World()
@@ -111,5 +124,5 @@ def rehearse(scene: Scene, world: Optional[World] = None, task: Callable[[World]
     elapsed = world.time - start
     world.step(60)
     verdict = judge(world, scene.goal)
-    return Rehearsed(scene.seed, failed, reason, verdict.success, verdict.why,
-                     tuple(cause.kind for cause in scene.causes), wall, elapsed)
+    return RehearsalResult(scene.seed, failed, reason, verdict.success, verdict.why,
+                           tuple(cause.kind for cause in scene.causes), wall, elapsed)

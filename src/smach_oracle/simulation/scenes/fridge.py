@@ -1,8 +1,8 @@
-"""The refrigerator as a URDF model of our own: a body with shelves, a door on a hinge, a vertical bar for a handle."""
+"""The refrigerator as a URDF model of our own: a body with shelves, and a door with a handle."""
 import xml.etree.ElementTree as ElementTree
 from typing import Tuple
 
-from ..robot.kitchen import Kitchen
+from smach_oracle.pr2.kitchen import Kitchen
 
 DOOR_JOINT = 'door_hinge'  # rad; 0 closed, positive open
 DOOR_LIMIT = 1.75  # rad; a stop, as of a cabinet beside it
@@ -14,7 +14,10 @@ Triple = Tuple[float, float, float]
 
 
 def fridge_urdf(kitchen: Kitchen) -> str:
-    """Text of the model; its root is the fridge's frame, the door is closed where its joint is 0."""
+    """Text of the model.
+
+    Its root is the fridge's frame. The door is closed where its joint is 0.
+    """
     robot = ElementTree.Element('robot', name='fridge')
     _body(robot, kitchen)
     _door(robot, kitchen)
@@ -23,7 +26,8 @@ def fridge_urdf(kitchen: Kitchen) -> str:
     ElementTree.SubElement(joint, 'child', link='door')
     ElementTree.SubElement(joint, 'origin', xyz=_text((0.0, kitchen.width / 2, 0.0)))
     ElementTree.SubElement(joint, 'axis', xyz='0 0 -1')
-    ElementTree.SubElement(joint, 'limit', lower='0', upper=str(DOOR_LIMIT), effort='100', velocity='5')
+    ElementTree.SubElement(joint, 'limit', lower='0', upper=str(DOOR_LIMIT), effort='100',
+                           velocity='5')
     ElementTree.SubElement(joint, 'dynamics', damping='0.5', friction='0')
     return ElementTree.tostring(robot, encoding='unicode')
 
@@ -42,25 +46,35 @@ def _body(robot: ElementTree.Element, kitchen: Kitchen) -> None:
 
 
 def _door(robot: ElementTree.Element, kitchen: Kitchen) -> None:
-    """Its frame is at the hinge on the floor, turned as the fridge's: closed, it reaches towards -y, outside is -x."""
+    """Add the door.
+
+    Its frame is at the hinge on the floor, turned as the fridge's: closed, it reaches towards -y,
+    and outside is -x.
+    """
     thick, width, height = kitchen.door_thickness, kitchen.width, kitchen.height - 2 * GAP
-    link = _link(robot, 'door', DOOR_MASS, (-thick / 2, -width / 2, kitchen.height / 2), (1.5, 1.5, 0.3))
+    link = _link(robot, 'door', DOOR_MASS, (-thick / 2, -width / 2, kitchen.height / 2),
+                 (1.5, 1.5, 0.3))
     _box(link, (thick, width, height), (-thick / 2, -width / 2, kitchen.height / 2), WHITE)
     low, high = kitchen.handle_span
     axis = -(width - kitchen.handle_inset)
     bar = '<cylinder radius="{}" length="{}"/>'.format(kitchen.handle_radius, high - low)
     _shape(link, bar, (-thick - kitchen.handle_stand_off, axis, (low + high) / 2), DARK)
     for end in (low + 0.01, high - 0.01):
-        _box(link, (kitchen.handle_stand_off, 0.02, 0.02), (-thick - kitchen.handle_stand_off / 2, axis, end), DARK)
+        _box(link, (kitchen.handle_stand_off, 0.02, 0.02),
+             (-thick - kitchen.handle_stand_off / 2, axis, end), DARK)
 
 
-def _link(robot: ElementTree.Element, name: str, mass: float, centre: Triple, inertia: Triple) -> ElementTree.Element:
+def _link(robot: ElementTree.Element, name: str, mass: float, centre: Triple,
+          inertia: Triple) -> ElementTree.Element:
     link = ElementTree.SubElement(robot, 'link', name=name)
     inertial = ElementTree.SubElement(link, 'inertial')
     ElementTree.SubElement(inertial, 'origin', xyz=_text(centre))
     ElementTree.SubElement(inertial, 'mass', value=str(mass))
-    ElementTree.SubElement(inertial, 'inertia', dict(zip(('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'),
-                                                         [str(value) for value in inertia + (0.0, 0.0, 0.0)])))
+    ElementTree.SubElement(
+        inertial, 'inertia',
+        dict(
+            zip(('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'),
+                [str(value) for value in inertia + (0.0, 0.0, 0.0)])))
     return link
 
 
@@ -74,7 +88,8 @@ def _shape(link: ElementTree.Element, geometry: str, centre: Triple, colour: Tri
         ElementTree.SubElement(part, 'origin', xyz=_text(centre))
         ElementTree.SubElement(part, 'geometry').append(ElementTree.fromstring(geometry))
         if kind == 'visual':
-            material = ElementTree.SubElement(part, 'material', name='{:.2f}_{:.2f}_{:.2f}'.format(*colour))
+            material = ElementTree.SubElement(part, 'material',
+                                              name='{:.2f}_{:.2f}_{:.2f}'.format(*colour))
             ElementTree.SubElement(material, 'color', rgba=_text(colour + (1.0,)))
 
 

@@ -1,19 +1,21 @@
-"""The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person who holds out a hand."""
+"""The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person."""
 from typing import List, Tuple
 
 import numpy as np
 
-from ..robot.interface import ARM_JOINTS, ARMS
-from ..robot.kitchen import Kitchen
-from ..robot.travel import TRAVEL
+from smach_oracle.pr2.kitchen import Kitchen
+from smach_oracle.pr2.planning.travel import TRAVEL
+from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
+
 from .fridge import DOOR_JOINT, fridge_urdf
-from .kitchen_causes import Draft, with_causes
+from .kitchen_causes import KitchenDraft, with_causes
 from .person import PALM, PALM_SIZE, person
 from .scene import Body, Goal, RobotStart, Scene
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
-COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70), (0.60, 0.20, 0.55))
+COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
+           (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
 DOOR_FRICTION = 3.0  # N m, dry
@@ -30,13 +32,14 @@ def draw(seed: int, benign: bool = False) -> Scene:
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
     generator = np.random.default_rng([seed, 2])
     kitchen = Kitchen()
-    draft = Draft(tuple(_drinks(generator, kitchen)), kitchen.place[:2], kitchen.width / 2 - kitchen.wall)
+    draft = KitchenDraft(tuple(_drinks(generator, kitchen)), kitchen.place[:2],
+                         kitchen.width / 2 - kitchen.wall)
     if not benign:
         draft = with_causes(draft, seed)
     goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
     return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
-                 RobotStart(_posture(), drive_error=draft.drive_error), disturbances=draft.disturbances,
-                 causes=draft.causes)
+                 RobotStart(_posture(), drive_error=draft.drive_error),
+                 disturbances=draft.disturbances, causes=draft.causes)
 
 
 def _fridge(kitchen: Kitchen) -> Body:
@@ -50,16 +53,20 @@ def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
     places: List[Tuple[float, float]] = []
     for _ in range(100):
         x, y = generator.uniform(*DEPTHS), generator.uniform(*SIDES)
-        if len(places) < 3 and all(np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
+        if len(places) < 3 and all(
+                np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
     floor = kitchen.shelves[kitchen.drinks_shelf]
-    return [Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
-                 (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001), mass=DRINK_MASS,
-                 colour=COLOURS[index % len(COLOURS)]) for index, (x, y) in enumerate(places)]
+    return [
+        Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
+             (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001),
+             mass=DRINK_MASS, colour=COLOURS[index % len(COLOURS)])
+        for index, (x, y) in enumerate(places)
+    ]
 
 
 def _posture() -> Tuple[Tuple[str, float], ...]:
     arms = [pair for arm in ARMS for pair in zip(ARM_JOINTS[arm], TRAVEL[arm])]
-    jaws = [('{}_gripper_{}_finger_joint'.format(arm[0], finger), 0.0) for arm in ARMS for finger in 'lr']
-    return tuple(arms + jaws + [('torso_lift_joint', START_TORSO)])
+    fingers = [(name, 0.0) for arm in ARMS for name in FINGER_JOINTS[arm]]
+    return tuple(arms + fingers + [('torso_lift_joint', START_TORSO)])

@@ -1,7 +1,9 @@
-"""The person who waits for the drink: a hand that is held out flat, a small tray on it. Nothing of it moves."""
+"""The person who waits for the drink: a hand that holds a tray. Nothing of the person moves."""
 from typing import Tuple
 
 import numpy as np
+
+from smach_oracle.geometry.transforms import VectorLike
 
 from .scene import Body, Vector
 
@@ -34,11 +36,14 @@ def person() -> Tuple[Body, ...]:
     x, y, top = PALM
     palm = Body('palm', 'box', PALM_SIZE, (x, y, top - PALM_SIZE[2] / 2), colour=TRAY)
     arm = _limb('person_arm', (x, y, 0.0), WRIST, ELBOW, 0.08)
-    hand = Body('person_hand', 'round', HAND_SIZE, (x, y + 0.02, top - PALM_SIZE[2] - HAND_SIZE[2] / 2), colour=SKIN)
+    hand = Body('person_hand', 'round', HAND_SIZE,
+                (x, y + 0.02, top - PALM_SIZE[2] - HAND_SIZE[2] / 2), colour=SKIN)
     stands = (x + STANDS[0], y + STANDS[1], 0.0)
     parts = [Body('person_' + name, 'round', size, _sum(stands, centre), colour=colour)
              for name, centre, size, colour in PARTS]
-    limbs = [_limb('person_' + name, stands, start, end, thick) for name, start, end, thick in LIMBS]
+    limbs = [
+        _limb('person_' + name, stands, start, end, thick) for name, start, end, thick in LIMBS
+    ]
     return (palm, hand, arm) + tuple(parts) + tuple(limbs)
 
 
@@ -48,10 +53,11 @@ def _limb(name: str, origin: Vector, start: Vector, end: Vector, thick: float) -
     length = float(np.linalg.norm(along))
     roll = float(np.arctan2(-along[1], np.hypot(along[0], along[2])))
     pitch = float(np.arctan2(along[0], along[2]))
-    return Body(name, 'round', (thick, thick, length + thick / 2), _sum(origin, np.add(start, end) / 2), roll=roll,
-                pitch=pitch, colour=SHIRT)
+    return Body(name, 'round', (thick, thick, length + thick / 2),
+                _sum(origin,
+                     np.add(start, end) / 2), roll=roll, pitch=pitch, colour=SHIRT)
 
 
-def _sum(one: Vector, other: Vector) -> Vector:
+def _sum(one: Vector, other: VectorLike) -> Vector:
     x, y, z = (float(a + b) for a, b in zip(one, other))
     return x, y, z

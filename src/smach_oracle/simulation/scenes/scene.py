@@ -1,11 +1,14 @@
-"""What a trial's world is made of: plain data, drawn from the trial's seed by the scenes, built by the world."""
+"""What a trial's world is made of: plain data, drawn from the trial's seed."""
 from typing import NamedTuple, Tuple
 
 Vector = Tuple[float, float, float]
 
 
 class Body(NamedTuple):
-    """A thing in the world. Its frame is the world's: the floor is z = 0, the robot starts near the origin facing x."""
+    """A thing in the world, in whose frame its pose is.
+
+    The floor is z = 0; the robot starts near the origin facing x.
+    """
 
     name: str
     shape: str  # 'box', 'cylinder', 'round' (between a ball and a cylinder) or 'urdf'
@@ -22,7 +25,7 @@ class Body(NamedTuple):
     joint_friction: Tuple[Tuple[str, float], ...] = ()  # urdf: N or N m
 
 
-class Sensor(NamedTuple):
+class CameraQuality(NamedTuple):
     """How well the head camera sees in this trial."""
 
     noise: float = 1.0  # depth noise, times that of a Kinect
@@ -34,12 +37,14 @@ class Sensor(NamedTuple):
 class Disturbance(NamedTuple):
     """Something that happens to the world in the course of a trial."""
 
-    kind: str  # which, of those that world/disturbances.py knows
-    after: str  # the event that sets it off, e.g. 'look_at' (first head motion), 'see:2' (second frame), 'drive:1'
+    kind: str  # which, of those that physics/disturbances.py knows
+    # the event that sets it off, e.g. 'look_at' (first head motion), 'see:2' (second image),
+    # 'drive:1'
+    after: str
     values: Tuple[Tuple[str, float], ...] = ()
 
 
-class Cause(NamedTuple):
+class SceneCause(NamedTuple):
     """A reason to fail that this world was given, for the analysis afterwards."""
 
     kind: str  # short and stable, e.g. 'crowded', 'arm_in_view', 'sensor_noise', 'slippery_object'
@@ -51,11 +56,12 @@ class RobotStart(NamedTuple):
 
     joints: Tuple[Tuple[str, float], ...] = ()
     base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
-    drive_error: Vector = (0.0, 0.0, 0.0)  # sigma of x, y, yaw that each drive adds between truth and odometry
+    # sigma of x, y, yaw that each drive adds between truth and odometry
+    drive_error: Vector = (0.0, 0.0, 0.0)
 
 
 class Goal(NamedTuple):
-    """What makes the trial a true success; the judge reads it, nobody else."""
+    """What makes the trial a true success; the judge alone reads it."""
 
     kind: str  # 'stands_at' or 'in_hand'
     body: str  # name of the body; '' : any of the movable ones
@@ -71,6 +77,6 @@ class Scene(NamedTuple):
     bodies: Tuple[Body, ...]
     goal: Goal
     robot: RobotStart = RobotStart()
-    sensor: Sensor = Sensor()
+    camera: CameraQuality = CameraQuality()
     disturbances: Tuple[Disturbance, ...] = ()
-    causes: Tuple[Cause, ...] = ()
+    causes: Tuple[SceneCause, ...] = ()

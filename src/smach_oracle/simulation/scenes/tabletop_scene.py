@@ -1,10 +1,10 @@
-"""The world of the first use case (paper, VI-B): table, things and reasons to fail, all drawn from the trial's seed."""
+"""The world of the first use case (paper, VI-B): a table and things, drawn from the seed."""
 from typing import List, Tuple
 
 import numpy as np
 
-from .scene import Body, Goal, RobotStart, Scene, Sensor
-from .tabletop_causes import GOAL, TABLE_TOP, TORSO, Draft, with_causes
+from .scene import Body, CameraQuality, Goal, RobotStart, Scene
+from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
 
 TASK = 'pick_and_place'
 TABLE_X = 0.82  # m, of its middle
@@ -15,8 +15,8 @@ OTHERS_X, OTHERS_Y = (0.62, 0.86), (-0.45, 0.40)
 CLEAR = 0.13  # m between the middles of things, where nothing is crowded
 FREE_GOAL = 0.17  # m around the goal
 MASS = (0.15, 0.40)  # kg
-COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15), (0.55, 0.20, 0.60),
-           (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
+COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15),
+           (0.55, 0.20, 0.60), (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
 WOOD = (0.58, 0.42, 0.27)
 
 
@@ -26,21 +26,26 @@ def draw(seed: int, benign: bool = False) -> Scene:
     :param seed: 0 or more.
     :param benign: without any reason to fail.
     """
-    draft = Draft(_things(np.random.default_rng([seed, 61])))
+    draft = TabletopDraft(_things(np.random.default_rng([seed, 61])))
     if not benign:
         draft = with_causes(draft, seed)
     height = TABLE_TOP + draft.things[0].size[2] / 2
     goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
-    return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal, RobotStart((('torso_lift_joint', TORSO),)),
-                 Sensor(), draft.disturbances, draft.causes)
+    return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal,
+                 RobotStart((('torso_lift_joint', TORSO),)), CameraQuality(), draft.disturbances,
+                 draft.causes)
 
 
 def _table() -> List[Body]:
-    top = Body('table', 'box', TABLE_SIZE, (TABLE_X, 0.0, TABLE_TOP - TABLE_SIZE[2] / 2), colour=WOOD)
+    top = Body('table', 'box', TABLE_SIZE, (TABLE_X, 0.0, TABLE_TOP - TABLE_SIZE[2] / 2),
+               colour=WOOD)
     tall = TABLE_TOP - TABLE_SIZE[2]
-    legs = [Body('leg_{}'.format(2 * i + j), 'box', (0.06, 0.06, tall),
-                 (TABLE_X + x * (TABLE_SIZE[0] / 2 - 0.06), y * (TABLE_SIZE[1] / 2 - 0.06), tall / 2),
-                 colour=(0.35, 0.25, 0.17)) for i, x in enumerate((-1, 1)) for j, y in enumerate((-1, 1))]
+    legs = [
+        Body('leg_{}'.format(2 * i + j), 'box', (0.06, 0.06, tall),
+             (TABLE_X + x * (TABLE_SIZE[0] / 2 - 0.06), y * (TABLE_SIZE[1] / 2 - 0.06), tall / 2),
+             colour=(0.35, 0.25, 0.17)) for i, x in enumerate((-1, 1))
+        for j, y in enumerate((-1, 1))
+    ]
     return [top] + legs
 
 
@@ -54,7 +59,9 @@ def _things(generator: np.random.Generator) -> Tuple[Body, ...]:
         beyond = np.hypot(x, y) > np.hypot(*spots[0]) + 0.05
         if len(spots) < wanted and beyond and _clear((x, y), spots):
             spots.append((x, y))
-    return tuple(_thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]]) for k, spot in enumerate(spots))
+    return tuple(
+        _thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]])
+        for k, spot in enumerate(spots))
 
 
 def _clear(spot: Tuple[float, float], spots: List[Tuple[float, float]]) -> bool:
@@ -72,5 +79,5 @@ def _thing(generator: np.random.Generator, name: str, spot: Tuple[float, float],
     if generator.random() < 0.55:
         return Body(name, 'cylinder', (wide, wide, tall), position, mass=mass, colour=colour)
     deep = float(generator.uniform(0.6, 1.0)) * wide
-    return Body(name, 'box', (2 * wide, 2 * deep, tall), position, yaw=float(generator.uniform(-1.5, 1.5)), mass=mass,
-                colour=colour)
+    return Body(name, 'box', (2 * wide, 2 * deep, tall), position,
+                yaw=float(generator.uniform(-1.5, 1.5)), mass=mass, colour=colour)

@@ -1,0 +1,1 @@
+"""The PR2 as a model that physics can move."""

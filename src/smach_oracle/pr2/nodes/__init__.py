@@ -1,0 +1,1 @@
+"""The subsystems as ROS nodes."""

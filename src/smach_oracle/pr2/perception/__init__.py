@@ -1,0 +1,1 @@
+"""What the head camera sees: tables, objects, the refrigerator's door."""

@@ -1,0 +1,1 @@
+"""Pick, place, open, close, hand over."""

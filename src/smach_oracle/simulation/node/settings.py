@@ -1,0 +1,71 @@
+"""The parameters of the world node."""
+from typing import Any, Callable, NamedTuple, TypeVar
+
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
+from smach_oracle.oracle.settings.paths import check_writable, path_of
+
+from ..scenes.tasks import TASKS
+
+NONE = 'none'
+T = TypeVar('T')
+
+
+class WorldSettings(NamedTuple):
+    """Parameters of the node, by their names without the tilde."""
+
+    task: str = TASKS[0]  # whose scenes are drawn
+    seed: int = 0  # of the scene that is there before the first reset
+    benign: bool = False  # scenes without causes to fail
+    # simulated s per wall s; 0: as fast as possible, frozen while nothing is commanded
+    real_time_factor: float = 0.0
+    # at factor 0: s that the clock goes on per wall s while nothing is commanded
+    idle_speed: float = 10.0
+    # at factor 0: wall s that nothing was commanded before the clock goes on alone
+    idle_grace: float = 0.1
+    truth_file: str = NONE  # gets a line of JSON on each trial that has ended
+    # joint states and transforms per simulated s; at factor 0 the default is 4
+    state_rate: float = 10.0
+    # images per simulated s for those who subscribe; at factor 0 the default is 0: snapshots
+    camera_rate: float = 2.0
+
+    @property
+    def lock_step(self) -> bool:
+        """Whether time is that of the commands, and not that of a wall clock."""
+        return self.real_time_factor == 0
+
+
+def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
+    """Settings out of parameters.
+
+    :param get: ``get(name, default)``, as rospy.get_param.
+    :raises SettingsError: naming the parameter, its value and what is allowed.
+    """
+    def number(name: str, default: float, low: float, high: float) -> float:
+        allowed = 'a number from {:g} to {:g}'.format(low, high)
+        return taken(name, default, checks.number(low, high, allowed))
+
+    def taken(name: str, default: T, check: checks.Check) -> T:
+        value: T = check('~' + name, get('~' + name, default))
+        return value
+
+    factor = number('real_time_factor', 0.0, 0.0, 100.0)
+    return WorldSettings(
+        task=taken('task', TASKS[0], checks.choice(TASKS)), real_time_factor=factor,
+        seed=taken('seed', 0, checks.whole(0, 'a whole number from 0')),
+        benign=taken('benign', False, checks.flag),
+        idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
+        idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
+        truth_file=taken('truth_file', NONE, _writable_file),
+        state_rate=number('state_rate', 10.0 if factor else 4.0, 0.1, 60.0),
+        camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0))
+
+
+def _writable_file(key: str, value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise SettingsError(key, value, "a file's name, or {}".format(NONE))
+    if value == NONE:
+        return value
+    path = path_of(value)
+    check_writable(key, path)
+    return path

@@ -1,0 +1,1 @@
+"""Trials in one process, without ROS: for tests, tuning, pictures."""

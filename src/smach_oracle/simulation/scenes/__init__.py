@@ -1,0 +1,1 @@
+"""What a trial's world is made of, and why it may fail."""

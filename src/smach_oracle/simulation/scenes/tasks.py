@@ -1,0 +1,20 @@
+"""The tasks that the world has scenes for."""
+from typing import Callable, Dict
+
+from . import kitchen_scene, tabletop_scene
+from .scene import Scene
+
+SCENES: Dict[str, Callable[[int, bool], Scene]] = {
+    tabletop_scene.TASK: tabletop_scene.draw, kitchen_scene.TASK: kitchen_scene.draw
+}
+TASKS = tuple(SCENES)
+
+
+def draw(task: str, seed: int, benign: bool) -> Scene:
+    """The scene of a trial.
+
+    :param benign: without any reason to fail.
+    :raises KeyError: for a task that is not in TASKS.
+    :raises ValueError: for a negative seed.
+    """
+    return SCENES[task](seed, benign)
