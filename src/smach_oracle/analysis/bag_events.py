@@ -1,11 +1,11 @@
-"""Finds bags and reads the executive's events and the worlds' causes out of them, with rosbags: it needs no ROS."""
+"""Finds bags, and reads the executive's events and the worlds' causes with rosbags, without ROS."""
 import json
 import math
 import os
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
-from ..oracle.errors import OracleError
-from ..oracle.events import Event, EventKind
+from smach_oracle.oracle.errors import OracleError
+from smach_oracle.oracle.records.events import Event, EventKind
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
@@ -17,14 +17,14 @@ class BagError(OracleError):
     """A bag cannot be used; the text says why."""
 
 
-class Skipped(NamedTuple):
+class SkippedBag(NamedTuple):
     """A bag, or a folder of bags, that was not used."""
 
     path: str
     reason: str
 
 
-class Cause(NamedTuple):
+class RecordedCause(NamedTuple):
     """What a simulated world was given to fail with (TrialCause)."""
 
     seed: int
@@ -37,16 +37,17 @@ class BagContent(NamedTuple):
     """What the analysis takes from a bag."""
 
     events: List[Event]  # in the order of their recording
-    causes: Dict[str, Cause]  # by trial id
-    nodes: Dict[str, str]  # by trial id: whose events they are, as their topic tells
+    causes: Dict[str, RecordedCause]  # by trial id
+    nodes: Dict[str, str]  # by trial id: the node, from the topic of the events
 
 
 def find_bags(places: Sequence[str]) -> List[str]:
-    """Paths of all bags in folders and below, also unfinished ones (`.bag.active`), sorted; each once.
+    """Paths of all bags in folders and below, also unfinished ones (`.bag.active`), sorted.
 
-    A path of a file is taken as it is. Left out: the backups `X.orig.bag` that `rosbag reindex` makes of `X.bag`.
+    Each is there once. A path of a file is taken as it is. Left out: the backups `X.orig.bag` that
+    `rosbag reindex` makes of `X.bag`.
 
-    Raises BagError where a place does not exist.
+    :raises BagError: where a place does not exist.
     """
     found: Dict[str, None] = {}
     for place in places:
@@ -71,13 +72,16 @@ class MessageStores:
     """Reads messages; remembers the definitions it has met, so that many bags are quick."""
 
     def __init__(self) -> None:
-        """Raises ImportError where rosbags is missing."""
-        from rosbags import typesys  # only where bags are read: a command tells its options without it
+        """:raises ImportError: where rosbags is missing."""
+        from rosbags import (
+            typesys,  # only where bags are read: a command shows its options without it
+        )
         self._typesys = typesys
-        self._stores: Dict[str, Any] = {}  # by message definition: another release's events may have other fields
+        # by message definition: another release's events may have other fields
+        self._stores: Dict[str, Any] = {}
 
     def read(self, connection: Any, data: bytes) -> Any:
-        """One message of a connection. Raises whatever a damaged one makes rosbags raise."""
+        """One message of a connection; raises whatever a damaged one makes rosbags raise."""
         definition = connection.msgdef
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
         if text not in self._stores:
@@ -91,7 +95,10 @@ class EventReader:
     """Reads bags."""
 
     def __init__(self, most_events: float = math.inf) -> None:
-        """`most_events`: a bag with more is refused. Raises ImportError where rosbags is missing."""
+        """
+        :param most_events: a bag with more is refused.
+        :raises ImportError: where rosbags is missing.
+        """
         from rosbags.rosbag1 import Reader
         self._open = Reader
         self._stores = MessageStores()
@@ -100,57 +107,72 @@ class EventReader:
     def read(self, path: str) -> BagContent:
         """All events in a bag, and the cause of each trial; the topics' names do not matter.
 
-        A cause is latched: a bag may begin with that of the trial before. The last one before a trial's end counts.
-        Raises BagError.
+        A cause is latched: a bag may begin with that of the trial before. The last one before a
+        trial's end counts.
+
+        :raises BagError: where it cannot be used.
         """
         if path.endswith('.active'):
-            raise BagError('still being recorded, or its recorder died: start the recorder again in this folder, '
-                           'or run `rosbag reindex` on it and take the .active off its name')
+            raise BagError(
+                'still being recorded, or its recorder died: start the recorder again in this '
+                'folder, '
+                'or run `rosbag reindex` on it and take the .active off its name')
         try:
             return self._read(path)
         except BagError:
             raise
-        except Exception as err:  # a damaged file can make rosbags raise anything, assertions among it
+        except Exception as err:
+            # a damaged file can make rosbags raise anything, assertions among it
             raise BagError('damaged, or no bag: {}'.format(_words(err))) from err
 
     def _read(self, path: str) -> BagContent:
         events: List[Event] = []
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
-        causes: List[Tuple[int, Cause]] = []
+        causes: List[Tuple[int, RecordedCause]] = []
         nodes: Dict[str, str] = {}
         with self._open(path) as reader:
-            connections = [item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)]
+            connections = [
+                item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)
+            ]
             if not any(item.msgtype == EVENT_TYPE for item in connections):
                 raise BagError('no events of the executive in it')
             for item, stamp, data in reader.messages(connections):
                 message = self._stores.read(item, data)
                 if item.msgtype == CAUSE_TYPE:
-                    causes.append((stamp, _cause(message)))
+                    causes.append((stamp, _recorded_cause(message)))
                 else:
                     events.append(_event(message))
                     ends[message.trial_id] = stamp
-                    nodes[message.trial_id] = item.topic[:-len(_EVENTS)] if item.topic.endswith(_EVENTS) else ''
+                    nodes[message.trial_id] = item.topic[:-len(_EVENTS)] if item.topic.endswith(
+                        _EVENTS) else ''
                 if len(events) > self._most_events:
                     raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own
-            ends[max(ends, key=lambda trial_id: ends[trial_id])] = max([stamp for stamp, _ in causes], default=0)
+            ends[max(ends,
+                     key=lambda trial_id: ends[trial_id])] = max([stamp for stamp, _ in causes],
+                                                                 default=0)
         found = {trial_id: _latest(causes, end) for trial_id, end in ends.items()}
-        return BagContent(events, {trial_id: cause for trial_id, cause in found.items() if cause is not None}, nodes)
+        return BagContent(
+            events, {trial_id: cause
+                     for trial_id, cause in found.items() if cause is not None}, nodes)
 
 
-def _latest(causes: Sequence[Tuple[int, Cause]], end: int) -> Optional[Cause]:
+def _latest(causes: Sequence[Tuple[int, RecordedCause]], end: int) -> Optional[RecordedCause]:
     return next((cause for stamp, cause in reversed(causes) if stamp <= end), None)
 
 
-def _cause(message: Any) -> Cause:
-    return Cause(int(message.seed), message.task, tuple(message.kinds), tuple(message.details))
+def _recorded_cause(message: Any) -> RecordedCause:
+    return RecordedCause(int(message.seed), message.task, tuple(message.kinds),
+                         tuple(message.details))
 
 
 def _event(message: Any) -> Event:
     kind = _KINDS.get(message.kind, message.kind)  # a later release may know more kinds
-    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path, message.state, message.outcome,
-                 message.target, message.failure_kind, message.failure_class, message.rate, message.continuous,
-                 message.query_id, message.by, message.text, json.loads(message.data) if message.data else None)
+    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
+                 message.state, message.outcome, message.target, message.failure_kind,
+                 message.failure_class, message.rate, message.continuous, message.query_id,
+                 message.by, message.text,
+                 json.loads(message.data) if message.data else None)
 
 
 def _words(err: Exception) -> str:

@@ -1,4 +1,4 @@
-"""Machines as bags show them: their containers' structures, and what the cameras saw at failures. It needs no ROS."""
+"""Structures of machines, and images of failures, read from bags without ROS."""
 from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
 
 from rosbags.rosbag1 import Reader
@@ -19,7 +19,7 @@ class Container(NamedTuple):
     outcomes: Tuple[str, ...]
 
 
-class SeenFrame(NamedTuple):
+class FailureImage(NamedTuple):
     """What one camera saw when a question was put."""
 
     query_id: str
@@ -28,27 +28,29 @@ class SeenFrame(NamedTuple):
     data: bytes
 
 
-class Machines(NamedTuple):
-    """What a bag tells of machines."""
+class RecordedMachines(NamedTuple):
+    """The machines of a bag."""
 
     containers: Dict[str, Container]  # by path, as in events; the latest word on each
-    frames: List[SeenFrame]
+    frames: List[FailureImage]
 
 
-def read_machines(path: str) -> Machines:
+def read_machines(path: str) -> RecordedMachines:
     """Read a bag that has events in it. A damaged one may raise anything."""
     containers: Dict[str, Container] = {}
-    frames: List[SeenFrame] = []
+    frames: List[FailureImage] = []
     stores = MessageStores()
     with Reader(path) as reader:
-        connections = [item for item in reader.connections if item.msgtype in (STRUCTURE_TYPE, FRAMES_TYPE)]
+        connections = [
+            item for item in reader.connections if item.msgtype in (STRUCTURE_TYPE, FRAMES_TYPE)
+        ]
         for item, _, data in reader.messages(connections) if connections else ():
             message = stores.read(item, data)
             if item.msgtype == FRAMES_TYPE:
                 frames += list(_frames(message))[:MOST_FRAMES - len(frames)]
             elif len(containers) < MOST_CONTAINERS:
                 containers[message.path.lstrip('/')] = _container(message)
-    return Machines(containers, frames)
+    return RecordedMachines(containers, frames)
 
 
 def _container(message: Any) -> Container:
@@ -56,6 +58,6 @@ def _container(message: Any) -> Container:
     return Container(tuple(message.children), tuple(edges), tuple(message.container_outcomes))
 
 
-def _frames(message: Any) -> Iterator[SeenFrame]:
+def _frames(message: Any) -> Iterator[FailureImage]:
     for topic, image in zip(message.topics, message.images):
-        yield SeenFrame(message.query_id, topic, image.format, bytes(image.data))
+        yield FailureImage(message.query_id, topic, image.format, bytes(image.data))

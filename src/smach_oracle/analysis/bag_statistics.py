@@ -1,6 +1,7 @@
-"""Count what happened in recorded trials: the paper's Table I, its time series, and the data behind them.
+"""Count what happened in recorded trials: the paper's Table I, its time series, their data.
 
-Exit code: 0, all bags were read; 1, some were skipped; 2, there was nothing to count or an output cannot be written.
+Exit code: 0, all bags were read; 1, some were skipped; 2, there was nothing to count or an output
+cannot be written.
 """
 import argparse
 import os
@@ -8,12 +9,14 @@ import re
 import sys
 from typing import List, Optional, Sequence
 
-from ..oracle.naming import DEFAULT_FAILING_OUTCOMES, FailingNames
-from ..oracle.paths import path_of
-from . import groups as grouping, table
+from smach_oracle.oracle.settings.failing_outcomes import DEFAULT_FAILING_OUTCOMES, FailingNames
+from smach_oracle.oracle.settings.paths import path_of
+
+from . import table
 from .bag_events import BagError
-from .reading import complain, tell_skipped
+from .reading import report_error, report_skipped
 from .trials import Trials, TrialSummary, load_trials
+from .variants import VariantCounts, count_variants, time_series
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -21,14 +24,15 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = _parse(argv)
     try:
         found = load_trials(args.folders, FailingNames(args.failing_outcomes))
-        groups = grouping.make_groups(found.trials)
-        sys.stdout.write(table.format_text(groups, found.trials))
-        code = tell_skipped(found.skipped)
-        _write_files(args, found, groups)
+        variants = count_variants(found.trials)
+        sys.stdout.write(table.format_text(variants, found.trials))
+        code = report_skipped(found.skipped)
+        _write_files(args, found, variants)
     except (BagError, ImportError) as err:
-        return complain('bag_statistics', err)
+        return report_error('bag_statistics', err)
     except OSError as err:
-        return complain('bag_statistics', '{}: {}'.format(err.filename or 'output', err.strerror or err))
+        return report_error('bag_statistics', '{}: {}'.format(err.filename or 'output', err.strerror
+                                                              or err))
     return code
 
 
@@ -37,24 +41,28 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
                         help='with bags in it or below it; or a bag')
-    parser.add_argument('--figure', metavar='OUT', type=path_of, help='write the time series to OUT.svg and OUT.png')
-    parser.add_argument('--columns', type=int, choices=(1, 2), default=1,
-                        help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)')
-    parser.add_argument('--x-axis', choices=('trials', 'time'), default='trials',
-                        help='of the figure: number of the trial, or time since the first (default: trials)')
+    parser.add_argument('--figure', metavar='OUT', type=path_of,
+                        help='write the time series to OUT.svg and OUT.png')
+    parser.add_argument(
+        '--columns', type=int, choices=(1, 2), default=1,
+        help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)')
+    parser.add_argument(
+        '--x-axis', choices=('trials', 'time'), default='trials',
+        help='of the figure: number of the trial, or time since the first (default: trials)')
     parser.add_argument('--json', metavar='OUT', type=path_of,
                         help='write the table, all trials and the skipped bags as JSON')
     parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
-    parser.add_argument('--failing-outcomes', nargs='+', metavar='NAME', default=list(DEFAULT_FAILING_OUTCOMES),
-                        help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
-                            ' '.join(DEFAULT_FAILING_OUTCOMES)))
+    parser.add_argument(
+        '--failing-outcomes', nargs='+', metavar='NAME', default=list(DEFAULT_FAILING_OUTCOMES),
+        help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
+            ' '.join(DEFAULT_FAILING_OUTCOMES)))
     return parser.parse_args(argv)
 
 
-def _write_files(args: argparse.Namespace, found: Trials, groups: List[grouping.Group]) -> None:
+def _write_files(args: argparse.Namespace, found: Trials, variants: List[VariantCounts]) -> None:
     if args.json:
         with open(args.json, 'w', encoding='utf-8') as target:
-            table.write_json(target, groups, found.trials, found.skipped)
+            table.write_json(target, variants, found.trials, found.skipped)
     if args.csv:
         with open(args.csv, 'w', encoding='utf-8', newline='') as target:
             table.write_csv(target, found.trials)
@@ -65,8 +73,9 @@ def _write_files(args: argparse.Namespace, found: Trials, groups: List[grouping.
 def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> None:
     from .figure import save_time_series  # matplotlib takes a second: only where it is wanted
     stem = re.sub(r'\.(svg|png)$', '', args.figure)
-    series = grouping.time_series(trials)
-    for told, chosen in series:
-        suffix = '' if len(series) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_', '_'.join(told)).strip('_')
+    series = time_series(trials)
+    for words, chosen in series:
+        suffix = '' if len(series) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_',
+                                                          '_'.join(words)).strip('_')
         for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))

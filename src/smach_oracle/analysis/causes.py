@@ -1,58 +1,66 @@
 """How trials went by the causes that a simulated world was given to fail with."""
 from typing import Dict, List, NamedTuple, Sequence
 
-from .groups import find_arms
 from .trials import TrialSummary
+from .variants import find_variants
 
 NO_CAUSE = '(none)'
 
 
 class CauseRow(NamedTuple):
-    """The trials of one arm that were given a cause of one kind; each row counts trials."""
+    """The trials of one variant that were given a cause of one kind; each row counts trials."""
 
     experiment: str
-    arm: str
+    variant: str
     kind: str
     trials: int
     failed: int  # in which a state failed at least once
     recovered: int  # in which the oracle recovered at least once without the expert
     asked: int  # in which a question was put to the expert
-    ended_in_success: int  # by what the machine says
-    true_success: int  # by what the world says
+    ended_in_success: int  # by the machine's outcome
+    true_success: int  # by the world's judge
 
 
 def cause_rows(trials: Sequence[TrialSummary]) -> List[CauseRow]:
-    """One row for each arm and kind of cause, in alphabetical order; a trial is in the row of each of its kinds."""
+    """One row for each variant and kind of cause, in alphabetical order.
+
+    A trial is in the row of each of its kinds.
+    """
     rows = []
-    for arm in find_arms(trials):
+    for variant in find_variants(trials):
         by_kind: Dict[str, List[TrialSummary]] = {}
-        for trial in arm.trials:
+        for trial in variant.trials:
             if trial.cause is not None:
                 for kind in set(trial.cause.kinds) or {NO_CAUSE}:
                     by_kind.setdefault(kind, []).append(trial)
-        rows += [_row(arm.experiment, arm.name, kind, by_kind[kind]) for kind in sorted(by_kind)]
+        rows += [_row(variant.experiment, variant.name, kind, by_kind[kind])
+                 for kind in sorted(by_kind)]
     return rows
 
 
-def _row(experiment: str, arm: str, kind: str, trials: Sequence[TrialSummary]) -> CauseRow:
+def _row(experiment: str, variant: str, kind: str, trials: Sequence[TrialSummary]) -> CauseRow:
     return CauseRow(
-        experiment, arm, kind, len(trials), sum(trial.failures > 0 for trial in trials),
+        experiment, variant, kind, len(trials), sum(trial.failures > 0 for trial in trials),
         sum(trial.recoveries > 0 for trial in trials), sum(trial.questions > 0 for trial in trials),
         sum(trial.succeeded for trial in trials),
         sum(trial.truth is not None and trial.truth.success for trial in trials))
 
 
 def format_causes(rows: Sequence[CauseRow]) -> str:
-    """The rows as text, a table for each arm; '' where no trial has a cause."""
+    """The rows as text, a table for each variant; '' where no trial has a cause."""
     lines: List[str] = []
     width = max([len(row.kind) for row in rows] + [5])
     heading = '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
         'cause', width, 'trials', 'failed', 'recovered', 'asked', 'succeeded', 'true success')
-    arm = ('', '')
+    variant = ('', '')
     for row in rows:
-        if (row.experiment, row.arm) != arm:
-            arm = (row.experiment, row.arm)
-            lines += ['', '{}, {}: trials by what the world was given to fail with'.format(*arm), heading]
+        if (row.experiment, row.variant) != variant:
+            variant = (row.experiment, row.variant)
+            lines += [
+                '', '{}, {}: trials by what the world was given to fail with'.format(*variant),
+                heading
+            ]
         lines.append('  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
-            row.kind, width, row.trials, row.failed, row.recovered, row.asked, row.ended_in_success, row.true_success))
+            row.kind, width, row.trials, row.failed, row.recovered, row.asked, row.ended_in_success,
+            row.true_success))
     return '\n'.join(lines + ['']) if lines else ''

@@ -4,39 +4,43 @@ from typing import Optional, Sequence, Tuple
 
 Z_95 = 1.959963984540054  # two-sided 95% quantile of the normal distribution
 # The same of Student's t distribution, for 1, 2, ... degrees of freedom.
-T_95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120,
-        2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042)
+T_95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
+        2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056,
+        2.052, 2.048, 2.045, 2.042)
 
 Interval = Tuple[float, float]
 
 
-def wilson_interval(successes: int, runs: int, z: float = Z_95) -> Interval:
-    """Wilson score interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927); (0, 1) where there are no runs.
+def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
+    """Wilson score interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
 
-    Raises ValueError unless 0 <= successes <= runs.
+    (0, 1) where there are no trials.
+
+    :raises ValueError: unless 0 <= successes <= trials.
     """
-    if not 0 <= successes <= runs:
-        raise ValueError('successes: {} is not allowed; allowed: 0 to {}'.format(successes, runs))
-    if runs == 0:
+    if not 0 <= successes <= trials:
+        raise ValueError('successes: {} is not allowed; allowed: 0 to {}'.format(successes, trials))
+    if trials == 0:
         return 0.0, 1.0
-    share = successes / runs
-    centre = share + z * z / (2 * runs)
-    half = z * math.sqrt(share * (1 - share) / runs + z * z / (4 * runs * runs))
-    scale = 1 + z * z / runs
+    share = successes / trials
+    centre = share + z * z / (2 * trials)
+    half = z * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials * trials))
+    scale = 1 + z * z / trials
     low = 0.0 if successes == 0 else (centre - half) / scale
-    return low, 1.0 if successes == runs else (centre + half) / scale
+    return low, 1.0 if successes == trials else (centre + half) / scale
 
 
 def t_quantile(freedom: int) -> float:
     """Two-sided 95% quantile of Student's t distribution, for 1 degree of freedom or more."""
     if freedom <= len(T_95):
         return T_95[freedom - 1]
-    return (Z_95 + (Z_95 ** 3 + Z_95) / (4 * freedom)  # the first three terms of its expansion: within 0.0001
+    # the first three terms of its expansion: within 0.0001
+    return (Z_95 + (Z_95 ** 3 + Z_95) / (4 * freedom)
             + (5 * Z_95 ** 5 + 16 * Z_95 ** 3 + 3 * Z_95) / (96 * freedom ** 2))
 
 
 def replicate_interval(shares: Sequence[float]) -> Optional[Interval]:
-    """Student's t interval of the mean of replicates' shares, cut to 0 to 1; None for fewer than two."""
+    """Student's t interval of the mean of replicates' shares, cut to 0 to 1; None for one."""
     count = len(shares)
     if count < 2:
         return None

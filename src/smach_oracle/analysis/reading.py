@@ -1,17 +1,21 @@
-"""How every command here reads folders of bags: one that cannot be used is skipped, named, and told by exit code 1."""
+"""How every command here reads folders of bags.
+
+A bag that cannot be used is skipped and named, and the exit code is 1.
+"""
 import sys
 from typing import Iterator, List, Sequence, Tuple, Union
 
-from ..oracle.packages import lacking
-from .bag_events import BagContent, BagError, EventReader, Skipped, find_bags
+from smach_oracle.packages import lacking
+
+from .bag_events import BagContent, BagError, EventReader, SkippedBag, find_bags
 
 ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
 
 
-def read_bags(places: Sequence[str], skipped: List[Skipped]) -> Iterator[Tuple[str, BagContent]]:
-    """Path and content of every bag in folders and below that can be used; the others are added to `skipped`.
+def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
+    """Path and content of every bag in folders and below; unusable ones are added to `skipped`.
 
-    Raises BagError where a place does not exist, or there are no bags.
+    :raises BagError: where a place does not exist, or there are no bags.
     """
     paths = find_bags(places)
     if not paths:
@@ -21,12 +25,12 @@ def read_bags(places: Sequence[str], skipped: List[Skipped]) -> Iterator[Tuple[s
         try:
             content = reader.read(path)
         except BagError as err:
-            skipped.append(Skipped(path, str(err)))
+            skipped.append(SkippedBag(path, str(err)))
         else:
             yield path, content
 
 
-def tell_skipped(skipped: Sequence[Skipped]) -> int:
+def report_skipped(skipped: Sequence[SkippedBag]) -> int:
     """Name on standard error what was skipped, with the reasons; returns the exit code."""
     sys.stdout.flush()
     for item in skipped:
@@ -34,8 +38,8 @@ def tell_skipped(skipped: Sequence[Skipped]) -> int:
     return SOME_SKIPPED if skipped else ALL_READ
 
 
-def complain(command: str, why: Union[str, Exception]) -> int:
-    """Tell on standard error why a command has nothing to say; returns the exit code."""
+def report_error(command: str, why: Union[str, Exception]) -> int:
+    """Print on standard error why a command has no result; returns the exit code."""
     text = isinstance(why, ImportError) and lacking(why) or str(why)
     sys.stdout.flush()
     sys.stderr.write('{}: {}\n'.format(command, text))

@@ -1,4 +1,4 @@
-"""The figure of a memory sweep: share of trials in which the expert was asked, over the oracle's memory."""
+"""The figure of a memory sweep: share of trials with a question over the oracle's memory."""
 from typing import Any, List, Mapping, Sequence
 
 from matplotlib import rc_context
@@ -14,17 +14,24 @@ LOOKS = ((BLUE, 'o', '-'), (VERMILLION, 's', '--'), (GREEN, '^', ':'), (BLACK, '
 
 
 def save(series: Mapping[str, Sequence[Any]], stem: str) -> List[str]:
-    """Draw the points of each series to `stem`.svg and `stem`.png; returns the paths. Raises OSError."""
+    """Draw the points of each series to `stem`.svg and `stem`.png; returns the paths.
+
+    :raises OSError: where a file cannot be written.
+    """
     with rc_context(STYLE):
         figure = draw(series)
         paths = [stem + '.svg', stem + '.png']
-        figure.savefig(paths[0], metadata={'Date': None, 'Creator': None})  # the same bags give the same file
+        # the same bags give the same file
+        figure.savefig(paths[0], metadata={'Date': None, 'Creator': None})
         figure.savefig(paths[1], dpi=DPI, metadata={'Software': None})
     return paths
 
 
 def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
-    """Shares with 95% Wilson intervals; series beside each other are shifted a little, so that none hides another."""
+    """Shares with 95% Wilson intervals, by series.
+
+    Series are shifted a little beside each other, so that none hides another.
+    """
     figure = Figure(figsize=(COLUMN_IN[1], HEIGHT_IN))
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.14, 0.16, 0.84, 0.7))
@@ -34,9 +41,9 @@ def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
         shares = [100 * point.asked.share for point in points]
         reach = [[share - 100 * point.asked.interval[0] for share, point in zip(shares, points)],
                  [100 * point.asked.interval[1] - share for share, point in zip(shares, points)]]
-        axes.errorbar([shift * point.memory for point in points], shares, yerr=reach, color=colour, marker=marker,
-                      linestyle=dashes, markersize=3.5, linewidth=1.2, elinewidth=0.8, capsize=2, label=label,
-                      clip_on=False)
+        axes.errorbar([shift * point.memory for point in points], shares, yerr=reach, color=colour,
+                      marker=marker, linestyle=dashes, markersize=3.5, linewidth=1.2,
+                      elinewidth=0.8, capsize=2, label=label, clip_on=False)
     memories = sorted({point.memory for points in series.values() for point in points})
     axes.set_xscale('log')
     axes.xaxis.set_major_locator(FixedLocator(memories))
@@ -45,5 +52,6 @@ def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
     axes.set_xlabel('Memory N (results of a state)')
     axes.set_ylabel('Trials with a question (%)')
     axes.set_ylim(bottom=0)
-    axes.legend(loc='lower left', bbox_to_anchor=(0, 1.0), ncol=2, frameon=False, borderaxespad=0.0, borderpad=0.2)
+    axes.legend(loc='lower left', bbox_to_anchor=(0, 1.0), ncol=2, frameon=False, borderaxespad=0.0,
+                borderpad=0.2)
     return figure

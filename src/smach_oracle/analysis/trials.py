@@ -1,27 +1,14 @@
-"""What happened in each trial, told from its events (definitions: doc/statistics.md)."""
+"""Summaries of trials, made from the events in bags (definitions: doc/statistics.md)."""
 import os
-from collections import Counter
-from enum import Enum
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from ..oracle.events import NO_OUTCOME, Event, EventKind
-from ..oracle.naming import PREEMPTED, FailingNames
-from .bag_events import BagError, Cause, Skipped
+from smach_oracle.oracle.records.events import Event
+from smach_oracle.oracle.settings.failing_outcomes import FailingNames
+
+from .bag_events import BagError, RecordedCause, SkippedBag
 from .reading import read_bags
+from .trial_counter import DEFAULT_FAILING, TrialCounter, TrialEnding
 from .truth import Truth, TruthFiles
-
-DEFAULT_FAILING = FailingNames()
-STOPPED_BY = ('KeyboardInterrupt:', 'SystemExit:')  # how the texts of exceptions begin that are nobody's failure
-AUTONOMOUS_DECISIONS = ('revisit', 'step_back')
-
-
-class Ending(Enum):
-    """How a trial ended."""
-
-    SUCCESS = 'success'
-    FAILURE = 'failure'
-    PREEMPTED = 'preempted'  # by request, or by a shutdown or Ctrl-C
-    UNFINISHED = 'unfinished'  # its record ends before it
 
 
 class TrialSummary(NamedTuple):
@@ -29,10 +16,10 @@ class TrialSummary(NamedTuple):
 
     trial_id: str
     experiment: str  # path of the top machine
-    recovers: Optional[bool]  # with (True) or without the oracle; None: the record does not tell
+    recovers: Optional[bool]  # with (True) or without the oracle; None: it is not recorded
     start_time: float  # s since the epoch, the machine's own clock
     duration_s: float  # from the first to the last recorded event
-    ending: Ending
+    ending: TrialEnding
     outcome: str  # of the top machine; '' where it ended in an exception or is unfinished
     failures: int
     recoveries: int  # of the oracle, without the expert
@@ -41,9 +28,10 @@ class TrialSummary(NamedTuple):
     failures_by_state: Tuple[Tuple[str, int], ...]  # 'PATH/STATE', sorted
     lost_events: int  # gaps in the numbering
     bags: Tuple[str, ...]
-    settings: Tuple[Tuple[str, Any], ...] = ()  # of the oracle, sorted; () where the record does not tell
-    cause: Optional[Cause] = None  # what a simulated world was given to fail with
-    truth: Optional[Truth] = None  # what a simulated world says of the end
+    # of the oracle, sorted; () where they are not recorded
+    settings: Tuple[Tuple[str, Any], ...] = ()
+    cause: Optional[RecordedCause] = None  # what a simulated world was given to fail with
+    truth: Optional[Truth] = None  # how it ended, by the judge of a simulated world
 
     @property
     def replicate(self) -> str:
@@ -52,45 +40,46 @@ class TrialSummary(NamedTuple):
 
     @property
     def succeeded(self) -> bool:
-        """Whether the machine says so."""
-        return self.ending is Ending.SUCCESS
+        """Whether the machine ended in success, by its outcome."""
+        return self.ending is TrialEnding.SUCCESS
 
 
 class Trials(NamedTuple):
     """All that was found in some folders."""
 
     trials: List[TrialSummary]  # in the order of their beginning
-    skipped: List[Skipped]
+    skipped: List[SkippedBag]
 
 
 def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) -> Trials:
-    """Read all bags in folders (and below). A bag that cannot be used is named with the reason, not fatal.
+    """Read all bags in folders and below; those that cannot be used are listed with the reason.
 
-    Raises BagError where there is nothing to read: no such folder, no bags, or none with a trial in it.
+    :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
+        in it.
     """
-    gathered = _Gathered()
-    skipped: List[Skipped] = []
+    gathered = _TrialEvents()
+    skipped: List[SkippedBag] = []
     count = 0
     for path, content in read_bags(places, skipped):
         count += 1
         gathered.add(path, content.events, content.causes)
     if not gathered.events:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
-        raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(', '.join(places), count + len(skipped),
-                                                                         reasons))
+        raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(
+            ', '.join(places), count + len(skipped), reasons))
     trials = gathered.summaries(failing)
     return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
 
 
-class _Gathered:
+class _TrialEvents:
     """What was found of each trial: it may be spread over several bags, and be in more than one."""
 
     def __init__(self) -> None:
         self.events: Dict[str, Dict[int, Event]] = {}
         self._bags: Dict[str, Dict[str, None]] = {}
-        self._causes: Dict[str, Cause] = {}
+        self._causes: Dict[str, RecordedCause] = {}
 
-    def add(self, path: str, events: Iterable[Event], causes: Mapping[str, Cause]) -> None:
+    def add(self, path: str, events: Iterable[Event], causes: Mapping[str, RecordedCause]) -> None:
         for event in events:
             self.events.setdefault(event.trial_id, {})[event.seq] = event
             self._bags.setdefault(event.trial_id, {})[path] = None
@@ -110,67 +99,13 @@ class _Gathered:
 def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
               failing: FailingNames = DEFAULT_FAILING) -> TrialSummary:
     """Sum up the events of one trial, at least one, in any order."""
-    ordered = sorted(events, key=lambda event: event.seq)
-    first, last = ordered[0], ordered[-1]
-    start = _first(ordered, EventKind.TRIAL_START)
-    end = _first(ordered, EventKind.TRIAL_END)
-    asked = {event.query_id for event in ordered if event.kind == EventKind.QUERY_OPENED}
-    answered = {event.query_id for event in ordered if event.kind == EventKind.QUERY_ANSWERED}
-    failures = Counter('{}/{}'.format(event.path, event.state) for event in ordered if event.kind == EventKind.FAILURE)
-    times = [event.wall_time for event in ordered]
+    counter = TrialCounter(failing)
+    for event in sorted(events, key=lambda event: event.seq):
+        counter.add(event)
     return TrialSummary(
-        trial_id=first.trial_id, experiment=(start or first).path.strip('/').split('/')[0],
-        recovers=_recovers(start, ordered), start_time=first.wall_time, duration_s=max(times) - min(times),
-        ending=_ending(end, ordered, failing), outcome=end.outcome if end else '',
-        failures=sum(failures.values()), recoveries=count_recoveries(ordered),
-        questions=len(asked), answered=len(asked & answered), failures_by_state=tuple(sorted(failures.items())),
-        lost_events=last.seq + 1 - len(ordered), bags=bags, settings=_settings(start))
-
-
-def _settings(start: Optional[Event]) -> Tuple[Tuple[str, Any], ...]:
-    stated = start.data.get('settings') if start and isinstance(start.data, Mapping) else None
-    return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
-
-
-def count_recoveries(ordered: Iterable[Event]) -> int:
-    """How often the oracle recovered without the expert: a decision to revisit or to step back, carried out.
-
-    A decision is carried out by the next JUMP of the same container. A question in between takes it over.
-    """
-    decided: Dict[str, bool] = {}
-    recoveries = 0
-    for event in ordered:
-        if event.kind == EventKind.DECISION:
-            decided[event.path] = event.outcome in AUTONOMOUS_DECISIONS
-        elif event.kind in (EventKind.QUERY_OPENED, EventKind.FAILURE, EventKind.GIVE_UP):
-            decided[event.path] = False
-        elif event.kind == EventKind.JUMP:
-            recoveries += decided.pop(event.path, False)
-    return recoveries
-
-
-def _first(ordered: Iterable[Event], kind: EventKind) -> Optional[Event]:
-    return next((event for event in ordered if event.kind == kind), None)
-
-
-def _recovers(start: Optional[Event], ordered: Iterable[Event]) -> Optional[bool]:
-    """With or without the oracle: what TRIAL_START says, else whether the oracle was seen at work."""
-    stated = start.data.get('recovers') if start and isinstance(start.data, Mapping) else None
-    if isinstance(stated, bool):
-        return stated
-    return True if _first(ordered, EventKind.DECISION) else None
-
-
-def _ending(end: Optional[Event], ordered: Sequence[Event], failing: FailingNames) -> Ending:
-    if end is None:
-        return Ending.UNFINISHED
-    if end.outcome.lower() == PREEMPTED or (not end.outcome and _was_stopped(end, ordered)):
-        return Ending.PREEMPTED
-    failed = not end.outcome or end.outcome in failing  # no outcome: it ended in an exception
-    return Ending.FAILURE if failed else Ending.SUCCESS
-
-
-def _was_stopped(end: Event, ordered: Sequence[Event]) -> bool:
-    """Whether a shutdown or Ctrl-C ended it; an inconsistent machine has no outcome either, but enters no state."""
-    began = _first(ordered, EventKind.STATE_START) is not None
-    return end.text.startswith(STOPPED_BY) or (end.text == NO_OUTCOME and began)
+        trial_id=counter.trial_id, experiment=counter.experiment, recovers=counter.recovers,
+        start_time=counter.start_time, duration_s=counter.duration_s, ending=counter.ending,
+        outcome=counter.outcome, failures=counter.failures, recoveries=counter.recoveries,
+        questions=counter.questions, answered=counter.answered,
+        failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
+        settings=counter.settings)

@@ -1,6 +1,7 @@
-"""What a simulated world says of each trial, independently of the machine: `truth.jsonl` beside the bags.
+"""The world's own record of how each trial ended: `truth.jsonl` beside the bags.
 
-One JSON object a line: {"seed", "task", "success", "why", "causes": [{"kind", "text"}], "sim_s", "wall_s", "share"}.
+One JSON object a line: {"seed", "task", "success", "why", "causes": [{"kind", "text"}], "sim_s",
+"wall_s", "share"}.
 """
 import json
 import os
@@ -9,9 +10,12 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tup
 from .bag_events import BagError
 
 TRUTH_FILE = 'truth.jsonl'
-_NUMBER = (int, float)
-_FIELDS = {'seed': int, 'task': str, 'success': bool, 'why': str, 'causes': list, 'sim_s': _NUMBER, 'wall_s': _NUMBER,
-           'share': dict}
+# by name: the types that are allowed, and their name
+_FIELDS: Mapping[str, Tuple[Tuple[type, ...], str]] = {
+    'seed': ((int,), 'an int'), 'task': ((str,), 'a str'), 'success': ((bool,), 'a bool'),
+    'why': ((str,), 'a str'), 'causes': ((list,), 'a list'), 'sim_s': ((int, float), 'a number'),
+    'wall_s': ((int, float), 'a number'), 'share': ((dict,), 'a dict')
+}
 
 
 class Truth(NamedTuple):
@@ -28,15 +32,20 @@ class Truth(NamedTuple):
 
 
 def read_truth(path: str) -> Dict[int, Truth]:
-    """The lines of a truth file by seed; of two with the same seed the later counts.
+    """The lines of a truth file by seed; if a seed appears twice, the later line is used.
 
-    A last line that was cut off in its writing is passed over. Raises BagError for any other that is wrong, and
-    OSError.
+    A last line that was cut off in its writing is skipped.
+
+    :raises BagError: for any other line that is wrong.
+    :raises OSError: where the file cannot be read.
     """
     with open(path, encoding='utf-8') as source:
         lines = source.read().split('\n')
     torn = lines.pop()  # behind the last line's end: nothing, or what was being written
-    found = [_parse(line, '{} line {}'.format(path, number)) for number, line in enumerate(lines, 1) if line.strip()]
+    found = [
+        _parse(line, '{} line {}'.format(path, number)) for number, line in enumerate(lines, 1)
+        if line.strip()
+    ]
     if torn.strip():
         found += _whole(torn)
     return {truth.seed: truth for truth in found}
@@ -57,12 +66,15 @@ def _parse(line: str, where: str) -> Truth:
         raise BagError('{}: not JSON: {}'.format(where, err)) from err
     if not isinstance(data, dict):
         raise BagError('{}: not a JSON object'.format(where))
-    for name, kind in _FIELDS.items():
-        if not isinstance(data.get(name), kind) or (kind is not bool and isinstance(data.get(name), bool)):
+    for name, (kinds, allowed) in _FIELDS.items():
+        value = data.get(name)
+        is_bool = isinstance(value, bool)
+        if not isinstance(value, kinds) or (is_bool and bool not in kinds):
             raise BagError('{}: {}: {!r} is not allowed; allowed: {}'.format(
-                where, name, data.get(name), 'a number' if kind is _NUMBER else 'a {}'.format(kind.__name__)))
-    return Truth(data['seed'], data['task'], data['success'], data['why'], _causes(data['causes'], where),
-                 float(data['sim_s']), float(data['wall_s']), _shares(data['share'], where))
+                where, name, value, allowed))
+    return Truth(data['seed'], data['task'], data['success'], data['why'],
+                 _causes(data['causes'], where), float(data['sim_s']), float(data['wall_s']),
+                 _shares(data['share'], where))
 
 
 def _causes(items: Iterable[Any], where: str) -> Tuple[Tuple[str, str], ...]:
@@ -76,7 +88,8 @@ def _shares(share: Mapping[str, Any], where: str) -> Mapping[str, float]:
     try:
         return {str(name): float(value) for name, value in share.items()}
     except (TypeError, ValueError) as err:
-        raise BagError('{}: share: {!r} is not allowed; allowed: numbers by name'.format(where, share)) from err
+        raise BagError('{}: share: {!r} is not allowed; allowed: numbers by name'.format(
+            where, share)) from err
 
 
 class TruthFiles:
@@ -86,7 +99,10 @@ class TruthFiles:
         self._read: Dict[str, Dict[int, Truth]] = {}
 
     def of(self, folder: str, seed: Optional[int]) -> Optional[Truth]:
-        """The truth of the trial with that seed recorded in that folder; None where nobody tells. Raises BagError."""
+        """The truth of the trial with that seed recorded in that folder; None where there is none.
+
+        :raises BagError: where the file cannot be used.
+        """
         if seed is None:
             return None
         if folder not in self._read:

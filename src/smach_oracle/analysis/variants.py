@@ -1,10 +1,15 @@
-"""Trials by experiment and arm, and what is counted of each group (definitions: doc/statistics.md)."""
+"""Trials by experiment and variant, and the counts of each (definitions: doc/statistics.md).
+
+A variant is one of the ways in which an experiment runs the same trials, such as with and without
+the oracle.
+"""
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .intervals import Interval, replicate_interval, wilson_interval
-from .trials import Ending, TrialSummary
+from .trial_counter import TrialEnding
+from .trials import TrialSummary
 
-ARMS = ((True, 'with oracle'), (False, 'without oracle'), (None, 'arm unknown'))
+KINDS = ((True, 'with oracle'), (False, 'without oracle'), (None, 'variant unknown'))
 RECOVERIES = 'oracle recoveries'
 QUESTIONS = 'questions to the expert'
 ANSWERED = 'answered'
@@ -18,45 +23,51 @@ _BY_EVENTS: Tuple[Tuple[str, Callable[[TrialSummary], int]], ...] = (
     (ANSWERED, lambda trial: trial.answered),
     (NOT_ANSWERED, lambda trial: trial.questions - trial.answered),
 )
-_ENDINGS = {Ending.SUCCESS: 'ended in success', Ending.FAILURE: ENDED_IN_FAILURE, Ending.PREEMPTED: 'preempted',
-            Ending.UNFINISHED: 'unfinished'}
+_ENDINGS = {
+    TrialEnding.SUCCESS: 'ended in success', TrialEnding.FAILURE: ENDED_IN_FAILURE,
+    TrialEnding.PREEMPTED: 'preempted', TrialEnding.UNFINISHED: 'unfinished'
+}
 _BY_TRUTH: Tuple[Tuple[str, Callable[[bool, bool], bool]], ...] = (
-    (TRUE_SUCCESS, lambda said, true: true),
-    ('false success', lambda said, true: said and not true),
-    ('false failure', lambda said, true: true and not said),
+    (TRUE_SUCCESS, lambda claimed, true: true),
+    ('false success', lambda claimed, true: claimed and not true),
+    ('false failure', lambda claimed, true: true and not claimed),
 )
+
+# a trial's settings in an order: key, value if it is a number, else its text
+SettingsKey = Tuple[Tuple[str, float, str], ...]
 
 
 class Count(NamedTuple):
-    """How many trials of a group something happened in, and how often."""
+    """In how many trials of a variant something happened, and how often."""
 
     name: str
     trials: int
     share: float  # of the trials in which it is known, 0 to 1
     interval: Interval  # 95% Wilson score interval of the share, over trials
     events: Optional[int]  # None where it happens at most once a trial
-    over_replicates: Optional[Interval] = None  # 95% t interval of the mean share; None for fewer than two replicates
+    # 95% t interval of the mean share; None for fewer than two replicates
+    over_replicates: Optional[Interval] = None
 
 
-class Group(NamedTuple):
-    """The trials of one experiment in one arm."""
+class VariantCounts(NamedTuple):
+    """What happened in the trials of one variant of an experiment."""
 
     experiment: str
-    arm: str
-    runs: int
+    name: str
+    trials: int
     counts: Tuple[Count, ...]
     trials_with_gaps: int
     lost_events: int
     replicates: int = 1
-    truth_known: int = 0  # trials of which a world has told how they truly ended
+    truth_known: int = 0  # trials whose true end a world has recorded
 
     def of(self, name: str) -> Count:
         """The count of that name."""
         return next(item for item in self.counts if item.name == name)
 
 
-class Arm(NamedTuple):
-    """The trials that a group is made of."""
+class VariantTrials(NamedTuple):
+    """The trials of one variant of an experiment."""
 
     experiment: str
     name: str
@@ -66,54 +77,72 @@ class Arm(NamedTuple):
 
     def replicates(self) -> List[Tuple[TrialSummary, ...]]:
         """Its trials by the folder they were recorded in."""
-        return split_by(self.trials, lambda trial: trial.replicate)
+        return _by_replicate(self.trials)
 
 
-def split_by(trials: Sequence[TrialSummary], key: Callable[[TrialSummary], Any]) -> List[Tuple[TrialSummary, ...]]:
-    """The trials in parts, in the order of a key that can be sorted."""
-    parts: Dict[Any, List[TrialSummary]] = {}
+def _by_replicate(trials: Sequence[TrialSummary]) -> List[Tuple[TrialSummary, ...]]:
+    parts: Dict[str, List[TrialSummary]] = {}
     for trial in trials:
-        parts.setdefault(key(trial), []).append(trial)
-    return [tuple(parts[value]) for value in sorted(parts)]
+        parts.setdefault(trial.replicate, []).append(trial)
+    return [tuple(parts[folder]) for folder in sorted(parts)]
 
 
-def find_arms(trials: Sequence[TrialSummary]) -> List[Arm]:
-    """Trials by experiment (in alphabetical order), with or without oracle, and the oracle's settings."""
-    arms = []
-    for experiment in split_by(trials, lambda trial: trial.experiment):
-        for recovers, name in ARMS:
-            chosen = [trial for trial in experiment if trial.recovers is recovers]
-            variants = split_by(chosen, _settings_key) if recovers else [tuple(chosen)]
-            differing = _differing([dict(variant[0].settings) for variant in variants if variant])
-            for variant in filter(None, variants):
-                settings = dict(variant[0].settings)
-                told = ['{} {}'.format(key, settings.get(key, 'unknown')) for key in differing]
-                arms.append(Arm(variant[0].experiment, ', '.join([name] + told), recovers, settings, variant))
-    return arms
+def find_variants(trials: Sequence[TrialSummary]) -> List[VariantTrials]:
+    """Trials by experiment (in alphabetical order), with or without oracle, and its settings."""
+    variants = []
+    for experiment in sorted({trial.experiment for trial in trials}):
+        for recovers, name in KINDS:
+            chosen = [trial for trial in trials
+                      if trial.experiment == experiment and trial.recovers is recovers]
+            variants += _by_settings(experiment, name, recovers, chosen)
+    return variants
 
 
-def time_series(trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
-    """Trials for a figure each: one replicate of one oracle, with the trials without oracle of its place in order.
+def _by_settings(experiment: str, name: str, recovers: Optional[bool],
+                 trials: Sequence[TrialSummary]) -> List[VariantTrials]:
+    """One variant for each settings of the oracle, named by what differs; one without oracle."""
+    parts: Dict[SettingsKey, List[TrialSummary]] = {}
+    for trial in trials:
+        parts.setdefault(_settings_key(trial) if recovers else (), []).append(trial)
+    in_order = [(dict(parts[key][0].settings), tuple(parts[key])) for key in sorted(parts)]
+    differing = _differing([settings for settings, _ in in_order])
+    return [
+        VariantTrials(experiment, ', '.join([name] + _named(settings, differing)), recovers,
+                      settings, part) for settings, part in in_order
+    ]
 
-    Returns with each what tells it from the others: experiment, oracle, replicate, as far as there are several.
+
+def _named(settings: Dict[str, Any], keys: Sequence[str]) -> List[str]:
+    return ['{} {}'.format(key, settings.get(key, 'unknown')) for key in keys]
+
+
+def time_series(
+        trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
+    """Trials for a figure each: one replicate of one oracle, with trials without oracle beside it.
+
+    Returns with each the words that distinguish it from the others: experiment, oracle, replicate,
+    as far as there are several.
     """
     series = []
-    arms = find_arms(trials)
-    for experiment in sorted({arm.experiment for arm in arms}):
-        mine = [arm for arm in arms if arm.experiment == experiment]
-        beside = [part for arm in mine if arm.recovers is False for part in arm.replicates()]
-        with_oracle = [(arm.name, arm.replicates()) for arm in mine if arm.recovers is not False]
+    variants = find_variants(trials)
+    experiments = sorted({variant.experiment for variant in variants})
+    for experiment in experiments:
+        mine = [variant for variant in variants if variant.experiment == experiment]
+        beside = [part for variant in mine if variant.recovers is False
+                  for part in variant.replicates()]
+        with_oracle = [(variant.name, variant.replicates()) for variant in mine
+                       if variant.recovers is not False]
         for name, parts in with_oracle or [('', [()] * len(beside))]:
             for number, part in enumerate(parts):
-                told = ((experiment,) if len({arm.experiment for arm in arms}) > 1 else ()) + (
+                words = ((experiment,) if len(experiments) > 1 else ()) + (
                     (name,) if len(with_oracle) > 1 else ()) + (
                     ('replicate', str(number)) if len(parts) > 1 else ())
                 without = beside[number] if number < len(beside) else ()
-                series.append((told, tuple(part) + tuple(without)))
+                series.append((words, tuple(part) + tuple(without)))
     return series
 
 
-def _settings_key(trial: TrialSummary) -> Tuple[Tuple[str, float, str], ...]:
+def _settings_key(trial: TrialSummary) -> SettingsKey:
     """Numbers in the order of their size, everything else in that of the alphabet."""
     return tuple((key, value, '') if isinstance(value, (int, float)) else (key, 0.0, str(value))
                  for key, value in trial.settings)
@@ -124,22 +153,23 @@ def _differing(settings: Sequence[Dict[str, Any]]) -> List[str]:
     return [key for key in keys if len({repr(each.get(key)) for each in settings}) > 1]
 
 
-def make_groups(trials: Sequence[TrialSummary]) -> List[Group]:
-    """Count, by experiment and arm."""
-    return [make_group(arm) for arm in find_arms(trials)]
+def count_variants(trials: Sequence[TrialSummary]) -> List[VariantCounts]:
+    """Count, by experiment and variant."""
+    return [count_variant(variant) for variant in find_variants(trials)]
 
 
-def make_group(arm: Arm) -> Group:
-    """Count what happened in the trials of an arm."""
-    parts, known = arm.replicates(), [trial for trial in arm.trials if trial.truth is not None]
-    counts = [_by_events(name, number, arm.trials, parts) for name, number in _BY_EVENTS]
-    counts += [make_count(name, _ended(ending), arm.trials, parts) for ending, name in _ENDINGS.items()]
+def count_variant(variant: VariantTrials) -> VariantCounts:
+    """Count what happened in the trials of a variant."""
+    trials, parts = variant.trials, variant.replicates()
+    known = [trial for trial in trials if trial.truth is not None]
+    counts = [_by_events(name, number, trials, parts) for name, number in _BY_EVENTS]
+    counts += [make_count(name, _ended(ending), trials, parts) for ending, name in _ENDINGS.items()]
     if known:
-        known_parts = split_by(known, lambda trial: trial.replicate)
-        counts += [make_count(name, _found(holds), known, known_parts) for name, holds in _BY_TRUTH]
-    return Group(arm.experiment, arm.name, len(arm.trials), tuple(counts),
-                 sum(1 for trial in arm.trials if trial.lost_events), sum(trial.lost_events for trial in arm.trials),
-                 len(parts), len(known))
+        counts += [make_count(name, _found(holds), known, _by_replicate(known))
+                   for name, holds in _BY_TRUTH]
+    return VariantCounts(variant.experiment, variant.name, len(trials), tuple(counts),
+                         sum(1 for trial in trials if trial.lost_events),
+                         sum(trial.lost_events for trial in trials), len(parts), len(known))
 
 
 def _by_events(name: str, number: Callable[[TrialSummary], int], trials: Sequence[TrialSummary],
@@ -148,7 +178,7 @@ def _by_events(name: str, number: Callable[[TrialSummary], int], trials: Sequenc
     return count._replace(events=sum(map(number, trials)))
 
 
-def _ended(ending: Ending) -> Callable[[TrialSummary], bool]:
+def _ended(ending: TrialEnding) -> Callable[[TrialSummary], bool]:
     return lambda trial: trial.ending is ending
 
 
@@ -158,7 +188,7 @@ def _found(holds: Callable[[bool, bool], bool]) -> Callable[[TrialSummary], bool
 
 def make_count(name: str, happened: Callable[[TrialSummary], bool], trials: Sequence[TrialSummary],
                parts: Sequence[Sequence[TrialSummary]]) -> Count:
-    """In how many of at least one trial something happened; `parts`: the same trials by replicate."""
+    """In how many trials something happened, of at least one; `parts`: the same by replicate."""
     number = sum(map(happened, trials))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
     return Count(name, number, number / len(trials), wilson_interval(number, len(trials)), None,

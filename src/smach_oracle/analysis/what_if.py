@@ -1,41 +1,52 @@
 """What another memory, threshold or policy would have decided at the failures that were recorded.
 
-Each recorded failure is put once more to an oracle of other settings that has seen the same results before it: would
-it have asked where the recorded one recovered, or the other way round? That is all that a record can tell. It is no
-forecast of how often such an oracle asks: after the first other decision the trial would have gone another way, and
-the rates with it; for that, run the trials under it (run_trials --memory ... --policy ...).
+Each recorded failure is put once more to an oracle of other settings that has seen the same results
+before it: would it have asked where the recorded one recovered, or the other way round? That is all
+that a record can tell. It is no forecast of how often such an oracle asks: after the first other
+decision the trial would have gone another way, and the rates with it; for that, run the trials
+under it (run_trials --memory ... --policy ...).
 
-The record is first replayed under its own settings. Where that does not give the recorded rates and decisions, nothing
-is said of that folder. Exit code: 0; 1, some bags or folders were skipped; 2, nothing could be replayed.
+The record is first replayed under its own settings. Where that does not give the recorded rates and
+decisions, nothing is said of that folder. Exit code: 0; 1, some bags or folders were skipped; 2,
+nothing could be replayed.
 """
 import argparse
 import itertools
 import sys
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from ..oracle.errors import OracleError
-from ..oracle.events import SPENT, Event, EventKind
-from ..oracle.failure_rate import FailureClass, classify, make_estimator
-from ..oracle.history import History
-from ..oracle.naming import is_preempted
-from ..oracle.paths import path_of
-from ..oracle.policy import POLICIES, Action, Chain, Preconditions, Situation, policy_named
-from ..oracle.question import Visit, VisitResult
-from .bag_events import BagError, Skipped
-from .reading import complain, read_bags, tell_skipped
+from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, make_estimator
+from smach_oracle.oracle.decision.policy import (
+    POLICIES,
+    Action,
+    FailureContext,
+    Policy,
+    Preconditions,
+    Situation,
+    policy_named,
+)
+from smach_oracle.oracle.errors import OracleError
+from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import Decider, decided_by
+from smach_oracle.oracle.records.history import History
+from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.oracle.settings.failing_outcomes import is_preempted
+from smach_oracle.oracle.settings.paths import path_of
+
+from .bag_events import BagError, SkippedBag
+from .reading import read_bags, report_error, report_skipped
 from .trials import summarise
 
 ENOUGH_VISITS = 50
 SAME, NOT_KNOWN = 'same', 'not known'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
-RUN_FOR = (int(FailureClass.LOW), int(FailureClass.MODERATE))  # classes for which every policy runs preconditions
 NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 _ROUNDING = 1e-9
 
 Key = Tuple[str, str]  # path and state
 
 
-class Tried(NamedTuple):
+class TriedSettings(NamedTuple):
     """What became of the recorded decisions under other settings."""
 
     settings: Mapping[str, Any]
@@ -44,13 +55,15 @@ class Tried(NamedTuple):
     other_trials: int  # in which at least one decision is known to be another
 
 
-class _State:
+class _LearnedState:
     """What an oracle learns of a state, and what it knows of the present failure."""
 
     def __init__(self, settings: Mapping[str, Any]) -> None:
-        self.estimator = make_estimator(settings['estimator'], settings['memory'], settings['prior'])
-        self.chain: Optional[Chain] = None
-        self.preconditions: List[bool] = []  # whether each was met, of those run for the present failure
+        self.estimator = make_estimator(settings['estimator'], settings['memory'],
+                                        settings['prior'])
+        self.context: Optional[FailureContext] = None
+        # whether each was met, of those run for the present failure
+        self.preconditions: List[bool] = []
 
 
 class Replay:
@@ -61,11 +74,11 @@ class Replay:
         self._settings = settings
         self._policy = policy_named(settings['policy'])
         self._conditioned = conditioned
-        self._states: Dict[Key, _State] = {}
+        self._states: Dict[Key, _LearnedState] = {}
         self._histories: Dict[str, History] = {}
 
     def take(self, event: Event) -> Optional[str]:
-        """Follow one event. Returns the action it would take, 'not known' included, at a DECISION, else None."""
+        """Follow one event; returns the action at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
             for history in self._histories.values():
                 history.begin_trial()
@@ -88,10 +101,10 @@ class Replay:
         """What it has learned of the event's state."""
         return self._state(event).estimator.rate
 
-    def _state(self, event: Event) -> _State:
+    def _state(self, event: Event) -> _LearnedState:
         key = (event.path, event.state)
         if key not in self._states:
-            self._states[key] = _State(self._settings)
+            self._states[key] = _LearnedState(self._settings)
         return self._states[key]
 
     def _history(self, path: str) -> History:
@@ -100,9 +113,7 @@ class Replay:
     def _failed(self, event: Event) -> None:
         state, history = self._state(event), self._history(event.path)
         successes = state.estimator.successes
-        state.chain = Chain(event.state, '', history.failed_last(event.state),
-                            history.failing_since(event.state, successes), history.unconditioned,
-                            history.succeeded_before(event.state))
+        state.context = history.failure_context(event.state, '', successes)
         state.preconditions = []
         history.failed(event.state, successes)
         state.estimator.add(True)
@@ -110,7 +121,7 @@ class Replay:
 
     def _left(self, event: Event) -> None:
         state = self._state(event)
-        if state.chain is not None:  # the end of the visit whose failure is known
+        if state.context is not None:  # the end of the visit whose failure is known
             return
         if not is_preempted(event.outcome):
             state.estimator.add(False)
@@ -122,20 +133,22 @@ class Replay:
 
     def begin_visit(self, event: Event) -> None:
         """A state is about to run."""
-        self._state(event).chain = None
+        self._state(event).context = None
 
     def _decide(self, event: Event) -> str:
         state = self._state(event)
-        if _is_spent(event):
+        if decided_by(event) is Decider.MAX_RECOVERIES:
             return Action.ASK.value
-        failure_class = classify(state.estimator.rate, self._settings['moderate_from'], self._settings['high_from'])
+        failure_class = classify(state.estimator.rate, self._settings['moderate_from'],
+                                 self._settings['high_from'])
         preconditions = self._preconditions(event, state, failure_class)
-        if preconditions is None or state.chain is None:
+        if preconditions is None or state.context is None:
             return NOT_KNOWN
         return self._policy.decide(Situation(failure_class, preconditions,
-                                             self._policy.is_continuous(state.chain))).value
+                                             self._policy.is_continuous(state.context))).value
 
-    def _preconditions(self, event: Event, state: _State, failure_class: FailureClass) -> Optional[Preconditions]:
+    def _preconditions(self, event: Event, state: _LearnedState,
+                       failure_class: FailureClass) -> Optional[Preconditions]:
         if self._conditioned.get((event.path, event.state)) is False:
             return Preconditions.NONE
         if not self._policy.runs_preconditions(failure_class):
@@ -145,24 +158,23 @@ class Replay:
         return Preconditions.MET if all(state.preconditions) else Preconditions.NOT_MET
 
 
-def _is_spent(event: Event) -> bool:
-    """Whether max_recoveries decided, outside every policy."""
-    return event.text.endswith(SPENT)
+def _conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
+    """Which states have preconditions: those where some were run.
 
-
-def _conditioned(events: Iterable[Event]) -> Dict[Key, bool]:
-    """Which states have preconditions: those where some were run; not those where none were, though they would be."""
+    Those where none were run, though they would have been, have none.
+    """
     known: Dict[Key, bool] = {}
     for event in events:
         key = (event.path, event.state)
         if event.kind == EventKind.PRECONDITION_START:
             known[key] = True
-        elif event.kind == EventKind.DECISION and not _is_spent(event) and event.failure_class in RUN_FOR:
+        elif (event.kind == EventKind.DECISION and decided_by(event) is Decider.POLICY
+              and policy.runs_preconditions(FailureClass(event.failure_class))):
             known.setdefault(key, False)
     return known
 
 
-def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> Tried:
+def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> TriedSettings:
     """Put the decisions of one replicate to an oracle of other settings.
 
     :param trials: the events of each trial, in order.
@@ -171,7 +183,8 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     recorded = dict(summarise(trials[0]).settings)
     if not set(NEEDED) <= set(recorded):
         raise BagError('its trials do not tell the settings of their oracle')
-    conditioned = _conditioned(event for trial in trials for event in trial)
+    conditioned = _conditioned((event for trial in trials for event in trial),
+                               policy_named(recorded['policy']))
     own, other = Replay(recorded, conditioned), Replay({**recorded, **settings}, conditioned)
     counts = dict.fromkeys(OUTCOMES, 0)
     other_trials = 0
@@ -189,14 +202,16 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
                 counts[outcome] += 1
                 another = another or outcome not in (SAME, NOT_KNOWN)
         other_trials += another
-    return Tried(dict(settings), counts, len(trials), other_trials)
+    return TriedSettings(dict(settings), counts, len(trials), other_trials)
 
 
 def _check_rate(own: Replay, event: Event) -> None:
     if event.kind == EventKind.FAILURE and abs(own.rate(event) - event.rate) > _ROUNDING:
-        raise BagError('{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}: states with '
-                       'settings of their own, rates kept from elsewhere, or trials that are missing'.format(
-                           event.trial_id, event.state, event.rate, own.rate(event)))
+        raise BagError(
+            '{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}: states '
+            'with '
+            'settings of their own, rates kept from elsewhere, or trials that are missing'.format(
+                event.trial_id, event.state, event.rate, own.rate(event)))
 
 
 def _check_decision(done: str, event: Event) -> None:
@@ -213,10 +228,13 @@ def _outcome(recorded: str, tried: str) -> str:
     return 'would recover' if recorded == Action.ASK.value else 'recovers otherwise'
 
 
-def load_replicates(places: Sequence[str], skipped: List[Skipped]) -> Dict[str, List[List[Event]]]:
+def load_replicates(places: Sequence[str],
+                    skipped: List[SkippedBag]) -> Dict[str, List[List[Event]]]:
     """The trials with an oracle, by the folder they were recorded in, in order.
 
-    Bags that cannot be used go to `skipped`. Raises BagError.
+    Bags that cannot be used go to `skipped`.
+
+    :raises BagError: where there are none, or no folder.
     """
     found: Dict[str, List[List[Event]]] = {}
     for path, content in read_bags(places, skipped):
@@ -226,16 +244,25 @@ def load_replicates(places: Sequence[str], skipped: List[Skipped]) -> Dict[str, 
         for events in trials.values():
             summary = summarise(events, (path,))
             if summary.recovers and not summary.lost_events:
-                found.setdefault(summary.replicate, []).append(sorted(events, key=lambda event: event.seq))
-    return {folder: sorted(trials, key=lambda events: events[0].wall_time) for folder, trials in found.items()}
+                found.setdefault(summary.replicate,
+                                 []).append(sorted(events, key=lambda event: event.seq))
+    return {
+        folder: sorted(trials, key=lambda events: events[0].wall_time)
+        for folder, trials in found.items()
+    }
 
 
-def format_tried(rows: Sequence[Tried]) -> str:
+def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
     """A line for each oracle that was tried."""
-    names = [', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded' for row in rows]
+    names = [
+        ', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded'
+        for row in rows
+    ]
     width = max(len(name) for name in names + ['settings'])
-    lines = ['{:<{}}  decisions'.format('settings', width) + ''.join('{:>20}'.format(name) for name in OUTCOMES)
-             + '   trials with another']
+    lines = [
+        '{:<{}}  decisions'.format('settings', width) +
+        ''.join('{:>20}'.format(name) for name in OUTCOMES) + '   trials with another'
+    ]
     for name, row in zip(names, rows):
         lines.append('{:<{}}  {:>9}'.format(name, width, sum(row.counts.values())) + ''.join(
             '{:>20}'.format(row.counts[outcome]) for outcome in OUTCOMES)
@@ -247,29 +274,34 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it')
+    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
+                        help='with bags in it or below it')
     parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
     parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')
     for name in ('moderate_from', 'high_from', 'prior'):
-        parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try')
+        parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X',
+                            help='values to try')
     args = parser.parse_args(argv)
     varied = {name: values for name, values in vars(args).items() if name != 'folders' and values}
-    skipped: List[Skipped] = []
+    skipped: List[SkippedBag] = []
     try:
         replicates = load_replicates(args.folders, skipped)
     except (BagError, ImportError) as err:
-        return complain('what_if', err)
+        return report_error('what_if', err)
     replayed = 0
     for folder, trials in sorted(replicates.items()):
         try:
-            rows = [compare(trials, dict(zip(varied, values))) for values in itertools.product(*varied.values())]
+            rows = [
+                compare(trials, dict(zip(varied, values)))
+                for values in itertools.product(*varied.values())
+            ]
         except OracleError as err:
-            skipped.append(Skipped(folder, str(err)))
+            skipped.append(SkippedBag(folder, str(err)))
         else:
-            sys.stdout.write('{}\n{}'.format(folder, format_tried(rows)))
+            sys.stdout.write('{}\n{}'.format(folder, format_tried_settings(rows)))
             replayed += 1
-    code = tell_skipped(skipped)
+    code = report_skipped(skipped)
     if not replayed:
-        return complain('what_if', '{}: no trials with an oracle that could be replayed'.format(
+        return report_error('what_if', '{}: no trials with an oracle that could be replayed'.format(
             ', '.join(args.folders)))
     return code

@@ -1,0 +1,162 @@
+"""Count what happened in one trial, one event after the other (definitions: doc/statistics.md).
+
+The one definition for trials in bags and for trials that a console hears of while they run.
+"""
+from collections import Counter
+from enum import Enum
+from typing import Any, Dict, Mapping, Optional, Set, Tuple
+
+from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import TrialEnd, ended_by
+from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
+
+DEFAULT_FAILING = FailingNames()
+AUTONOMOUS_DECISIONS = ('revisit', 'step_back')
+
+
+class TrialEnding(Enum):
+    """How a trial ended."""
+
+    SUCCESS = 'success'
+    FAILURE = 'failure'
+    PREEMPTED = 'preempted'  # by request, or by a shutdown or Ctrl-C
+    UNFINISHED = 'unfinished'  # no end was recorded, or it still runs
+
+
+class TrialCounter:
+    """The counts of one trial so far; its events are added in the order of their numbers."""
+
+    def __init__(self, failing: FailingNames = DEFAULT_FAILING) -> None:
+        """`failing`: outcomes of the top machine that are failures."""
+        self.trial_id = ''
+        self.experiment = ''  # path of the top machine
+        self.start_time = 0.0  # s since the epoch, the machine's own clock
+        self.recoveries = 0  # of the oracle, without the expert
+        self._failing = failing
+        self._start: Mapping[str, Any] = {}  # data of TRIAL_START
+        self._end: Optional[Event] = None
+        self._earliest_s = self._latest_s = 0.0
+        self._count = 0
+        self._last_seq = -1
+        self._failures: Dict[str, int] = Counter()
+        self._asked: Set[str] = set()
+        self._answered: Set[str] = set()
+        # by container: whether its last decision is a recovery that no jump has carried out yet
+        self._decided: Dict[str, bool] = {}
+        self._oracle_seen = False
+        self._state_seen = False
+
+    @property
+    def recovers(self) -> Optional[bool]:
+        """With or without the oracle, as TRIAL_START has it; True where an oracle was at work.
+
+        None where neither is recorded.
+        """
+        stated = self._start.get('recovers')
+        if isinstance(stated, bool):
+            return stated
+        return True if self._oracle_seen else None
+
+    @property
+    def settings(self) -> Tuple[Tuple[str, Any], ...]:
+        """The oracle's settings, sorted; () where they are not recorded."""
+        stated = self._start.get('settings')
+        return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
+
+    @property
+    def duration_s(self) -> float:
+        """s from the first to the last recorded event."""
+        return self._latest_s - self._earliest_s
+
+    @property
+    def ending(self) -> TrialEnding:
+        """How it ended."""
+        end = self._end
+        if end is None:
+            return TrialEnding.UNFINISHED
+        if end.outcome.lower() == PREEMPTED or (not end.outcome and self._was_stopped(end)):
+            return TrialEnding.PREEMPTED
+        failed = not end.outcome or end.outcome in self._failing  # none: it ended in an exception
+        return TrialEnding.FAILURE if failed else TrialEnding.SUCCESS
+
+    @property
+    def outcome(self) -> str:
+        """Outcome of the top machine; '' where it ended in an exception or is unfinished."""
+        return self._end.outcome if self._end is not None else ''
+
+    @property
+    def failures(self) -> int:
+        """How often a state failed."""
+        return sum(self._failures.values())
+
+    @property
+    def failures_by_state(self) -> Tuple[Tuple[str, int], ...]:
+        """How often each state failed, by 'PATH/STATE', sorted."""
+        return tuple(sorted(self._failures.items()))
+
+    @property
+    def questions(self) -> int:
+        """How many questions were put to the expert."""
+        return len(self._asked)
+
+    @property
+    def answered(self) -> int:
+        """How many of these questions were answered."""
+        return len(self._asked & self._answered)
+
+    @property
+    def lost_events(self) -> int:
+        """Gaps in the numbering: events that were lost, or that came before the first one added."""
+        return self._last_seq + 1 - self._count
+
+    def add(self, event: Event) -> None:
+        """Count one event."""
+        self._note_arrival(event)
+        if event.kind == EventKind.TRIAL_START:
+            self.experiment = _experiment(event)
+            self._start = event.data if isinstance(event.data, Mapping) else {}
+        elif event.kind == EventKind.TRIAL_END:
+            self._end = self._end or event
+        elif event.kind == EventKind.STATE_START:
+            self._state_seen = True
+        elif event.kind == EventKind.FAILURE:
+            self._failures['{}/{}'.format(event.path, event.state)] += 1
+        elif event.kind == EventKind.QUERY_OPENED:
+            self._asked.add(event.query_id)
+        elif event.kind == EventKind.QUERY_ANSWERED:
+            self._answered.add(event.query_id)
+        self._count_recovery(event)
+
+    def _note_arrival(self, event: Event) -> None:
+        if not self._count:
+            self.trial_id, self.experiment = event.trial_id, _experiment(event)
+            self.start_time = self._earliest_s = self._latest_s = event.wall_time
+        self._count += 1
+        self._last_seq = max(self._last_seq, event.seq)
+        self._earliest_s = min(self._earliest_s, event.wall_time)
+        self._latest_s = max(self._latest_s, event.wall_time)
+
+    def _count_recovery(self, event: Event) -> None:
+        """Count a decision to revisit or to step back, once it is carried out.
+
+        The next JUMP of the same container carries it out. A failure or a question in between
+        replaces it.
+        """
+        if event.kind == EventKind.DECISION:
+            self._oracle_seen = True
+            self._decided[event.path] = event.outcome in AUTONOMOUS_DECISIONS
+        elif event.kind in (EventKind.QUERY_OPENED, EventKind.FAILURE, EventKind.GIVE_UP):
+            self._decided[event.path] = False
+        elif event.kind == EventKind.JUMP:
+            self.recoveries += self._decided.pop(event.path, False)
+
+    def _was_stopped(self, end: Event) -> bool:
+        """Whether a shutdown or Ctrl-C ended it.
+
+        An inconsistent machine has no outcome either, but enters no state.
+        """
+        return ended_by(end, self._state_seen) in (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
+
+
+def _experiment(event: Event) -> str:
+    return event.path.strip('/').split('/')[0]
