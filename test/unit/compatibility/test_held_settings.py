@@ -1,0 +1,27 @@
+"""Settings files of version 0.1 are accepted, with the effective values that they had."""
+import pytest
+import readings
+from held import SETTINGS, expected, lacking
+
+HELD = expected('settings')
+TOKENS = 'tokens.txt'
+
+
+def test_every_file_is_read():
+    assert {path.name for path in SETTINGS.iterdir()} == set(HELD)
+
+
+@pytest.mark.parametrize('name', sorted(set(HELD) - {TOKENS}))
+def test_a_file_has_the_effective_values_that_it_had(name, monkeypatch):
+    assert not list(lacking(HELD[name], readings.settings(name, monkeypatch)))
+
+
+def test_the_tokens_of_the_console_have_the_owners_that_they_had(tmp_path):
+    assert not list(lacking(HELD[TOKENS], readings.tokens(tmp_path)))
+
+
+def test_one_of_the_files_has_no_default_value_of_the_oracle():
+    usual, other = HELD['oracle_all.yaml'], HELD['oracle_other.yaml']
+    assert not [key for key in usual if usual[key] == other[key]]
+    of_all, of_others = (file['states']['A_STATE_THAT_IS_NOWHERE'] for file in (usual, other))
+    assert [key for key in of_all if of_all[key] == of_others[key]] == ['preconditions']
