@@ -1,5 +1,7 @@
 """Run the checks, say what each found and how long it took, and end with `N passed, N failed`.
 
+The line above that one counts the checks that needed a second attempt, and names them.
+
 Called by scripts/test, in the environment of scripts/ros_env.
 """
 import argparse
@@ -13,7 +15,7 @@ from typing import Dict, List
 
 from checks import Bench, Check, benchmark_checks, lint_checks, pytest_checks, rostest_checks
 from processes import Runner
-from report import Outcome, show, write_junit
+from report import Outcome, second_attempts, show, write_junit
 
 ROOT = Path(__file__).resolve().parents[2]
 # what may run side by side: rostests wait most of their time, benchmarks must be alone
@@ -35,7 +37,10 @@ def find_checks(group: str) -> Dict[str, Check]:
 
 def select(checks: Dict[str, Check], pattern: str) -> Dict[str, Check]:
     """The checks whose name contains `pattern`, or matches it where it has wildcards."""
-    return {name: check for name, check in checks.items() if fnmatch.fnmatch(name, '*{}*'.format(pattern))}
+    return {
+        name: check
+        for name, check in checks.items() if fnmatch.fnmatch(name, '*{}*'.format(pattern))
+    }
 
 
 def run_group(checks: Dict[str, Check], bench: Bench, jobs: int) -> List[Outcome]:
@@ -55,11 +60,14 @@ def run_group(checks: Dict[str, Check], bench: Bench, jobs: int) -> List[Outcome
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog='scripts/test', description='Set up, then check everything.')
-    parser.add_argument('group', nargs='?', choices=sorted(JOBS) + ['all'], default='all',
-                        help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
-                             'package: build and install; bench: limits on speed (default: all)')
-    parser.add_argument('pattern', nargs='?', default='', help='only checks with this in their name; * is a wildcard')
+    parser = argparse.ArgumentParser(prog='scripts/test',
+                                     description='Set up, then check everything.')
+    parser.add_argument(
+        'group', nargs='?', choices=sorted(JOBS) + ['all'], default='all',
+        help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
+        'package: build and install; bench: limits on speed (default: all)')
+    parser.add_argument('pattern', nargs='?', default='',
+                        help='only checks with this in their name; * is a wildcard')
     parser.add_argument('--jobs', type=int, help='checks at a time (default: 2, benchmarks 1)')
     return parser.parse_args()
 
@@ -70,7 +78,8 @@ def _interrupt(number: int, frame: object) -> None:
 
 def main() -> int:
     arguments = parse_arguments()
-    # SIGINT too: a shell that starts this in the background has it ignored, here and in all that is started from here
+    # SIGINT too: a shell that starts this in the background has it ignored, here and in all that is
+    # started from here
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     bench = Bench(ROOT, ROOT / 'build' / 'test_results', Runner())
@@ -95,15 +104,16 @@ def _summarise(outcomes: List[Outcome], bench: Bench, seconds: float) -> int:
     print('--- {:.0f} s; results and logs in {}'.format(seconds, bench.results))
     if bad:
         print('failed: {}'.format(', '.join(bad)))
-    again = [outcome.name for outcome in outcomes if outcome.note]
-    if again:
-        print('passed at the second attempt: {}'.format(', '.join(again)))
     skipped = sum(outcome.skipped for outcome in outcomes)
     if skipped:
         print('{} skipped'.format(skipped))
-    passed, failed = (sum(getattr(outcome, name) for outcome in outcomes) for name in ('passed', 'failed'))
-    # a check without a single case counts as a failure, and so does a selection that selects nothing
-    failed += sum(1 for outcome in outcomes if not outcome.ok and not outcome.failed) + (not outcomes)
+    passed, failed = (sum(getattr(outcome, name) for outcome in outcomes)
+                      for name in ('passed', 'failed'))
+    # a check without a single case counts as a failure, and so does a selection that selects
+    # nothing
+    failed += sum(1
+                  for outcome in outcomes if not outcome.ok and not outcome.failed) + (not outcomes)
+    print(second_attempts(outcomes))
     print('{} passed, {} failed'.format(passed, failed))
     return 1 if failed else 0
 

@@ -1,7 +1,8 @@
 """Run a command with a time limit, and leave nothing of it behind.
 
-roslaunch puts every node into a session of its own, so that killing the command, or its process group, is not enough.
-Every process of a check therefore carries a mark in its environment, by which its last descendant is found.
+roslaunch puts every node into a session of its own, so that killing the command, or its process
+group, is not enough. Every process of a check therefore carries a mark in its environment, by which
+its last descendant is found.
 """
 import os
 import signal
@@ -34,8 +35,9 @@ class Runner:
             with self._lock:
                 if self.stopped:
                     return 'interrupted'
-                process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, cwd=str(cwd),
-                                           stdin=subprocess.DEVNULL, start_new_session=True,
+                process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT,
+                                           cwd=str(cwd), stdin=subprocess.DEVNULL,
+                                           start_new_session=True,
                                            env=dict(os.environ, **(env or {}), **{MARK: mark}))
                 self._running.append(process)
         try:
@@ -50,7 +52,9 @@ class Runner:
         return 'interrupted' if self.stopped else problem
 
     def stop(self) -> None:
-        """End what runs, as Ctrl-C would, or by force where that takes long; start nothing any more."""
+        """End what runs, as Ctrl-C would, or by force where that takes long; start nothing any
+        more.
+        """
         with self._lock:
             self.stopped = True
             running = list(self._running)
@@ -99,7 +103,8 @@ def kill_marked(mark: str) -> List[str]:
         if not found:
             break
         for pid in found:
-            killed[pid] = _read(pid, 'cmdline').replace(b'\0', b' ').decode(errors='replace').strip()
+            killed[pid] = _read(pid, 'cmdline').replace(b'\0',
+                                                        b' ').decode(errors='replace').strip()
             try:
                 os.kill(pid, signal.SIGKILL)
             except ProcessLookupError:

@@ -16,6 +16,7 @@ class Outcome:
     seconds: float = 0.0
     detail: str = ''
     note: str = ''  # what is to be seen of a check that passed
+    attempts: int = 1
     log: str = ''
     junit: List[Path] = field(default_factory=list)
 
@@ -26,7 +27,9 @@ class Outcome:
 
 
 def read_junit(paths: Iterable[Path], outcome: Outcome) -> None:
-    """Add the cases of JUnit files to `outcome`, and the messages of those that failed to its detail."""
+    """Add the cases of JUnit files to `outcome`, and the messages of those that failed to its
+    detail.
+    """
     for path in paths:
         try:
             root = ElementTree.parse(str(path)).getroot()
@@ -44,7 +47,8 @@ def _count(case: ElementTree.Element, outcome: Outcome) -> None:
     if problems:
         outcome.failed += 1
         text = (problems[0].text or problems[0].get('message') or '').strip()
-        outcome.detail += '{}.{}:\n{}\n'.format(case.get('classname', ''), case.get('name', ''), _tail(text, 30))
+        outcome.detail += '{}.{}:\n{}\n'.format(case.get('classname', ''), case.get('name', ''),
+                                                _tail(text, 30))
     elif case.find('skipped') is not None:
         outcome.skipped += 1
     else:
@@ -67,7 +71,8 @@ def show(outcome: Outcome) -> None:
     counts = '{} passed'.format(outcome.passed)
     for count, word in ((outcome.failed, 'failed'), (outcome.skipped, 'skipped')):
         counts += ', {} {}'.format(count, word) if count else ''
-    print('{} {:<44} {:>6.1f} s  {}'.format('ok  ' if outcome.ok else 'FAIL', outcome.name, outcome.seconds, counts))
+    print('{} {:<44} {:>6.1f} s  {}'.format('ok  ' if outcome.ok else 'FAIL', outcome.name,
+                                            outcome.seconds, counts))
     if not outcome.ok:
         detail = outcome.detail.rstrip() or 'ran, but reported no case'
         detail += '\nlog: ' + outcome.log if outcome.log else ''
@@ -76,8 +81,17 @@ def show(outcome: Outcome) -> None:
         print('\n'.join('     . ' + line for line in outcome.note.rstrip().splitlines()))
 
 
+def second_attempts(outcomes: Iterable[Outcome]) -> str:
+    """How many checks were tried twice, and which; said also where none was."""
+    again = ['{} ({})'.format(outcome.name, 'passed then' if outcome.ok else 'failed again')
+             for outcome in outcomes if outcome.attempts > 1]
+    return 'second attempts: {}{}'.format(len(again), ': ' + ', '.join(again) if again else '')
+
+
 def write_junit(outcomes: Iterable[Outcome], path: Path) -> None:
-    """Put all results into one JUnit file: a suite per check, with the suites of the tools that write their own."""
+    """Put all results into one JUnit file: a suite per check, with the suites of the tools that
+    write their own.
+    """
     root = ElementTree.Element('testsuites')
     for outcome in outcomes:
         if outcome.junit:
@@ -86,7 +100,8 @@ def write_junit(outcomes: Iterable[Outcome], path: Path) -> None:
                 root.extend([found] if found.tag == 'testsuite' else list(found))
             continue
         suite = ElementTree.SubElement(root, 'testsuite', name=outcome.name, tests='1',
-                                       failures=str(int(not outcome.ok)), time='{:.3f}'.format(outcome.seconds))
+                                       failures=str(int(not outcome.ok)),
+                                       time='{:.3f}'.format(outcome.seconds))
         case = ElementTree.SubElement(suite, 'testcase', classname='checks', name=outcome.name,
                                       time='{:.3f}'.format(outcome.seconds))
         if not outcome.ok:

@@ -1,4 +1,6 @@
-"""The package builds alone and in catkin workspaces, installs, runs where it was installed, and yields to upstream."""
+"""The package builds alone and in catkin workspaces, installs, runs where it was installed, and
+yields to upstream.
+"""
 import pytest
 from workspace import PYTHON, copy_sources, fake_upstream, run
 
@@ -33,8 +35,10 @@ def installed(tmp_path_factory):
     top = tmp_path_factory.mktemp('alone')
     copy_sources(top / 'smach_oracle')
     (top / 'out').mkdir()
-    run('cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; make -j2; make install'.format(PYTHON),
-        top / 'out')
+    run(
+        'cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; make -j2; make '
+        'install'
+        .format(PYTHON), top / 'out')
     (top / 'smach_oracle').rename(top / 'moved_away')
     (top / 'out').rename(top / 'out_moved_away')
     return top
@@ -51,7 +55,8 @@ def test_the_install_space_runs_without_its_sources(installed):
 def test_installed_messages_are_found_by_rosmsg(installed):
     assert 'local_data' in in_installed(installed, 'rosmsg show smach_msgs/SmachContainerStatus')
     assert 'seq' in in_installed(installed, 'rosmsg show smach_oracle/OracleEvent')
-    assert 'max_effort' in in_installed(installed, 'rosmsg show control_msgs/GripperCommandActionGoal')
+    assert 'max_effort' in in_installed(installed,
+                                        'rosmsg show control_msgs/GripperCommandActionGoal')
 
 
 def test_every_command_is_installed_for_rosrun(installed):
@@ -62,9 +67,10 @@ def test_every_command_is_installed_for_rosrun(installed):
 
 def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
     (installed / 'flaky.py').write_text(SCRIPT)
-    # without a master, as before the robot is switched on, is not what oracle_run is for: start one on a free port
+    # without a master, as before the robot is switched on, is not what oracle_run is for: start one
+    # on a free port
     command = '''
-        port=$(python3 -c 'from smach_oracle.simulation.experiment.launching import free_port; print(free_port())')
+        port=$(python3 -c 'from smach_oracle.experiment.launching import free_port; print(free_port())')
         export ROS_MASTER_URI=http://localhost:$port ROS_HOSTNAME=localhost ROS_LOG_DIR="$PWD/log"
         roscore -p $port >/dev/null 2>&1 & core=$!; trap 'kill -INT $core; wait $core || true' EXIT
         until rosnode list >/dev/null 2>&1; do sleep 0.2; done
@@ -79,6 +85,21 @@ def test_launch_files_and_settings_are_installed(installed):
         assert (installed / 'installed/share/smach_oracle/src/smach_oracle/tasks' / name).exists()
 
 
+def test_the_page_of_the_console_is_installed_whole(installed):
+    console = 'smach_oracle/expert/console'
+    sources = installed / 'moved_away/src' / console
+    target, = (installed / 'installed/lib').glob('python3*/*-packages/' + console)
+    names = {
+        path.relative_to(sources)
+        for path in (sources / 'static').rglob('*') if path.is_file()
+    }
+    assert names == {
+        path.relative_to(target)
+        for path in (target / 'static').rglob('*') if path.is_file()
+    }
+    assert len(names) > 40
+
+
 def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     copy_sources(tmp_path / 'src/smach_oracle')
     for name in NAMES:
@@ -88,7 +109,8 @@ def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     where = run(WHERE, tmp_path, str(tmp_path / 'devel/setup.bash'))
     assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
     check = 'import smach_oracle, smach, smach_ros, smach_msgs; print(smach.upstream, smach_ros.upstream)'
-    assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel/setup.bash'))
+    assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path,
+                              str(tmp_path / 'devel/setup.bash'))
 
 
 def test_an_isolated_workspace_builds_upstream_first_and_uses_it(tmp_path):
@@ -98,7 +120,8 @@ def test_an_isolated_workspace_builds_upstream_first_and_uses_it(tmp_path):
     assert "smach: upstream's is used" in output
     assert "smach_ros: upstream's is absent, ours stands in" in output
     check = 'import smach_oracle, smach; print(smach.upstream)'
-    assert 'True' in run('python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel_isolated/setup.bash'))
+    assert 'True' in run('python3 -c "{}"'.format(check), tmp_path,
+                         str(tmp_path / 'devel_isolated/setup.bash'))
 
 
 def test_our_stand_ins_go_when_upstream_comes(tmp_path):
@@ -113,4 +136,7 @@ def test_our_stand_ins_go_when_upstream_comes(tmp_path):
         (tmp_path / 'upstream' / name / '__init__.py').write_text('')
     output = run('PYTHONPATH="{}" cmake .. {}'.format(tmp_path / 'upstream', PYTHON), build)
     assert output.count("upstream's is used") == len(python)
-    assert not [path for name in NAMES for path in (build / 'devel').glob('lib/python3/dist-packages/' + name)]
+    assert not [
+        path for name in NAMES
+        for path in (build / 'devel').glob('lib/python3/dist-packages/' + name)
+    ]

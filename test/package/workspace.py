@@ -32,24 +32,30 @@ def copy_sources(target: Path) -> Path:
 
 
 def fake_upstream(source_space: Path, name: str) -> None:
-    """Write a catkin package that provides the Python package `name`, empty but for saying that it is upstream's."""
+    """Write a catkin package that provides the Python package `name`, empty but for saying that it
+    is upstream's.
+    """
     python = source_space / name / 'src' / name
     python.mkdir(parents=True)
     (python / '__init__.py').write_text("upstream = True\n")
-    for file, text in (('CMakeLists.txt', UPSTREAM_CMAKE), ('package.xml', UPSTREAM_XML), ('setup.py', UPSTREAM_SETUP)):
+    for file, text in (('CMakeLists.txt', UPSTREAM_CMAKE), ('package.xml', UPSTREAM_XML),
+                       ('setup.py', UPSTREAM_SETUP)):
         (source_space / name / file).write_text(text.format(name))
 
 
 def run(command: str, cwd: Path, setup: str = '', timeout_s: float = 300.0) -> str:
-    """Run a bash command in a shell without any devel space but the one whose setup.bash is `setup`; return its output.
+    """Run a bash command in a shell without any devel space but the one whose setup.bash is
+    `setup`; return its output.
 
     Raises AssertionError with the output where the command fails.
     """
-    own = ('CMAKE_PREFIX_PATH', 'PYTHONPATH', 'ROS_PACKAGE_PATH', 'PKG_CONFIG_PATH', 'LD_LIBRARY_PATH')
+    own = ('CMAKE_PREFIX_PATH', 'PYTHONPATH', 'ROS_PACKAGE_PATH', 'PKG_CONFIG_PATH',
+           'LD_LIBRARY_PATH')
     env = {name: value for name, value in os.environ.items() if name not in own}
     # Python is all that these tests look at: headers and Lisp for it would take most of the time
     env['ROS_LANG_DISABLE'] = 'gencpp:genlisp:geneus:gennodejs'
-    script = 'set -e; {} {}'.format('source "{}";'.format(setup) if setup else _ros_setup(), command)
+    script = 'set -e; {} {}'.format('source "{}";'.format(setup) if setup else _ros_setup(),
+                                    command)
     result = subprocess.run(['bash', '-c', script], cwd=str(cwd), env=env, stdout=subprocess.PIPE,
                             stderr=subprocess.STDOUT, timeout=timeout_s, check=False)
     output = result.stdout.decode(errors='replace')

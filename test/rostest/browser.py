@@ -9,19 +9,26 @@ import time
 
 from selenium import webdriver
 from selenium.common.exceptions import (
-    ElementClickInterceptedException, ElementNotInteractableException, StaleElementReferenceException,
-    WebDriverException)
+    ElementClickInterceptedException,
+    ElementNotInteractableException,
+    StaleElementReferenceException,
+    WebDriverException,
+)
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from urllib3.exceptions import MaxRetryError
 from waiting import wait_for
 
-FLAGS = ['--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run', '--disable-background-networking',
-         '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage', '--disable-extensions',
-         '--mute-audio', '--disable-background-timer-throttling']
+FLAGS = [
+    '--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run',
+    '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    '--disable-dev-shm-usage', '--disable-extensions', '--mute-audio',
+    '--disable-background-timer-throttling'
+]
 # what is about to be replaced, moved, or uncovered
-NOT_YET = (StaleElementReferenceException, ElementClickInterceptedException, ElementNotInteractableException)
+NOT_YET = (StaleElementReferenceException, ElementClickInterceptedException,
+           ElementNotInteractableException)
 
 
 class Browser:
@@ -30,11 +37,14 @@ class Browser:
     def __init__(self, width=1360, height=860):
         self._profile = tempfile.mkdtemp(prefix='console-browser-')
         options = Options()
-        for flag in FLAGS + ['--user-data-dir=' + self._profile, '--window-size={},{}'.format(width, height)]:
+        for flag in FLAGS + [
+                '--user-data-dir=' + self._profile, '--window-size={},{}'.format(width, height)
+        ]:
             options.add_argument(flag)
         options.accept_insecure_certs = True  # such as tests make themselves
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-        self.driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')), options=options)
+        self.driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')),
+                                       options=options)
         self.driver.set_page_load_timeout(30)
 
     def close(self):
@@ -53,11 +63,15 @@ class Browser:
         """The first element that is there and shown; raises where none comes in time."""
         found = wait_for(lambda: self._shown(selector), limit_s)
         if not found:
-            raise AssertionError('nothing on the page for {!r}; it says:\n{}'.format(selector, self.text()[:2000]))
+            raise AssertionError('nothing on the page for {!r}; it says:\n{}'.format(
+                selector,
+                self.text()[:2000]))
         return found
 
     def click(self, selector, limit_s=40.0):
-        """Click what is there, shown and enabled; the page may replace, move or cover it in between."""
+        """Click what is there, shown and enabled; the page may replace, move or cover it in
+        between.
+        """
         def clicked():
             try:
                 element = self._shown(selector)
@@ -68,7 +82,9 @@ class Browser:
             except NOT_YET:
                 return False
         if not wait_for(clicked, limit_s):
-            raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000]))
+            raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(
+                selector,
+                self.text()[:2000]))
 
     def tap(self, selector):
         """With a finger, in the middle of what is there and shown."""
@@ -76,7 +92,8 @@ class Browser:
                         'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
                         'return [x + width / 2, y + height / 2]', self.find(selector))
         for kind, points in (('touchStart', [{'x': x, 'y': y}]), ('touchEnd', [])):
-            self.driver.execute_cdp_cmd('Input.dispatchTouchEvent', {'type': kind, 'touchPoints': points})
+            self.driver.execute_cdp_cmd('Input.dispatchTouchEvent',
+                                        {'type': kind, 'touchPoints': points})
 
     def says(self, text, selector='body', limit_s=40.0):
         """Whether an element comes to hold a text."""
@@ -95,9 +112,14 @@ class Browser:
         return self.driver.execute_script(script, *arguments)
 
     def errors(self):
-        """What the page's console complains of: exceptions and violations of its policy, not lost connections."""
-        return [entry['message'] for entry in self.driver.get_log('browser') if entry['level'] == 'SEVERE'
-                and 'net::ERR_' not in entry['message'] and 'WebSocket connection' not in entry['message']]
+        """What the page's console complains of: exceptions and violations of its policy, not lost
+        connections.
+        """
+        return [
+            entry['message'] for entry in self.driver.get_log('browser')
+            if entry['level'] == 'SEVERE' and 'net::ERR_' not in entry['message']
+            and 'WebSocket connection' not in entry['message']
+        ]
 
     def screenshot(self, path, width=None, height=None):
         """A picture of the page, at another size where given."""
@@ -117,7 +139,8 @@ class Browser:
 
 def _below(process):
     """The processes that a process has started, and those that they have."""
-    listed = subprocess.run(['ps', '-e', '-o', 'pid=,ppid='], stdout=subprocess.PIPE, check=True).stdout.decode()
+    listed = subprocess.run(['ps', '-e', '-o', 'pid=,ppid='], stdout=subprocess.PIPE,
+                            check=True).stdout.decode()
     pairs = [tuple(map(int, line.split())) for line in listed.splitlines()]
     found = []
     new = [pid for pid, parent in pairs if parent == process]

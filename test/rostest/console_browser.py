@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The operator console in a real browser: real node, real master, a real machine under a real oracle."""
+"""The operator console in a real browser: real node, real master, a real machine under a real
+oracle.
+"""
 import os
 import shutil
 import subprocess
@@ -19,6 +21,27 @@ from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'
+UNKNOWN_SUCCESS = '''return import("/static/js/answering/state_choices.js").then(
+({ stateLines }) => (
+  stateLines({ state: "PICK", success: null, class: 0, visits: 0, missing: [], preconditions: [],
+    blocked: "", helped: [0, 0] }, "PLACE")[0].textContent))'''
+NO_PLACE = '''return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
+  const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));
+  const view = new GraphView(() => {});
+  view.set("/alpha", { path: "A", oracle: "O", drawn: true, size: [9, 9], states, outcomes: [],
+    edges: [] });
+  return view.root.querySelectorAll(".state").length;
+})'''
+
+BARS = '''return import("/static/js/questions/claim_bar.js").then(({ ClaimBar }) => {
+  const bar = new ClaimBar({ leave() {}, claim() {}, takeOver() {} });
+  const now = { holder: "ann", status: "claimed", interface: "" };
+  return [false, true].map((mayAnswer) => {
+    bar.show({ settled: false, now, mine: false, held: false, claiming: false, sending: false,
+      problem: "", mayAnswer });
+    return bar.root.textContent;
+  });
+})'''
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -49,24 +72,31 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
     def test_1_a_question_is_shown_whole_and_answered_in_two_actions(self):
         browser = self.browser
         browser.find(QUESTION)
-        self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')), 'the title tells of it')
+        self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')),
+                        'the title tells of it')
         browser.click(QUESTION)
         self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
         for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'missing: grasp',
                      'assist', '"mug"'):
             self.assertIn(told, browser.text())
         self.assertTrue(browser.says('DETECT unknown'), 'the preconditions are looked at')
-        self.assertIsNone(browser.run('return window.hacked || document.querySelector(".failure b") || null'),
-                          'what a robot says is text')
-        self.assertTrue(wait_for(lambda: browser.run(
-            'return document.getElementById("/alpha/KITCHEN/FETCH/PICK").classList.contains("failed")')),
-            'the failed state is marked in its graph')
+        self.assertIsNone(
+            browser.run('return window.hacked || document.querySelector(".failure b") || null'),
+            'what a robot says is text')
+        self.assertTrue(
+            wait_for(lambda: browser.run(
+                'return document.getElementById("/alpha/KITCHEN/FETCH/PICK")'
+                '.classList.contains("failed")'
+            )), 'the failed state is marked in its graph')
         browser.find('[data-output=grasp]').send_keys('{"width_m": 0.04}')
         browser.click('.choice.supersede[data-name=succeeded]')
-        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'), 'what happened next')
-        self.assertTrue(wait_for(lambda: 'succeeded' in self.outcomes(OracleEvent.TRIAL_END, 'outcome')))
+        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'),
+                        'what happened next')
+        self.assertTrue(
+            wait_for(lambda: 'succeeded' in self.outcomes(OracleEvent.TRIAL_END, 'outcome')))
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[0], 'operator')
-        self.assertTrue(wait_for(lambda: 'answer' in [told.command for told in self.audited if told.ok]))
+        self.assertTrue(
+            wait_for(lambda: 'answer' in [told.command for told in self.audited if told.ok]))
         self.assertEqual(browser.errors(), [])
 
     def test_2_a_page_comes_back_with_its_claim_after_the_server_was_restarted(self):
@@ -82,7 +112,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         type(self).console = self.start_console()
         self.assertTrue(browser.says('live', '#status', 40.0))
         self.assertTrue(browser.says(YOURS, limit_s=40.0), 'the claim is kept')
-        self.assertEqual(browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost')
+        self.assertEqual(
+            browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost')
 
     def test_3_a_second_console_takes_over_and_answers(self):
         browser = self.browser
@@ -96,7 +127,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('bob', '#person'))
         browser.click(QUESTION)
         self.assertTrue(browser.says('operator works on it.'))
-        self.assertFalse(browser.find('.choice.goto').is_enabled(), 'nobody answers what another one holds')
+        self.assertFalse(
+            browser.find('.choice.goto').is_enabled(), 'nobody answers what another one holds')
         browser.click('[data-action=take-over]')
         self.assertTrue(browser.says(YOURS))
         first, second = browser.driver.window_handles
@@ -107,7 +139,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.find('body').send_keys('3')
         self.assertTrue(browser.says('The machine goes to PLACE.', '.follow-up'))
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
-        self.assertIn(('take_over', 'bob', True), [(told.command, told.expert, told.ok) for told in self.audited])
+        self.assertIn(('take_over', 'bob', True),
+                      [(told.command, told.expert, told.ok) for told in self.audited])
 
     def test_3_on_a_phone_two_taps_answer_and_what_happens_next_is_at_the_top(self):
         browser = self.browser
@@ -117,12 +150,15 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})
         browser.tap(QUESTION)
         self.assertTrue(browser.says(YOURS))
-        self.assertTrue(browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'), 'how often it helped before')
-        self.assertTrue(wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled()))
+        self.assertTrue(browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'),
+                        'how often it helped before')
+        self.assertTrue(
+            wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled()))
         browser.tap('.choice.goto[data-name=PLACE]')
         self.assertTrue(browser.says('The trial ended with succeeded.', '.follow-up'))
-        top, bottom = browser.run('const box = document.querySelector(".follow-up").getBoundingClientRect();'
-                                  'return [box.top, box.bottom]')
+        top, bottom = browser.run(
+            'const box = document.querySelector(".follow-up").getBoundingClientRect();'
+            'return [box.top, box.bottom]')
         self.assertTrue(0 < top < bottom < 844, (top, bottom))
 
     def test_4_machines_and_trials_are_shown(self):
@@ -136,11 +172,19 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('with oracle', '.panel.trials table'))
         browser.click('.trial:first-child')
         self.assertTrue(browser.says('failed', '.event-log'))
-        added = ('return import("/static/js/format.js").then(({ added }) => '
-                 '["It warns: no cup", "PICK failed."].map((words) => added({ words, text: "no cup" })))')
+        added = (
+            'return import("/static/js/page/format.js").then(({ added }) => '
+            '["It warns: no cup", "PICK failed."].map((words) => added({ words, text: "no cup" })))'
+        )
         self.assertEqual(browser.run(added), ['', ' no cup'], 'nothing is told twice')
+        self.assertEqual(browser.run(UNKNOWN_SUCCESS), 'PICK–', 'not drawn as a failure')
+        self.assertEqual(browser.run(NO_PLACE), 1, 'it costs the other states nothing')
+        viewers, operators = browser.run(BARS)
+        self.assertIn('as a viewer', viewers)
+        self.assertEqual(operators, 'ann works on it. Take it over', 'a role may change')
         browser.find('.timeline .mark')
-        self.assertTrue(wait_for(lambda: not browser.text('.trial-detail p').startswith('0 s')), 'it runs on')
+        self.assertTrue(wait_for(lambda: not browser.text('.trial-detail p').startswith('0 s')),
+                        'it runs on')
         self.assertEqual(browser.errors(), [])
 
     def test_5_every_command_about_a_trial_is_in_its_bag(self):
@@ -149,8 +193,10 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
             for path in sorted(os.listdir(self.bags)):
                 if path.endswith('.bag'):
                     with rosbag.Bag(os.path.join(self.bags, path)) as bag:
-                        commands += [message.command
-                                     for _, message, _ in bag.read_messages('/alpha/expert_query/audit')]
+                        commands += [
+                            message.command
+                            for _, message, _ in bag.read_messages('/alpha/expert_query/audit')
+                        ]
             return commands
         self.assertTrue(wait_for(lambda: 'take_over' in told()))
         self.assertEqual(told()[:2], ['claim', 'answer'])
@@ -169,7 +215,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         for page in (second, first):
             browser.driver.switch_to.window(page)
             browser.find('#token')
-        # both have begun a session, and the cookie is of the one that came last: here not of the page that is looked at
+        # both have begun a session, and the cookie is of the one that came last: here not of the
+        # page that is looked at
         browser.driver.delete_all_cookies()
         browser.run('return fetch("session").then((answer) => answer.json())')
         self.sign_in('no such token')
@@ -177,14 +224,19 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.sign_in(self.token_of('viewer', tokens))
         self.assertTrue(browser.says('(viewer)', '#person'), browser.text())
         browser.driver.switch_to.window(second)
-        self.assertTrue(browser.says('bob (viewer)'), 'the other page is signed in, too, once it is looked at')
+        self.assertTrue(browser.says('bob (viewer)'),
+                        'the other page is signed in, too, once it is looked at')
         browser.click('#person')
         browser.click('dialog button')
         for page in (second, first):
             browser.driver.switch_to.window(page)
-            self.assertTrue(browser.says('Sign in', 'h1'), 'to sign out ends all pages of this browser')
-            self.assertTrue(browser.says('You have signed out' + (' on another page' if page == first else '.')))
-            self.assertEqual(browser.text('#nav'), '', 'nothing leads back to what was shown before')
+            self.assertTrue(browser.says('Sign in', 'h1'),
+                            'to sign out ends all pages of this browser')
+            self.assertTrue(
+                browser.says('You have signed out' +
+                             (' on another page' if page == first else '.')))
+            self.assertEqual(browser.text('#nav'), '',
+                             'nothing leads back to what was shown before')
         self.sign_in(self.token_of('viewer', tokens))
         browser.click('#tab-questions')
         browser.click(QUESTION)
@@ -194,38 +246,51 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
     def test_7_encrypted_the_page_and_its_socket_work_and_the_cookie_is_for_nothing_else(self):
         browser, tokens = self.browser, os.path.join(self.bags, 'tokens')
         certificate, key = (os.path.join(self.bags, name) for name in ('own.pem', 'own.key'))
-        subprocess.run(['openssl', 'req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
-                        '/CN=localhost', '-keyout', key, '-out', certificate], check=True, stderr=subprocess.PIPE)
+        subprocess.run([
+            'openssl', 'req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
+            '/CN=localhost', '-keyout', key, '-out', certificate
+        ], check=True, stderr=subprocess.PIPE)
         type(self).console.stop()
         browser.driver.delete_all_cookies()
-        type(self).console = self.start_console('_token_file:=' + tokens, '_certificate:=' + certificate,
+        type(self).console = self.start_console('_token_file:=' + tokens,
+                                                '_certificate:=' + certificate,
                                                 '_private_key:=' + key)
         self.assertTrue(wait_for(self.page_is_served, 40.0))
         browser.driver.get(self.page.replace('http', 'https'))
         browser.find('#token', 40.0).send_keys(self.token_of('operator', tokens))
         browser.click('#sign-in')
         self.assertTrue(browser.says('live', '#status'), 'its socket is encrypted as well')
-        self.assertEqual(browser.run('return fetch("session").then((answer) => answer.json()).then((it) => it.role)'),
-                         'operator')
-        cookie, = [each for each in browser.driver.get_cookies() if each['name'].startswith('console_')]
-        self.assertEqual((cookie['secure'], cookie['httpOnly'], cookie['sameSite']), (True, True, 'Strict'))
+        self.assertEqual(
+            browser.run(
+                'return fetch("session").then((answer) => answer.json()).then((it) => it.role)'),
+            'operator')
+        cookie, = [
+            each for each in browser.driver.get_cookies() if each['name'].startswith('console_')
+        ]
+        self.assertEqual((cookie['secure'], cookie['httpOnly'], cookie['sameSite']),
+                         (True, True, 'Strict'))
         self.assertEqual(browser.run('return document.cookie'), '', 'no script can read it')
 
     def test_8_the_page_runs_nothing_that_is_not_its_own(self):
         browser = self.browser
         image = "'<img src=x onerror=\"window.hacked = 1\">'"
-        for attack in ('document.body.insertAdjacentHTML("beforeend", {})'.format(image),
-                       'document.body.innerHTML = ' + image, 'eval("window.hacked = 1")',
-                       'new Function("window.hacked = 1")()', 'setTimeout("window.hacked = 1")',
-                       'const it = document.createElement("script"); it.append("window.hacked = 1");'
-                       'document.body.append(it)', 'location.href = "javascript:window.hacked = 1"',
-                       'const it = document.createElement("b"); it.setAttribute("onclick", "window.hacked = 1");'
-                       'document.body.append(it); it.click()'):
+        for attack in (
+                'document.body.insertAdjacentHTML("beforeend", {})'.format(image),
+                'document.body.innerHTML = ' + image, 'eval("window.hacked = 1")',
+                'new Function("window.hacked = 1")()', 'setTimeout("window.hacked = 1")',
+                'const it = document.createElement("script"); it.append("window.hacked = 1");'
+                'document.body.append(it)', 'location.href = "javascript:window.hacked = 1"',
+                'const it = document.createElement("b"); it.setAttribute("onclick", '
+                '"window.hacked = 1");'
+                'document.body.append(it); it.click()'):
             browser.run(  # not at once: the policy does not bind what a test runs itself
-                'return new Promise((done) => setTimeout(() => {{ setTimeout(done, 100); {} }}))'.format(attack))
+                'return new Promise((done) => setTimeout(() => {{ setTimeout(done, 100); {} }}))'.
+                format(attack))
             self.assertIsNone(browser.run('return window.hacked'), attack)
-        browser.run('return fetch("https://127.0.0.1:{}/session").catch(() => null)'.format(self.port))
-        self.assertTrue(any('connect-src' in error for error in browser.errors()), 'and it speaks to nobody else')
+        browser.run('return fetch("https://127.0.0.1:{}/session").catch(() => null)'.format(
+            self.port))
+        self.assertTrue(any('connect-src' in error for error in browser.errors()),
+                        'and it speaks to nobody else')
 
 
 if __name__ == '__main__':

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The simulated PR2 driven from a real browser, with its camera beside: where the hand goes, and how soon it stands."""
+"""The simulated PR2 driven from a real browser, with its camera beside: where the hand goes, and
+how soon it stands.
+"""
 import contextlib
 import os
 import shutil
@@ -11,20 +13,21 @@ import numpy as np
 import rospy
 import rostest
 import tf2_ros
-from control_msgs.msg import PointHeadAction, PointHeadGoal
 from geometry_msgs.msg import Point, PointStamped, Pose, Quaternion, Vector3
 from roslib.packages import find_node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+
+from control_msgs.msg import PointHeadAction, PointHeadGoal
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import Node  # noqa: E402
 from thin_line import ThinLine  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
+from smach_oracle.experiment.launching import free_port  # noqa: E402
 from smach_oracle.geometry.transforms import from_quaternion  # noqa: E402
 from smach_oracle.msg import CollisionBoxes, ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
@@ -48,14 +51,16 @@ class Robot:
         self._listener = tf2_ros.TransformListener(self._buffer)
         self.joints, self.commands, self.states, self.audited = [], [], [], []
         for topic, kind, take in (('joint_states', JointState, self.joints.append),
-                                  ('manipulation_interface/command', TeleopCommand, self.commands.append),
-                                  ('manipulation_interface/state', TeleopState, self.states.append),
+                                  ('manipulation_interface/command', TeleopCommand,
+                                   self.commands.append), ('manipulation_interface/state',
+                                                           TeleopState, self.states.append),
                                   ('expert_console/audit', ConsoleCommand, self.audited.append)):
             rospy.Subscriber(topic, kind, take, queue_size=200, tcp_nodelay=True)
 
     def pose(self, frame):
         """4x4, the base from a frame, by TF."""
-        found = self._buffer.lookup_transform(BASE, frame, rospy.Time(), rospy.Duration(20)).transform
+        found = self._buffer.lookup_transform(BASE, frame, rospy.Time(),
+                                              rospy.Duration(20)).transform
         at, turn = found.translation, found.rotation
         return from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
@@ -70,14 +75,18 @@ class Robot:
                          if name.startswith(side[0] + '_') and 'gripper' not in name])
 
     def moved_last(self, side, since):
-        """When (s) an arm was last told to be elsewhere than right before; `since`: looked at from then on."""
+        """When (s) an arm was last told to be elsewhere than right before; `since`: looked at from
+        then on.
+        """
         told = [each for each in self.joints if each.header.stamp.to_sec() >= since]
         return max((after.header.stamp.to_sec() for before, after in zip(told, told[1:])
-                    if np.abs(self.arm(after, side) - self.arm(before, side)).max() > STANDS), default=0.0)
+                    if np.abs(self.arm(after, side) - self.arm(before, side)).max() > STANDS),
+                   default=0.0)
 
     def look_at_the_table(self):
         """Tilts the camera, too: its axes are others than the base's."""
-        head = actionlib.SimpleActionClient('head_traj_controller/point_head_action', PointHeadAction)
+        head = actionlib.SimpleActionClient('head_traj_controller/point_head_action',
+                                            PointHeadAction)
         assert head.wait_for_server(rospy.Duration(60))
         head.send_goal_and_wait(PointHeadGoal(
             target=PointStamped(Header(frame_id='base_link'), Point(0.6, -0.2, 0.7)),
@@ -94,7 +103,8 @@ class Drive(unittest.TestCase):
         cls.line = ThinLine(port)
         cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
                            '__name:=expert_console')
-        cls.machine = Node(sys.executable, os.path.join(HERE, 'console_drive_pr2_robot.py'), '__name:=alpha')
+        cls.machine = Node(sys.executable, os.path.join(HERE, 'console_drive_pr2_robot.py'),
+                           '__name:=alpha')
         cls.browser = Browser(1360, 1000)
         cls.robot.look_at_the_table()
         assert wait_for(cls.page_is_served, 40.0)
@@ -110,7 +120,8 @@ class Drive(unittest.TestCase):
     def page_is_served(cls):
         try:
             cls.browser.driver.get('http://localhost:{}/'.format(cls.line.port))
-            return cls.browser.driver.title.endswith('Operator console')  # not the browser's own page of an error
+            # not the browser's own page of an error
+            return cls.browser.driver.title.endswith('Operator console')
         except Exception:  # whatever the driver says of a page that is not there yet
             return False
 
@@ -124,7 +135,9 @@ class Drive(unittest.TestCase):
     def stands(self, side):
         """Wait until the arm does; its tool's pose."""
         now = rospy.Time.now().to_sec()
-        self.assertTrue(wait_for(lambda: rospy.Time.now().to_sec() - max(now, self.robot.moved_last(side, now)) > 0.3))
+        self.assertTrue(
+            wait_for(lambda: rospy.Time.now().to_sec() - max(now, self.robot.moved_last(side, now))
+                     > 0.3))
         return self.robot.pose(TOOLS[side])
 
     def drive(self, key, side='right'):
@@ -141,7 +154,10 @@ class Drive(unittest.TestCase):
     def take_the_wheel(self):
         """Or keep it; what the page says counts once the console agrees."""
         def agreed():
-            told = [each.command for each in self.robot.audited if each.ok and each.command.endswith('_wheel')]
+            told = [
+                each.command for each in self.robot.audited
+                if each.ok and each.command.endswith('_wheel')
+            ]
             drives = told[-1:] == ['take_wheel']
             if drives == ('You drive.' in self.browser.text('.driver')):
                 return 'drives' if drives else 'stands by'
@@ -154,13 +170,14 @@ class Drive(unittest.TestCase):
         browser = self.browser
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=manipulation]')
-        browser.find('.hand', 40.0)
+        browser.find('.manipulation', 40.0)
         self.take_the_wheel()
         browser.find('[data-arm=left][aria-pressed=true]')
         browser.click('[data-frame=base]')
         right = self.stands('right')
         self.assert_along(self.drive('w', 'left'), np.array([1.0, 0.0, 0.0]))
-        self.assertLess(np.abs(self.robot.pose(TOOLS['right']) - right).max(), 0.01, 'the other one stands')
+        self.assertLess(
+            np.abs(self.robot.pose(TOOLS['right']) - right).max(), 0.01, 'the other one stands')
         browser.click('[data-arm=right]')
         browser.find('[data-arm=right][aria-pressed=true]')
 
@@ -174,13 +191,15 @@ class Drive(unittest.TestCase):
         self.assert_along(self.drive('w'), axis)
         self.key(Keys.ARROW_LEFT, True)
         begin = self.robot.pose(TOOLS['right'])
-        self.assertTrue(wait_for(lambda: abs(self.turned(begin)) > 0.35), 'it turns about the camera\'s vertical')
+        self.assertTrue(wait_for(lambda: abs(self.turned(begin)) > 0.35),
+                        'it turns about the camera\'s vertical')
         self.key(Keys.ARROW_LEFT, False)
         browser.click('[data-frame=tool]')
         axis = self.stands('right')[:3, 0]
         self.assertLess(axis[0], 0.97, 'the tool\'s axis is none of the base\'s')
         self.assert_along(self.drive('s'), -axis)
-        self.assertLess(np.abs(self.robot.pose(TOOLS['left']) - left).max(), 0.01, 'the other one stands')
+        self.assertLess(
+            np.abs(self.robot.pose(TOOLS['left']) - left).max(), 0.01, 'the other one stands')
 
     def turned(self, begin):
         """rad."""
@@ -190,10 +209,13 @@ class Drive(unittest.TestCase):
     def test_3_by_the_controls_on_the_screen_beside_a_live_camera(self):
         browser = self.browser
         browser.click('[data-frame=base]')
-        self.assertTrue(wait_for(lambda: browser.run(
-            'const c = document.querySelector(".drive-camera canvas");'
-            'if (!c || c.width < 100) return false; const d = c.getContext("2d").getImageData(0, 0, c.width, c.height);'
-            'return new Set(d.data).size > 50'), 40.0), 'the camera\'s picture')
+        self.assertTrue(
+            wait_for(
+                lambda: browser.run(
+                    'const c = document.querySelector(".drive-camera canvas");'
+                    'if (!c || c.width < 100) return false; const d = '
+                    'c.getContext("2d").getImageData(0, 0, c.width, c.height);'
+                    'return new Set(d.data).size > 50'), 40.0), 'the camera\'s picture')
         begin = self.stands('right')
         pad = browser.find('.pad[data-move=left]')
         ActionChains(browser.driver, duration=0).click_and_hold(pad).perform()
@@ -202,7 +224,8 @@ class Drive(unittest.TestCase):
         self.assert_along((self.stands('right') - begin)[:3, 3], np.array([0.0, 1.0, 0.0]))
 
     def time_to_stop(self, stop, key):
-        """s of the world's time from the command to stop, or from the last one to move, until the arm stands.
+        """s of the world's time from the command to stop, or from the last one to move, until the
+        arm stands.
 
         `stop` lasts until the arm has been seen to stand.
         """
@@ -211,21 +234,27 @@ class Drive(unittest.TestCase):
         self.assertTrue(self.gone(begin, 'right', 0.015), self.robot.states[-1:])
         begun = rospy.Time.now().to_sec() - 0.3
         with stop():
-            self.assertTrue(wait_for(lambda: rospy.Time.now().to_sec() - self.robot.moved_last('right', begun) > 0.4))
+            self.assertTrue(
+                wait_for(lambda: rospy.Time.now().to_sec() - self.robot.moved_last('right', begun) >
+                         0.4))
             held = [each.dead_man for each in self.robot.commands]
             last = len(held) - 1 - held[::-1].index(True)
             told = self.robot.commands[last:last + 2][-1]  # the release, where there is one
             self.key(key, False)
         moved = self.robot.moved_last('right', begun)
-        return moved - told.header.stamp.to_sec() if moved else float('inf')  # it stood before: this says nothing
+        # it stood before: this says nothing
+        return moved - told.header.stamp.to_sec() if moved else float('inf')
 
     def assert_stops(self, what, stop):
-        """The least of a few: a machine that is busy with others delays the test, too, and the nodes under test."""
+        """The least of a few: a machine that is busy with others delays the test, too, and the
+        nodes under test.
+        """
         times = []
         while len(times) < 2 or min(times) >= STOPS_WITHIN_S and len(times) < 8:
             self.take_the_wheel()
             times.append(self.time_to_stop(stop, 'ad'[len(times) % 2]))
-        rospy.loginfo('%s: stands after %s ms', what, ['{:.0f}'.format(each * 1e3) for each in times])
+        rospy.loginfo('%s: stands after %s ms', what,
+                      ['{:.0f}'.format(each * 1e3) for each in times])
         self.assertLess(min(times), STOPS_WITHIN_S, (what, times))
 
     def test_4_it_stands_when_the_key_is_let_go_the_page_is_hidden_or_the_link_is_lost(self):
@@ -236,8 +265,9 @@ class Drive(unittest.TestCase):
 
         @contextlib.contextmanager
         def hidden():
-            self.browser.run('Object.defineProperty(document, "hidden", {value: true, configurable: true});'
-                             'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden')
+            self.browser.run(
+                'Object.defineProperty(document, "hidden", {value: true, configurable: true});'
+                'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden')
             yield
 
         @contextlib.contextmanager
@@ -261,9 +291,11 @@ class Drive(unittest.TestCase):
         self.addCleanup(boxes.publish, CollisionBoxes(Header(frame_id=BASE), '', [], [], []))
         self.assertTrue(self.browser.says('1 box', '[data-fact=around]'))
         self.key('f', True)
-        self.assertTrue(wait_for(lambda: 'table' in self.robot.states[-1].limit), self.robot.states[-1])
+        self.assertTrue(wait_for(lambda: 'table' in self.robot.states[-1].limit),
+                        self.robot.states[-1])
         self.assertTrue(self.browser.says('table', '.drive-light'), 'the page says what slows it')
-        self.assertTrue(wait_for(lambda: self.robot.states[-1].speed < 0.5), 'the nearer the slower')
+        self.assertTrue(wait_for(lambda: self.robot.states[-1].speed < 0.5),
+                        'the nearer the slower')
         self.key('f', False)
 
     def test_6_the_gripper_and_then_the_machine_goes_on(self):
@@ -279,8 +311,10 @@ class Drive(unittest.TestCase):
         self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'))
         placed = wait_for(lambda: rospy.get_param('/alpha/placed', None))
         self.assertEqual(placed['frame'], BASE)
-        self.assertLess(np.linalg.norm(tool[:3, 3] - placed['at']), 0.03, 'of the arm that was driven')
-        self.assertTrue(wait_for(lambda: 'leave_wheel' in [told.command for told in self.robot.audited]))
+        self.assertLess(np.linalg.norm(tool[:3, 3] - placed['at']), 0.03,
+                        'of the arm that was driven')
+        self.assertTrue(
+            wait_for(lambda: 'leave_wheel' in [told.command for told in self.robot.audited]))
         self.assertEqual(browser.errors(), [])
 
 

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""A PR2 that never picks anything up by itself: its PLACE tells, as a parameter, what it was given."""
+"""A PR2 that never picks anything up by itself: its PLACE tells, as a parameter, what it was
+given.
+"""
 import rospy
-import smach
 
+import smach
 from smach_oracle import OracleContainer
 
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
@@ -38,9 +40,15 @@ def main():
     with sm:
         smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Place())
-    OracleContainer.wrap(sm, name='FETCH', settings={
-        'prior': 0.8, 'deadline_s': 600.0, 'interfaces': {'manipulation': {
-            'action': '/manipulation_interface', 'description': 'Drive the hand', 'states': ['PICK']}}})
+    OracleContainer.wrap(
+        sm, name='FETCH', settings={
+            'prior': 0.8, 'deadline_s': 600.0, 'interfaces': {
+                'manipulation': {
+                    'action': '/manipulation_interface', 'description': 'Drive the hand',
+                    'states': ['PICK']
+                }
+            }
+        })
     sm.execute()
     rospy.spin()
 

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Many robots, each a process of its own: their WORK fails, each goes where it is sent, and tells where that was."""
+"""Many robots, each a process of its own: their WORK fails, each goes where it is sent, and tells
+where that was.
+"""
 import os
 import signal
 import sys
 
 import rospy
-import smach
 
+import smach
 from smach_oracle import OracleContainer
 
 OUTCOMES = ['succeeded', 'aborted']
@@ -42,7 +44,8 @@ def run(number, robots):
         smach.StateMachine.add('WORK', Work())
         for each in range(robots):
             smach.StateMachine.add('PLAN_{}'.format(each), Plan(each))
-    OracleContainer.wrap(sm, name='JOB', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0})
+    OracleContainer.wrap(sm, name='JOB',
+                         settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0})
     sm.execute()
     rospy.set_param('~ended', True)
     rospy.spin()

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The situation now and the past, in a real browser: preconditions, the camera at the failure, replay, and old bags."""
+"""The situation now and the past, in a real browser: preconditions, the camera at the failure,
+replay, and old bags.
+"""
 import os
 import shutil
 import sys
@@ -16,9 +18,9 @@ from console_page import WITH_BROWSER, ConsolePage, Node  # noqa: E402
 from published_camera import PublishedCamera  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
+from smach_oracle.experiment.launching import free_port  # noqa: E402
 from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, OpenQueries  # noqa: E402
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
-from smach_oracle.simulation.world.scene import Body  # noqa: E402
+from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
 
 if WITH_BROWSER:
     from browser import Browser  # noqa: E402
@@ -28,8 +30,10 @@ TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.9, 0
 CAMERA = '/head_camera/rgb/image_raw'
 QUESTION = '.question-row[data-key^="/alpha/"]'
 PICK = '.choice.goto[data-name=PICK]'
-MIDDLE = ('const c = document.querySelector(arguments[0]); if (!c) return null; const p = c.getContext("2d")'
-          '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]')
+MIDDLE = (
+    'const c = document.querySelector(arguments[0]); if (!c) return null; const p = '
+    'c.getContext("2d")'
+    '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]')
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -75,27 +79,32 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         told = browser.text(PICK)
         self.assertIn("camera_answers unknown: raised RuntimeError('no <b>camera</b>')", told)
         self.assertIn('DETECT unknown: only running it would tell; its last visit succeeded', told)
-        self.assertTrue(browser.says('has not come back for', '.choice.goto[data-name=PLACE]'), 'and holds nobody up')
+        self.assertTrue(browser.says('has not come back for', '.choice.goto[data-name=PLACE]'),
+                        'and holds nobody up')
         rospy.set_param('/alpha/hand_is_free', True)
-        self.assertTrue(browser.says('hand_is_free holds', PICK), 'what changes is told while the question is open')
+        self.assertTrue(browser.says('hand_is_free holds', PICK),
+                        'what changes is told while the question is open')
         self.assertIn('as of', browser.text(PICK))
-        self.assertEqual(rospy.get_param('/alpha/looked_at_the_door'), 1, 'what hangs is not called again')
+        self.assertEqual(rospy.get_param('/alpha/looked_at_the_door'), 1,
+                         'what hangs is not called again')
 
     def test_2_the_frame_of_the_failure_is_there_and_a_live_one_beside_it(self):
         browser = self.browser
         frames = rospy.wait_for_message('/alpha/failure_frames', FailureFrames, 20.0)
         self.assertEqual((frames.query_id, frames.topics), (self.question().query_id, [CAMERA]))
-        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.still-view.shown canvas')))
-        self.assertEqual(browser.text('.still-view figcaption .dim'), 'at the failure')
+        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.failure-image.shown canvas')))
+        self.assertEqual(browser.text('.failure-image figcaption .dim'), 'at the failure')
         self.assertTrue(wait_for(lambda: self.printed.get_num_connections()))
         self.printed.publish(InterfaceOutput(query_id=frames.query_id, lines=['ready']))
-        red = browser.run(MIDDLE, '.still-view canvas')
+        red = browser.run(MIDDLE, '.failure-image canvas')
         self.assertGreater(red[0], red[2] + 40)
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
         browser.click('[data-action=live-camera]')
-        self.assertTrue(wait_for(lambda: (lambda now: now and now[2] > now[0] + 40)(
-            browser.run(MIDDLE, '.pane.now .camera-view.shown canvas'))), 'the live one has changed')
-        self.assertEqual(browser.run(MIDDLE, '.still-view canvas'), red, 'the other has not')
+        self.assertTrue(
+            wait_for(lambda: (lambda now: now and now[2] > now[0] + 40)
+                     (browser.run(MIDDLE, '.pane.now .camera-view.shown canvas'))),
+            'the live one has changed')
+        self.assertEqual(browser.run(MIDDLE, '.failure-image canvas'), red, 'the other has not')
 
     def test_3_outputs_are_written_as_what_they_are(self):
         browser = self.browser
@@ -117,11 +126,15 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
 
     def test_4_a_trial_is_replayed_from_its_bag_after_a_restart(self):
         browser = self.browser
-        self.assertTrue(wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:]))
-        with rosbag.Bag(os.path.join(self.bags, min(name for name in os.listdir(self.bags) if name[0] == '2'))) as bag:
+        self.assertTrue(
+            wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:]))
+        with rosbag.Bag(
+                os.path.join(self.bags,
+                             min(name for name in os.listdir(self.bags) if name[0] == '2'))) as bag:
             told = {topic: message for topic, message, _ in bag.read_messages(
                 ['/alpha/interface_output', '/alpha/failure_frames'])}
-        self.assertEqual(told['/alpha/interface_output'].lines, ['ready'], 'what interfaces print is in the bag')
+        self.assertEqual(told['/alpha/interface_output'].lines, ['ready'],
+                         'what interfaces print is in the bag')
         self.assertEqual(told['/alpha/failure_frames'].topics, [CAMERA])
         type(self).console.stop()
         self.assertTrue(browser.says('connection lost', '#status'))
@@ -139,20 +152,24 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('PICK failed', '.replay-words'))
         self.assertIn('PICK failed', slider.get_attribute('aria-valuetext'))
-        self.assertTrue(wait_for(lambda: self.classes('PICK') >= {'failed'}), 'in the graph of that trial')
-        self.assertLess(float(slider.get_attribute('aria-valuenow')), float(slider.get_attribute('aria-valuemax')))
+        self.assertTrue(wait_for(lambda: self.classes('PICK') >= {'failed'}),
+                        'in the graph of that trial')
+        self.assertLess(float(slider.get_attribute('aria-valuenow')),
+                        float(slider.get_attribute('aria-valuemax')))
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Question about PICK', '.replay-question'))
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
-        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-stills .shown canvas')), 'what was seen then')
+        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-images .shown canvas')),
+                        'what was seen then')
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Answer of operator: supersede succeeded', '.replay-question'))
         slider.send_keys(Keys.ARROW_LEFT)
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'), 'one event back')
 
     def classes(self, label):
-        return set((self.browser.run('const e = document.getElementById(arguments[0]); return e && '
-                                     'e.getAttribute("class")', 'replayed/FETCH/' + label) or '').split())
+        return set((self.browser.run(
+            'const e = document.getElementById(arguments[0]); return e && '
+            'e.getAttribute("class")', 'replayed/FETCH/' + label) or '').split())
 
     def test_5_it_plays_by_itself_and_follows_a_finger(self):
         browser = self.browser
@@ -160,15 +177,18 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         slider.send_keys(Keys.HOME)
         browser.run('document.querySelector(".replay-speed").value = "0.25"')
         browser.click('[data-replay=play]')
-        self.assertTrue(wait_for(lambda: 'active' in self.classes('DETECT')), 'it has come to the first state')
+        self.assertTrue(wait_for(lambda: 'active' in self.classes('DETECT')),
+                        'it has come to the first state')
         browser.click('[data-replay=play]')
         stopped = slider.get_attribute('aria-valuenow')
         self.assertGreater(float(stopped), 0.0)
         right = int(slider.rect['width'] / 2) - 20
         ActionChains(browser.driver).move_to_element_with_offset(slider, right, 5).click().perform()
-        self.assertTrue(wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped)))
+        self.assertTrue(
+            wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped)))
         browser.click('.event-log .event:last-child')
-        self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'), 'a line of the log leads there')
+        self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'),
+                        'a line of the log leads there')
         self.assertEqual(browser.errors(), [])
 
 

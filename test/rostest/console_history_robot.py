@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""A robot for the tests of the console's situation and history: its PICK fails until its work is done by somebody else.
+"""A robot for the tests of the console's situation and history: its PICK fails until its work is
+done by somebody else.
 
-Of PICK's preconditions one function looks at a parameter, one raises, one hangs, and one is a state.
+Of PICK's preconditions one function looks at a parameter, one raises, one hangs, and one is a
+state.
 """
 import threading
 
 import rosgraph
 import rospy
-import smach
 from console_robot import Work, chain
 from sensor_msgs.msg import Image
 from waiting import wait_for
 
+import smach
 from smach_oracle import OracleContainer
 
 CALLED = {'hangs': 0}
@@ -57,9 +59,12 @@ def main():
         return Work(label, ['PICK'], 0.1, ['grasp', 'fits', 'tries'] if label == 'PICK' else [])
     sm = chain(['DETECT', 'PICK', 'PLACE'], make)
     sm.userdata.grasp, sm.userdata.fits, sm.userdata.tries = [1, 2], False, 3
-    OracleContainer.wrap(sm, name='FETCH', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0},
-                         preconditions={'PICK': [hand_is_free, camera_answers, 'DETECT'],
-                                        'PLACE': [(door_is_shut, smach.CBState(lambda ud: 'done', ['done']))]})
+    OracleContainer.wrap(
+        sm, name='FETCH', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0},
+        preconditions={
+            'PICK': [hand_is_free, camera_answers, 'DETECT'],
+            'PLACE': [(door_is_shut, smach.CBState(lambda ud: 'done', ['done']))]
+        })
     while not rospy.is_shutdown():
         sm.execute()
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The console's eye in a real browser: an object marked with the mouse in a real interface, sensors looked at, and a
-robot with its cloud in 3D."""
+"""The console's eye in a real browser: an object marked with the mouse in a real interface, sensors
+looked at, and a robot with its cloud in 3D."""
 import os
 import sys
 import unittest
@@ -18,8 +18,8 @@ from waiting import wait_for  # noqa: E402
 
 from smach_oracle.msg import ConsoleCommand  # noqa: E402
 from smach_oracle.ros.images import cloud_message  # noqa: E402
-from smach_oracle.simulation.world.node.state_publisher import publish_description  # noqa: E402
-from smach_oracle.simulation.world.scene import Body  # noqa: E402
+from smach_oracle.simulation.node.state_publisher import publish_description  # noqa: E402
+from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
 
 if WITH_BROWSER:
     from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
@@ -41,7 +41,7 @@ PICTURE = ('const view = document.querySelector(arguments[0]);'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
-class TheEye(ConsolePage, unittest.TestCase):
+class Marking(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
@@ -51,7 +51,7 @@ class TheEye(ConsolePage, unittest.TestCase):
         cls.cloud = rospy.Publisher('points', PointCloud2, queue_size=1, latch=True)
         cls.audited = []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
-        cls.begin('console_eye_robot.py', size=(1360, 1000))
+        cls.begin('console_marking_robot.py', size=(1360, 1000))
 
     def drag(self, *points):
         """With the mouse, over points of the frame in px."""
@@ -60,7 +60,8 @@ class TheEye(ConsolePage, unittest.TestCase):
         middle = np.array([canvas.size['width'], canvas.size['height']]) / 2.0
         places = [np.rint(np.array(point, float) * scale - middle) for point in points]
         action = ActionChains(self.browser.driver, duration=20)
-        action.move_to_element_with_offset(canvas, *(int(each) for each in places[0])).click_and_hold()
+        action.move_to_element_with_offset(canvas,
+                                           *(int(each) for each in places[0])).click_and_hold()
         for place in places[1:]:
             action.move_to_element_with_offset(canvas, *(int(each) for each in place))
         action.release().perform()
@@ -77,12 +78,15 @@ class TheEye(ConsolePage, unittest.TestCase):
 
     def assert_the_object_is_drawn_in_3d(self, canvas):
         own = int(self.browser.text('[data-fact=points]'))
-        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'points') > own + 5000), 'it, and what is around it')
-        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') > 10000), 'the robot beside it')
+        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'points') > own + 5000),
+                        'it, and what is around it')
+        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') > 10000),
+                        'the robot beside it')
         before, pixels = self.browser.run(PICTURE, canvas)
         self.assertGreater(pixels, 5000)
         self.browser.find(canvas).send_keys(Keys.ARROW_LEFT)
-        self.assertTrue(wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before), 'a key turns it')
+        self.assertTrue(wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before),
+                        'a key turns it')
 
     def test_1_an_object_is_marked_in_the_frame_and_the_machine_goes_on_with_it(self):
         browser = self.browser
@@ -93,9 +97,11 @@ class TheEye(ConsolePage, unittest.TestCase):
         self.drag(*self.around_the_can())
         browser.find('[data-fact=size]')
         middle = np.array(self.around_the_can(), float).mean(axis=0)
-        self.assertTrue(wait_for(lambda: browser.run(
-            'return document.querySelector(".drawing").getContext("2d").getImageData(arguments[0], arguments[1], 1, 1)'
-            '.data[3]', *(int(each) for each in middle))), 'the mask lies over the object')
+        self.assertTrue(
+            wait_for(lambda: browser.run(
+                'return document.querySelector(".drawing").getContext("2d")'
+                '.getImageData(arguments[0], arguments[1], 1, 1).data[3]',
+                *(int(each) for each in middle))), 'the mask lies over the object')
         print('from the end of the drawing to the mask on the screen: {} ms'.format(
             browser.run('return document.querySelector(".perception").dataset.shownAfter')))
         self.assert_the_object_is_drawn_in_3d('.object-view .cloud')
@@ -106,11 +112,15 @@ class TheEye(ConsolePage, unittest.TestCase):
         self.assertEqual([told.ok for told in self.told('mark')], [True, True])
         browser.click('.perception .accept')
         self.assertTrue(wait_for(lambda: rospy.has_param('/alpha/picked')))
-        self.assertLess(np.linalg.norm(np.subtract(rospy.get_param('/alpha/picked'), CAN.position)), 0.02)
-        self.assertTrue(browser.says('DETECT_TABLETOP counts as having ended with succeeded.', '.follow-up'))
+        self.assertLess(np.linalg.norm(np.subtract(rospy.get_param('/alpha/picked'), CAN.position)),
+                        0.02)
+        self.assertTrue(
+            browser.says('DETECT_TABLETOP counts as having ended with succeeded.', '.follow-up'))
         self.assertTrue(wait_for(lambda: self.told('hand_over')))
-        self.assertEqual([(told.ok, told.expert) for told in self.told('hand_over')], [(True, 'operator')])
-        self.assertTrue(self.told('hand_over')[0].query_id, 'it is told which question it was about')
+        self.assertEqual([(told.ok, told.expert) for told in self.told('hand_over')],
+                         [(True, 'operator')])
+        self.assertTrue(
+            self.told('hand_over')[0].query_id, 'it is told which question it was about')
         self.assertEqual(browser.errors(), [])
 
     def test_2_giving_up_asks_again(self):
@@ -121,33 +131,42 @@ class TheEye(ConsolePage, unittest.TestCase):
         browser.find('.perception.shown', 30.0)
         browser.click('.perception .quit')
         self.assertTrue(browser.says('It asks again', '.follow-up', 30.0))
-        self.assertTrue(wait_for(lambda: not browser.text('.perception')), 'the tools are gone with the interface')
+        self.assertTrue(wait_for(lambda: not browser.text('.perception')),
+                        'the tools are gone with the interface')
 
     def test_3_a_camera_is_listened_to_while_somebody_looks(self):
         browser = self.browser
         browser.click('#tab-sensors')
-        self.assertTrue(wait_for(lambda: self.camera._rgb.get_num_connections() == 0))
+        self.assertTrue(wait_for(lambda: self.camera.viewers == 0))
         browser.click('[data-topic="{}"]'.format(CAMERA))
         browser.find('.camera-view.shown')
-        self.assertTrue(wait_for(lambda: browser.run(
-            'const view = document.querySelector(".camera-view .picture");'
-            'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, 1).data[0] > 20')))
-        self.assertEqual(self.camera._rgb.get_num_connections(), 1)
-        browser.driver.delete_all_cookies()  # as when a session has become too old while its page was open
+        self.assertTrue(
+            wait_for(lambda: browser.run(
+                'const view = document.querySelector(".camera-view .image");'
+                'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, '
+                '1).data[0] > 20'
+            )))
+        self.assertEqual(self.camera.viewers, 1)
+        # as when a session has become too old while its page was open
+        browser.driver.delete_all_cookies()
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
-        self.assertTrue(wait_for(lambda: browser.run(
-            'const view = document.querySelector(".camera-view .picture");'
-            'const [red, , blue] = view.getContext("2d").getImageData(320, 336, 1, 1).data; return blue > red + 40')))
+        self.assertTrue(
+            wait_for(lambda: browser.run(
+                'const view = document.querySelector(".camera-view .image");'
+                'const [red, , blue] = view.getContext("2d").getImageData(320, 336, 1, 1).data; '
+                'return blue > red + 40'
+            )))
         self.camera.show([TABLE, CAN, BOX])
         self.assertTrue(any('401' in entry for entry in browser.errors()), 'it was refused once')
         browser.click('.camera-view .view-close')
-        self.assertTrue(wait_for(lambda: self.camera._rgb.get_num_connections() == 0, 30.0), 'nobody looks any more')
+        self.assertTrue(wait_for(lambda: self.camera.viewers == 0, 30.0), 'nobody looks any more')
 
     def test_4_clouds_and_joints_are_shown(self):
         browser = self.browser
         self.joints.publish(JointState(name=['elbow'], position=[1.25]))
         points = np.random.default_rng(1).uniform(-1, 1, (50000, 3))
-        self.cloud.publish(cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8)))
+        self.cloud.publish(
+            cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8)))
         browser.click('[data-topic="/joint_states"]')
         self.assertTrue(browser.says('1.250', '.joints-view'))
         browser.click('[data-topic="/points"]')
@@ -157,15 +176,19 @@ class TheEye(ConsolePage, unittest.TestCase):
 
     def test_5_the_robot_stands_in_its_cloud_and_moves_as_its_joints_say(self):
         browser, canvas = self.browser, '.cloud-view .cloud'
-        self.assertTrue(wait_for(
-            lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(canvas, 'points') == 20000),
-            (self.drawn(canvas, 'triangles'), self.drawn(canvas, 'points'), browser.text('.cloud-view')))
+        self.assertTrue(
+            wait_for(lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(
+                canvas, 'points') == 20000),
+            (self.drawn(canvas, 'triangles'), self.drawn(canvas,
+                                                         'points'), browser.text('.cloud-view')))
         before = browser.run(PICTURE, canvas)[0]
-        self.joints.publish(JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))
+        self.joints.publish(
+            JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))
         self.assertTrue(wait_for(lambda: browser.run(PICTURE, canvas)[0] != before))
         self.assertNotIn('No transform', browser.text('.cloud-view'))
-        browser.run('const choice = document.querySelector(".cloud-view .beside"); choice.value = "";'
-                    'choice.dispatchEvent(new Event("change"))')
+        browser.run(
+            'const choice = document.querySelector(".cloud-view .beside"); choice.value = "";'
+            'choice.dispatchEvent(new Event("change"))')
         self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') == 0), 'the cloud alone')
         self.assertEqual(browser.errors(), [])
 
@@ -175,23 +198,28 @@ class TheEye(ConsolePage, unittest.TestCase):
             browser.click('.sensor-list [data-topic="{}"]'.format(topic))
         browser.click('.sensor-list [data-topic="{} as a cloud"]'.format(DEPTH))
         self.assertTrue(browser.says('of 307200 points', '.cloud-view'))
-        self.assertTrue(wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000), 'with the robot')
+        self.assertTrue(wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000),
+                        'with the robot')
         # 422: the first image may have come before the first camera_info, and the page was told so
         self.assertEqual([entry for entry in browser.errors() if '422' not in entry], [])
 
-    def test_6_with_a_cloud_that_came_before_its_transform_the_robot_stands_as_soon_as_that_is_known(self):
+    def test_6_a_robot_whose_cloud_came_first_stands_as_soon_as_its_transform_is_known(self):
         browser, view = self.browser, '.cloud-view[data-topic="/early"]'
         early = rospy.Publisher('early', PointCloud2, queue_size=1, latch=True)
-        early.publish(cloud_message(np.random.default_rng(1).uniform(-1, 1, (500, 3)), Header(frame_id='early')))
+        early.publish(
+            cloud_message(
+                np.random.default_rng(1).uniform(-1, 1, (500, 3)), Header(frame_id='early')))
         browser.click('.sensor-list [data-topic="/early"]')
         self.assertTrue(browser.says('No transform from early', view), browser.text(view))
         self.assertEqual(self.drawn(view + ' .cloud', 'triangles'), 0)
         self.camera.tell_place('early')
-        self.assertTrue(wait_for(lambda: self.drawn(view + ' .cloud', 'triangles') > 10000), browser.text(view))
+        self.assertTrue(wait_for(lambda: self.drawn(view + ' .cloud', 'triangles') > 10000),
+                        browser.text(view))
         browser.click('.sensor-list [data-topic="/early"]')
 
     def test_7_a_robot_description_that_would_do_harm_is_told_in_a_sentence(self):
-        rospy.set_param('/evil/robot_description', '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>')
+        rospy.set_param('/evil/robot_description',
+                        '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>')
         evil = '[data-topic="/evil/robot_description"]'
         self.browser.click('.sensor-list ' + evil)
         self.assertTrue(self.browser.says('entities; that is not allowed', '.view' + evil))
@@ -199,5 +227,5 @@ class TheEye(ConsolePage, unittest.TestCase):
 
 
 if __name__ == '__main__':
-    rospy.init_node('console_eye')
-    rostest.rosrun('smach_oracle', 'console_eye', TheEye)
+    rospy.init_node('console_marking')
+    rostest.rosrun('smach_oracle', 'console_marking', Marking)

@@ -1,6 +1,9 @@
-"""The console as a node of its own, a robot that asks, and a real browser at the page: for a class of tests."""
+"""The console as a node of its own, a robot that asks, and a real browser at the page: for a class
+of tests.
+"""
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -8,7 +11,7 @@ import sys
 from roslib.packages import find_node
 from waiting import wait_for
 
-from smach_oracle.simulation.experiment.launching import free_port
+from smach_oracle.experiment.launching import free_port
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 WITH_BROWSER = bool(shutil.which('chromedriver'))
@@ -19,6 +22,14 @@ class Node:
 
     def __init__(self, *command):
         self._process = subprocess.Popen(command)
+
+    def freeze(self):
+        """SIGSTOP: its connections stay, and nothing answers."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self):
+        """SIGCONT."""
+        self._process.send_signal(signal.SIGCONT)
 
     def stop(self):
         """Ctrl-C, as from a shell."""
@@ -32,7 +43,9 @@ class ConsolePage:
 
     @classmethod
     def begin(cls, robot, *arguments, size=()):
-        """Start the console, the robot /alpha (a file beside this one, and its arguments) and a browser at the page."""
+        """Start the console, the robot /alpha (a file beside this one, and its arguments) and a
+        browser at the page.
+        """
         from browser import Browser
         cls.port = free_port()
         cls.page = 'http://localhost:{}/'.format(cls.port)

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""A robot for the console's tests: a real machine under a real oracle, whose PICK fails until its work is done."""
+"""A robot for the console's tests: a real machine under a real oracle, whose PICK fails until its
+work is done.
+"""
 import sys
 
 import rospy
-import smach
 
+import smach
 from smach_oracle import OracleContainer
 
 MARKUP = 'no grasp found for <b>mug</b> & <script>window.hacked = 1</script>'
@@ -15,14 +17,15 @@ class Work(smach.State):
     """Succeeds after some time; the labels in `failing` fail."""
 
     def __init__(self, label, failing, time_s, output_keys=(), input_keys=()):
-        smach.State.__init__(self, OUTCOMES, input_keys=list(input_keys), output_keys=list(output_keys))
+        smach.State.__init__(self, OUTCOMES, input_keys=list(input_keys),
+                             output_keys=list(output_keys))
         self._label = label
         self._failing = failing
         self._time_s = time_s
         self._outputs = output_keys
 
     def execute(self, ud):
-        rospy.sleep(self._time_s)
+        rospy.sleep(self._time_s)  # the state takes so long
         if self._label in self._failing:
             raise RuntimeError(rospy.get_param('~reason', MARKUP))
         for key in self._outputs:
@@ -54,15 +57,23 @@ def make_machine(failing, time_s, size):
 
 
 def main(argv):
-    """Arguments: failing labels with commas, s that a state takes, further states, trials, prior failure rate."""
+    """Arguments: failing labels with commas, s that a state takes, further states, trials, prior
+    failure rate.
+    """
     failing, time_s, size, trials = argv[1].split(','), float(argv[2]), int(argv[3]), int(argv[4])
-    prior = float(argv[5]) if len(argv) > 5 else 0.8  # so high that every failure is a question at once
+    # so high that every failure is a question at once
+    prior = float(argv[5]) if len(argv) > 5 else 0.8
     rospy.init_node('robot')
     sm = make_machine(failing, time_s, size)
-    OracleContainer.wrap(sm, name='KITCHEN', settings={
-        'prior': prior, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
-        'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
-        'interfaces': {'assist': {'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']}}})
+    OracleContainer.wrap(
+        sm, name='KITCHEN', settings={
+            'prior': prior, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
+            'states': {'FETCH/PICK': {'preconditions': ['DETECT']}}, 'interfaces': {
+                'assist': {
+                    'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']
+                }
+            }
+        })
     for _ in range(trials):
         if rospy.is_shutdown():
             break

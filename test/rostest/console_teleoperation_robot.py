@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""A robot whose PICK never succeeds by itself; a person may drive its hand, through an interface started on demand."""
+"""A robot whose PICK never succeeds by itself; a person may drive its hand, through an interface
+started on demand.
+"""
 import rospy
-import smach
 
+import smach
 from smach_oracle import OracleContainer
 
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
@@ -36,10 +38,16 @@ def main():
     with sm:
         smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Place())
-    OracleContainer.wrap(sm, name='FETCH', settings={
-        'prior': 0.8, 'deadline_s': 300.0, 'interfaces': {'manipulation': {
-            'action': '/manipulation_interface', 'description': 'Drive the hand', 'states': ['PICK'],
-            'node': 'smach_oracle manipulation_interface', 'args': ['__name:=manipulation_interface']}}})
+    OracleContainer.wrap(
+        sm, name='FETCH', settings={
+            'prior': 0.8, 'deadline_s': 300.0, 'interfaces': {
+                'manipulation': {
+                    'action': '/manipulation_interface', 'description': 'Drive the hand',
+                    'states': ['PICK'], 'node': 'smach_oracle manipulation_interface',
+                    'args': ['__name:=manipulation_interface']
+                }
+            }
+        })
     sm.execute()
     rospy.spin()
 

@@ -10,25 +10,33 @@ import roslib.packages
 import rospy
 
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question
-from smach_oracle.oracle.events import FailureKind
-from smach_oracle.oracle.question import InterfaceOffer, OutcomeChoice, Question, StateChoice, Visit, VisitResult
-from smach_oracle.ros.expert_client import ExpertQueryClient
+from smach_oracle.oracle.asking.question import OutcomeChoice, Question, StateChoice
+from smach_oracle.oracle.records.events import FailureKind
+from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
+from smach_oracle.ros.expert.client import ExpertQueryClient
 
 
 def make_question(query_id='q1', **changes):
-    """A question of a pick-and-place machine whose PICK has failed; fields can be changed by name."""
+    """A question of a pick-and-place machine whose PICK has failed; fields can be changed by
+    name.
+    """
     question = Question(
         query_id=query_id, trial_id='trial', container_path='PICK_AND_PLACE', failed_state='PICK',
-        failure_kind=FailureKind.FELL_THROUGH, outcome='aborted', text='no grasp found', failure_class=3, rate=0.8,
-        continuous=True, recoveries=2, reason='the failure rate of PICK is HIGH', tried=('revisit PICK',),
-        history=(Visit('DETECT', 'succeeded', VisitResult.SUCCESS), Visit('PICK', 'aborted', VisitResult.FAILURE)),
+        failure_kind=FailureKind.FELL_THROUGH, outcome='aborted', text='no grasp found',
+        failure_class=3, rate=0.8, continuous=True, recoveries=2,
+        reason='the failure rate of PICK is HIGH', tried=('revisit PICK',),
+        history=(Visit('DETECT', 'succeeded',
+                       VisitResult.SUCCESS), Visit('PICK', 'aborted', VisitResult.FAILURE)),
         choices=(StateChoice('DETECT', 0.9, 1, 2, (), ()),
                  StateChoice('PICK', 0.2, 3, 1, ('grasp',), ('MOVE_ARMS_ASIDE', 'view_is_clear')),
                  StateChoice('PLACE', 0.5, 2, 0, (), (), 'still running after an overrun')),
-        supersede_outcomes=(OutcomeChoice('succeeded', 'PLACE'), OutcomeChoice('aborted', 'aborted')),
-        output_keys=('grasped',), give_up_outcomes=('succeeded', 'aborted'),
-        interfaces=(InterfaceOffer('assist', '/assist', 'do it by hand'),), userdata={'object': 'mug'},
-        input_userdata={'target': 'mug'}, deadline_s=0.0, fallback='PICK_AND_PLACE ends with aborted')
+        supersede_outcomes=(OutcomeChoice('succeeded', 'PLACE'),
+                            OutcomeChoice('aborted', 'aborted')), output_keys=('grasped',),
+        give_up_outcomes=('succeeded', 'aborted'), interfaces=(InterfaceOffer(
+            'assist', '/assist',
+            'do it by hand'),), userdata={'object': 'mug'}, input_userdata={'target': 'mug'},
+        deadline_s=0.0, fallback='PICK_AND_PLACE ends with aborted')
     return question._replace(**changes)
 
 
@@ -80,7 +88,9 @@ class Process:
         return cls(sys.executable, os.path.abspath(__file__), role, *arguments, **options)
 
     def output(self, timeout_s):
-        """What it has written when it ends (needs stdout=PIPE); raises where it does not end in time."""
+        """What it has written when it ends (needs stdout=PIPE); raises where it does not end in
+        time.
+        """
         return self._process.communicate(timeout=timeout_s)[0].decode()
 
     def kill(self):
@@ -108,7 +118,8 @@ def main(role, server, query_id='q1'):
     """Roles: `ask` puts a question and waits; `hold` claims one and keeps the claim."""
     rospy.init_node('{}_{}'.format(role, os.getpid()))
     if role == 'ask':
-        answer = ExpertQueryClient(server).ask(make_question(query_id), threading.Event(), lambda *_: None)
+        answer = ExpertQueryClient(server).ask(make_question(query_id), threading.Event(),
+                                               lambda *_: None)
         sys.stdout.write('answer {}'.format(answer.state if answer else None))
     elif role == 'hold':
         front_end = FrontEnd('holder', [server], lease_s=1.5)

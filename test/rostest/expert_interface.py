@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Shared-autonomy interfaces that an expert starts: seen to run, superseding the state, failing, preempted."""
+"""Shared-autonomy interfaces that an expert starts: seen to run, superseding the state, failing,
+preempted.
+"""
 import os
 import sys
 import threading
@@ -15,11 +17,18 @@ from expert_fixtures import Asked, make_question  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
 from smach_oracle.expert.front_end import FrontEnd  # noqa: E402
-from smach_oracle.msg import (ExpertDecision, OpenQuery, SharedAutonomyAction, SharedAutonomyFeedback,  # noqa: E402
-                              SharedAutonomyResult, UserdataItem)
-from smach_oracle.oracle.errors import InterfaceError  # noqa: E402
-from smach_oracle.oracle.question import AnswerKind, InterfaceOffer  # noqa: E402
-from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.msg import (
+    ExpertDecision,
+    OpenQuery,
+    SharedAutonomyAction,
+    SharedAutonomyFeedback,
+    SharedAutonomyResult,
+    UserdataItem,
+)
+from smach_oracle.oracle.asking.answer_rules import check_answer, choices_of  # noqa: E402
+from smach_oracle.oracle.asking.question import AnswerKind, InterfaceOffer  # noqa: E402
+from smach_oracle.oracle.errors import AnswerError, InterfaceError  # noqa: E402
+from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
 from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
 
 SERVER = '/expert_interface/expert_query'
@@ -29,7 +38,8 @@ class FakeInterface:
     """A shared-autonomy interface whose person does what the test says."""
 
     def __init__(self, work):
-        self._server = actionlib.SimpleActionServer('/assist', SharedAutonomyAction, self._execute, auto_start=False)
+        self._server = actionlib.SimpleActionServer('/assist', SharedAutonomyAction, self._execute,
+                                                    auto_start=False)
         self._work = work
         self.goals = []
         self._server.start()
@@ -65,6 +75,16 @@ class TestInterfaces(unittest.TestCase):
         return (client or self.client).run_interface(self.offer, self.question, self.cancelled,
                                          lambda *what: self.told.append(what))
 
+    def taken(self):
+        """The answer of the interface as the oracle takes it; None where it does not."""
+        try:
+            answer = self.run_interface()
+            if answer is not None:
+                check_answer(answer, choices_of(self.question))
+        except AnswerError:
+            return None
+        return answer
+
     def listed(self):
         """This test's question: that of the test before may not have left the list yet."""
         return [each for each in self.ann.questions() if each.goal.query_id == self.id()]
@@ -77,14 +97,18 @@ class TestInterfaces(unittest.TestCase):
 
         def work(server):
             seen.append(wait_for(self.statuses))
-            server.set_succeeded(SharedAutonomyResult('succeeded', encode_all({'grasped': 'mug'}), 'by hand'))
+            server.set_succeeded(
+                SharedAutonomyResult('succeeded', encode_all({'grasped': 'mug'}), 'by hand'))
 
         interface = self.interface(work)
         asked = Asked(self.client, self.question)
         listed, = wait_for(self.listed)
-        self.assertTrue(self.ann.answer(listed, ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist')).ok)
+        self.assertTrue(
+            self.ann.answer(listed, ExpertDecision(kind=ExpertDecision.INTERFACE,
+                                                   interface='assist')).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual((asked.answer.kind, asked.answer.interface), (AnswerKind.INTERFACE, 'assist'))
+        self.assertEqual((asked.answer.kind, asked.answer.interface),
+                         (AnswerKind.INTERFACE, 'assist'))
         self.assertTrue(wait_for(lambda: not self.statuses()))
         answer = self.run_interface()
         self.assertEqual((answer.kind, answer.outcome, answer.outputs), (
@@ -93,8 +117,10 @@ class TestInterfaces(unittest.TestCase):
         self.assertEqual((goal.state, goal.outcomes, decode_all(goal.userdata)), (
             'PICK', ['succeeded', 'aborted'], {'target': 'mug'}))
         self.assertEqual(seen, [[(OpenQuery.INTERFACE_RUNNING, 'ann')]])
-        self.assertEqual(self.told, [('interface_start', 'assist', ''), ('interface_end', 'assist', 'succeeded')])
-        self.assertTrue(wait_for(lambda: not self.statuses()), 'it leaves the list when the interface ends')
+        self.assertEqual(self.told, [('interface_start', 'assist', ''),
+                                     ('interface_end', 'assist', 'succeeded')])
+        self.assertTrue(wait_for(lambda: not self.statuses()),
+                        'it leaves the list when the interface ends')
 
     def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
         impatient = ExpertQueryClient(SERVER, server_wait_s=2.0)
@@ -109,10 +135,12 @@ class TestInterfaces(unittest.TestCase):
         results = [('aborted', SharedAutonomyResult('succeeded', [], 'the arm is stuck')),
                    ('succeeded', SharedAutonomyResult('finished', [], '')),
                    ('succeeded', SharedAutonomyResult('succeeded', encode_all({'other': 1}), '')),
-                   ('succeeded', SharedAutonomyResult('succeeded', [UserdataItem('grasped', 1, '', '', b'{')], ''))]
+                   ('succeeded',
+                    SharedAutonomyResult('succeeded', [UserdataItem('grasped', 1, '', '', b'{')],
+                                         ''))]
         self.interface(lambda server: getattr(server, 'set_' + results[0][0])(results.pop(0)[1]))
         for _ in range(4):
-            self.assertIsNone(self.run_interface())
+            self.assertIsNone(self.taken())
         self.assertEqual(results, [])
 
     def test_a_preempt_stops_the_interface_at_once(self):

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The master dies while a robot waits for an expert at a shared server. Masters and nodes of its own."""
+"""The master dies while a robot waits for an expert at a shared server. Masters and nodes of its
+own.
+"""
 import os
 import subprocess
 import sys
@@ -13,7 +15,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import Process  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.simulation.experiment.launching import free_port  # noqa: E402
+from smach_oracle.experiment.launching import free_port  # noqa: E402
 
 SHARED = '/shared/expert_query'
 RESTART_S = 8.0  # within which a master is back, also on a machine busy with other tests
@@ -34,14 +36,16 @@ class TestMasterRestart(unittest.TestCase):
         return process
 
     def start_master(self):
-        self.master = self.start(Process, 'rosmaster', '--core', '-p', str(self.port), stdout=subprocess.DEVNULL)
+        self.master = self.start(Process, 'rosmaster', '--core', '-p', str(self.port),
+                                 stdout=subprocess.DEVNULL)
         self.assertTrue(wait_for(self.master_answers, 30.0))
 
     def restart_master(self):
         before = self.call('getPid')
         self.master.kill()
         self.start_master()
-        # what it knows by now cannot be asserted: the nodes may have registered again before the first question
+        # what it knows by now cannot be asserted: the nodes may have registered again before the
+        # first question
         self.assertNotEqual(self.call('getPid'), before, 'the old master still answers')
 
     def start_expert(self, delay_s):
@@ -59,12 +63,17 @@ class TestMasterRestart(unittest.TestCase):
         subscribers = dict(self.call('getSystemState')[1]).get(SHARED + topic, [])
         return any(name.startswith(node) for name in subscribers)
 
+    @staticmethod
+    def let_them_connect():
+        time.sleep(1.0)  # a master does not know which of its nodes are connected
+
     def call(self, method):
-        return getattr(xmlrpc.client.ServerProxy(self.environment['ROS_MASTER_URI']), method)('/test')[2]
+        return getattr(xmlrpc.client.ServerProxy(self.environment['ROS_MASTER_URI']),
+                       method)('/test')[2]
 
     def test_a_front_end_started_after_the_restart_answers(self):
         self.assertTrue(wait_for(lambda: self.subscribed('/ask_', '/result'), 40.0))
-        time.sleep(1.0)
+        self.let_them_connect()
         self.restart_master()
         self.start_expert(0.0)
         self.assertEqual(self.robot.output(60.0)[-13:], 'answer DETECT')
@@ -73,7 +82,7 @@ class TestMasterRestart(unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.subscribed('/ask_', '/result'), 40.0))
         self.start_expert(RESTART_S)
         self.assertTrue(wait_for(lambda: self.subscribed('/scripted_expert', '/open'), 40.0))
-        time.sleep(1.0)
+        self.let_them_connect()
         self.restart_master()
         self.assertEqual(self.robot.output(60.0)[-13:], 'answer DETECT')
 

@@ -13,13 +13,13 @@ import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import Asked, make_question  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from waiting import stays, wait_for  # noqa: E402
 
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question  # noqa: E402
 from smach_oracle.msg import ExpertDecision, UserdataItem  # noqa: E402
+from smach_oracle.oracle.asking.question import AnswerKind  # noqa: E402
 from smach_oracle.oracle.errors import AnswerError  # noqa: E402
-from smach_oracle.oracle.question import AnswerKind  # noqa: E402
-from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
 from smach_oracle.ros.userdata_codec import encode  # noqa: E402
 
 SERVER = '/expert_protocol/expert_query'
@@ -50,7 +50,10 @@ class TestExpertProtocol(unittest.TestCase):
         return asked, listed
 
     def listed(self, front_end, query_id=None):
-        return next((each for each in front_end.questions() if each.goal.query_id == (query_id or self.id())), None)
+        return next(
+            (each
+             for each in front_end.questions() if each.goal.query_id == (query_id or self.id())),
+            None)
 
     def test_an_answer_resumes_the_robot(self):
         asked, listed = self.ask(userdata={'object': 'mug', 'image': object()})
@@ -59,7 +62,8 @@ class TestExpertProtocol(unittest.TestCase):
                          {'object': UserdataItem.JSON, 'image': UserdataItem.UNSENT})
         self.assertTrue(self.ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual(asked.answer, (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera'))
+        self.assertEqual(asked.answer,
+                         (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera'))
         self.assertTrue(wait_for(lambda: self.listed(self.ann) is None), 'it leaves the open list')
 
     def test_superseding_hands_over_the_output_userdata(self):
@@ -70,8 +74,10 @@ class TestExpertProtocol(unittest.TestCase):
 
     def test_outputs_of_an_unknown_message_type_are_an_answer_error(self):
         asked, listed = self.ask()
-        self.ann.answer(listed, supersede(UserdataItem('grasped', UserdataItem.ROS_MESSAGE, 'no_such/Grasp', '0' * 32,
-                                                       b'')))
+        self.ann.answer(
+            listed,
+            supersede(
+                UserdataItem('grasped', UserdataItem.ROS_MESSAGE, 'no_such/Grasp', '0' * 32, b'')))
         self.assertTrue(asked.wait())
         self.assertIsInstance(asked.error, AnswerError)
         self.assertIn('no_such/Grasp is not installed here', str(asked.error))
@@ -118,9 +124,10 @@ class TestExpertProtocol(unittest.TestCase):
         self.assertTrue(self.ann.claim(listed, take_over=True).ok)
         self.assertTrue(self.ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual(asked.progress, [
-            ('claimed', 'ann', 'claimed'), ('released', 'ann', 'ann gave it back'), ('claimed', 'bob', 'claimed'),
-            ('claimed', 'ann', 'taken over from bob')])
+        self.assertEqual(asked.progress, [('claimed', 'ann', 'claimed'),
+                                          ('released', 'ann', 'ann gave it back'),
+                                          ('claimed', 'bob', 'claimed'),
+                                          ('claimed', 'ann', 'taken over from bob')])
 
     def bob_claims(self, listed):
         self.assertTrue(wait_for(lambda: self.bob.find(listed.key)))
@@ -133,10 +140,7 @@ class TestExpertProtocol(unittest.TestCase):
         _, listed = self.ask()
         self.assertTrue(wait_for(lambda: slow.find(listed.key)))
         self.assertTrue(slow.claim(listed).ok)
-        begun_s = time.monotonic()
-        while time.monotonic() < begun_s + 2.0 * lease_s:
-            self.assertEqual(self.listed(self.ann).holder, 'slow')
-            time.sleep(0.05)
+        self.assertTrue(stays(lambda: self.listed(self.ann).holder == 'slow', 2.0 * lease_s))
 
     def test_nobody_answers_by_the_deadline(self):
         begun_s = time.monotonic()
@@ -173,8 +177,7 @@ class TestExpertProtocol(unittest.TestCase):
     def test_the_same_question_asked_again_joins_the_open_one(self):
         first, listed = self.ask()
         second = Asked(self.client, make_question(self.id()))
-        time.sleep(0.5)
-        self.assertEqual(len(self.ann.questions()), 1)
+        self.assertTrue(stays(lambda: len(self.ann.questions()) == 1, 0.5))
         self.ann.answer(listed, goto())
         self.assertTrue(first.wait() and second.wait())
         self.assertEqual(first.answer, second.answer)
@@ -190,7 +193,8 @@ class TestExpertProtocol(unittest.TestCase):
             self.assertGreater(version, before)
 
     def test_the_front_end_of_the_documentation_answers(self):
-        with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'expert.md')) as page:
+        with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc',
+                               'expert.md')) as page:
             code = page.read().split('## A front end in')[1].split('```python\n')[1].split('```')[0]
         self.assertLessEqual(len(code.splitlines()), 20)
         asked, _ = self.ask()

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The ROS master is killed and restarted in mid-trial: the trial ends as it would have, and the node can be found."""
+"""The ROS master is killed and restarted in mid-trial: the trial ends as it would have, and the
+node can be found.
+"""
 import json
 import sys
 import time
@@ -7,7 +9,7 @@ import unittest
 from typing import Any
 
 from oracle_support import OwnMaster, Process, oracle_run, script
-from waiting import wait_for
+from waiting import stays, wait_for
 
 TASK = '''
 import sys, rospy, smach
@@ -25,7 +27,8 @@ with sm:
 print('OUTCOME', sm.execute(), flush=True)
 sys.stdin.readline()
 '''
-# A front end that knows nothing of what was before: finds the server, waits for a question, answers it.
+# A front end that knows nothing of what was before: finds the server, waits for a question, answers
+# it.
 FRONT_END = '''
 import rospy
 from smach_oracle.msg import ExpertDecision, OpenQueries
@@ -70,15 +73,17 @@ class MasterRestartTest(unittest.TestCase):
 
     def restart_master(self, gap_s: float = 0.0) -> None:
         self.master.kill()
-        time.sleep(gap_s)
+        time.sleep(gap_s)  # so long there is no master
         self.master.start()
 
     def registered(self) -> bool:
         system = self.master.system()
-        return '/task/oracle/events' in system['publishers'] and '/task/expert_query/goal' in system['subscribers'] \
-            and '/task/expert_query/answer' in system['services']
+        return ('/task/oracle/events' in system['publishers']
+                and '/task/expert_query/goal' in system['subscribers']
+                and '/task/expert_query/answer' in system['services'])
 
-    def test_a_front_end_started_after_the_restart_can_answer_the_question_that_was_open(self) -> None:
+    def test_a_front_end_started_after_the_restart_can_answer_the_question_that_was_open(
+            self) -> None:
         task = self.ask_at_once()
         before = self.master.system()
         self.restart_master()
@@ -99,13 +104,13 @@ class MasterRestartTest(unittest.TestCase):
         task.go_on()
         self.assertEqual(task.wait(), 0)
 
-    def test_a_trial_that_begins_to_ask_while_the_master_is_away_goes_on_when_it_is_back(self) -> None:
+    def test_a_trial_that_begins_to_ask_while_the_master_is_away_goes_on_when_it_is_back(
+            self) -> None:
         task = self.start_task('--config', self.asking())
         self.master.kill()
         task.go_on()  # the state fails now
         self.assertTrue(task.says('PICK failed'), task.output())
-        time.sleep(1.0)  # for it to stumble, if it did
-        self.assertTrue(task.running(), task.output())
+        self.assertTrue(stays(task.running, 1.0), task.output())
         self.master.start()
         self.assertTrue(wait_for(self.registered), self.master.system())
         front_end = self.python(FRONT_END)
@@ -126,8 +131,9 @@ class MasterRestartTest(unittest.TestCase):
         """A task whose question is open."""
         task = self.start_task('--config', self.asking())
         task.go_on()
-        self.assertTrue(wait_for(lambda: 'PICK failed' in task.output()), task.output())
-        time.sleep(0.5)
+        self.assertTrue(task.says('PICK failed'), task.output())
+        self.assertTrue(task.says('the expert is asked'), task.output())
+        self.assertTrue(wait_for(self.registered), self.master.system())
         return task
 
     def asking(self) -> str:
@@ -139,7 +145,10 @@ class MasterRestartTest(unittest.TestCase):
     @staticmethod
     def own_names(system: Any) -> Any:
         # connections of others come and go; what is compared is what the node itself offers
-        return {kind: sorted(name for name in names if name.startswith('/task/')) for kind, names in system.items()}
+        return {
+            kind: sorted(name for name in names if name.startswith('/task/'))
+            for kind, names in system.items()
+        }
 
 
 if __name__ == '__main__':

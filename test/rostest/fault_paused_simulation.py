@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Simulated time that never begins, and a robot pushed into a namespace: limits, deadlines and answers work on."""
+"""Simulated time that never begins, and a robot pushed into a namespace: limits, deadlines and
+answers work on.
+"""
 import signal
 import sys
 import tempfile
@@ -7,8 +9,8 @@ import time
 import unittest
 
 import rospy
-
 from oracle_support import EventLog, FrontEnd, Process, oracle_run, recorded_events, script
+
 from smach_oracle.msg import ExpertDecision, OracleEvent
 from smach_oracle.srv import AnswerQueryRequest
 
@@ -38,7 +40,8 @@ LIMITED = 'states: {PICK: {time_limit_s: 0.5, max_recoveries: 0}}\n'
 class PausedSimulationTest(unittest.TestCase):
     def start(self, settings: str, *args: str) -> Process:
         config = script(self, LIMITED + settings, 'oracle.yaml')
-        return oracle_run(self, '--config', config, *args, script(self, HANGS_ONCE), '__ns:=/robots/one')
+        return oracle_run(self, '--config', config, *args, script(self, HANGS_ONCE),
+                          '__ns:=/robots/one')
 
     def test_a_time_limit_and_a_deadline_pass_though_the_clock_stands(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -46,7 +49,8 @@ class PausedSimulationTest(unittest.TestCase):
             self.assertEqual(task.wait(), 0, task.output())
             self.assertIn('OUTCOME aborted 0.0', task.output())
             kinds = [event.kind for event in recorded_events(folder, 'robots/one/task')[0]]
-        for kind in (OracleEvent.FAILURE, OracleEvent.QUERY_OPENED, OracleEvent.QUERY_EXPIRED, OracleEvent.TRIAL_END):
+        for kind in (OracleEvent.FAILURE, OracleEvent.QUERY_OPENED, OracleEvent.QUERY_EXPIRED,
+                     OracleEvent.TRIAL_END):
             self.assertIn(kind, kinds)
 
     def test_an_expert_answers_a_robot_in_a_namespace(self) -> None:
@@ -69,7 +73,8 @@ class PausedSimulationTest(unittest.TestCase):
         began = time.monotonic()
         task.signal(signal.SIGINT)
         task.wait()
-        self.assertLess(time.monotonic() - began, 6.0)  # 2 s, on a machine that has nothing else to do
+        # 2 s, on a machine that has nothing else to do
+        self.assertLess(time.monotonic() - began, 6.0)
         self.assertIn('OUTCOME preempted', task.output())
 
 

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""SIGINT and SIGTERM at any time: the question is taken back, the bag closed, the process gone within two seconds."""
+"""SIGINT and SIGTERM at any time: the question is taken back, the bag closed, the process gone
+within two seconds.
+"""
 import glob
 import json
 import os
@@ -12,12 +14,22 @@ from functools import partial
 from typing import Callable, Dict, List, Optional, Tuple
 
 import rospy
+from oracle_support import (
+    SIGNALS,
+    FrontEnd,
+    OwnMaster,
+    Process,
+    oracle_run,
+    recorded_events,
+    script,
+)
 
-from oracle_support import SIGNALS, FrontEnd, OwnMaster, Process, oracle_run, recorded_events, script
 from smach_oracle.msg import OracleEvent
 
-EXIT_LIMIT_S = 2.0 + 1.0  # two seconds are promised; the third is for starting and ending processes at all
-ATTEMPTS = 3  # a limit on time holds if it holds once: what else the machine does can only make a program slower
+# two seconds are promised; the third is for starting and ending processes at all
+EXIT_LIMIT_S = 2.0 + 1.0
+# a limit on time holds if it holds once: what else the machine does can only make a program slower
+ATTEMPTS = 3
 TASK = '''
 import sys, time, rospy, smach, smach_ros
 rospy.init_node('task')
@@ -80,9 +92,12 @@ class SignalsTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
 
-    def start(self, place: str, text: str = TASK + RUN, settings: Optional[Dict[str, object]] = None) -> Process:
-        config = script(self, json.dumps(dict({'deadline_s': 0}, **(settings or {}))), 'oracle.yaml')
-        task = oracle_run(self, '--config', config, '--record', self.bags, script(self, text), place)
+    def start(self, place: str, text: str = TASK + RUN,
+              settings: Optional[Dict[str, object]] = None) -> Process:
+        config = script(self, json.dumps(dict({'deadline_s': 0}, **(settings or {}))),
+                        'oracle.yaml')
+        task = oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
+                          place)
         if place == 'query':
             self.assertIsNotNone(FrontEnd(self, '/task/expert_query').question(), task.output())
         else:
@@ -90,7 +105,9 @@ class SignalsTest(unittest.TestCase):
         return task
 
     def in_time(self, case: Callable[[], None]) -> None:
-        """Run a case in a folder of its own, again where a process in it was too slow; any other failure counts."""
+        """Run a case in a folder of its own, again where a process in it was too slow; any other
+        failure counts.
+        """
         for attempt in range(1, ATTEMPTS + 1):
             self.setUp()
             try:
@@ -111,7 +128,9 @@ class SignalsTest(unittest.TestCase):
         return code
 
     def end(self, task: Process, number: int) -> Tuple[int, List[OracleEvent]]:
-        """Send the signal; check that it ends in time with its bag closed. Exit code and recorded events."""
+        """Send the signal; check that it ends in time with its bag closed. Exit code and recorded
+        events.
+        """
         code = self.signalled(task, number)
         self.assertEqual(glob.glob(os.path.join(self.bags, '*.active')), [], task.output())
         events, = recorded_events(self.bags)
@@ -129,7 +148,8 @@ class SignalsTest(unittest.TestCase):
             code, events = self.end(task, number)
             self.assertIn('OUTCOME preempted', task.output())
             self.assertEqual(code, 0, task.output())
-            self.assertEqual((events[-1].kind, events[-1].outcome), (OracleEvent.TRIAL_END, 'preempted'))
+            self.assertEqual((events[-1].kind, events[-1].outcome),
+                             (OracleEvent.TRIAL_END, 'preempted'))
             if expected is not None:
                 self.assertIn(expected, [event.kind for event in events])
         self.with_each_signal(case)
@@ -166,7 +186,8 @@ class SignalsTest(unittest.TestCase):
 
     def library_case(self) -> None:
         rospy.set_param('/task/record', self.bags)
-        self.addCleanup(lambda: rospy.has_param('/task/record') and rospy.delete_param('/task/record'))
+        self.addCleanup(
+            lambda: rospy.has_param('/task/record') and rospy.delete_param('/task/record'))
         program = Process([sys.executable, script(self, TASK + LIBRARY + RUN), 'query'])
         self.addCleanup(program.stop)
         front_end = FrontEnd(self, '/task/expert_query')
@@ -181,7 +202,8 @@ class SignalsTest(unittest.TestCase):
 
     def hanging_master_case(self) -> None:
         master = OwnMaster(self)
-        task = oracle_run(self, '--record', self.bags, script(self, TASK + RUN), 'state', env=master.env)
+        task = oracle_run(self, '--record', self.bags, script(self, TASK + RUN), 'state',
+                          env=master.env)
         self.assertTrue(task.says('THERE'), task.output())
         master.hang()
         _, events = self.end(task, signal.SIGINT)
@@ -189,7 +211,8 @@ class SignalsTest(unittest.TestCase):
 
     def test_before_the_script_has_a_node(self) -> None:
         def case() -> None:
-            task = oracle_run(self, script(self, "import time; print('THERE', flush=True); time.sleep(60)"))
+            task = oracle_run(
+                self, script(self, "import time; print('THERE', flush=True); time.sleep(60)"))
             self.assertTrue(task.says('THERE'), task.output())
             self.assertEqual(self.signalled(task, signal.SIGTERM), 128 + signal.SIGTERM)
         self.in_time(case)

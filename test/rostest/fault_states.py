@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""States and action servers that misbehave, in a script under oracle_run with a real expert: the robot goes on."""
+"""States and action servers that misbehave, in a script under oracle_run with a real expert: the
+robot goes on.
+"""
 import json
 import sys
 import tempfile
@@ -9,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import rospy
-
 from oracle_support import FrontEnd, Process, oracle_run, recorded_events, script
 from waiting import wait_for
 
@@ -84,7 +85,8 @@ class FaultyStatesTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
         self.expert = FrontEnd(self, '/task/expert_query')
-        return oracle_run(self, '--config', config, '--record', self.bags, script(self, text), *args)
+        return oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
+                          *args)
 
     def check_recovered(self, task: Process, kind: int) -> None:
         """One failure of this kind, then success."""
@@ -92,9 +94,11 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         self.assertEqual(task.wait(), 0)
         events, = recorded_events(self.bags)
-        failures = [(event.state, event.failure_kind) for event in events if event.kind == OracleEvent.FAILURE]
+        failures = [(event.state, event.failure_kind) for event in events
+                    if event.kind == OracleEvent.FAILURE]
         self.assertEqual(failures, [('PICK', kind)])
-        self.assertEqual([event.target for event in events if event.kind == OracleEvent.JUMP], ['PICK'])
+        self.assertEqual([event.target for event in events if event.kind == OracleEvent.JUMP],
+                         ['PICK'])
 
     def test_a_state_that_raises_is_recovered_from(self) -> None:
         task = self.start(STATES, 'raises')
@@ -105,8 +109,9 @@ class FaultyStatesTest(unittest.TestCase):
         self.check_recovered(self.start(STATES, 'returns_none'), OracleEvent.UNREGISTERED_OUTCOME)
 
     def test_a_state_that_never_returns_is_left_behind_and_the_expert_is_told(self) -> None:
-        task = self.start(STATES, 'hangs', states={'PICK': {'time_limit_s': 0.5, 'grace_period_s': 0.2}},
-                          max_recoveries=0)
+        task = self.start(STATES, 'hangs',
+                          states={'PICK': {'time_limit_s': 0.5,
+                                           'grace_period_s': 0.2}}, max_recoveries=0)
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
@@ -123,7 +128,8 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
-        reply = self.expert.answer(self.request(question, kind=ExpertDecision.GOTO, state='NOWHERE'))
+        reply = self.expert.answer(self.request(question, kind=ExpertDecision.GOTO,
+                                                state='NOWHERE'))
         self.assertFalse(reply.ok)
         for part in ('NOWHERE', 'PICK', 'PLACE'):  # what was wrong, what is allowed
             self.assertIn(part, reply.message)
@@ -136,8 +142,10 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
-        requests = {'Ann': self.request(question, 'Ann', kind=ExpertDecision.GOTO, state='PICK'),
-                    'Bob': self.request(question, 'Bob', kind=ExpertDecision.SUPERSEDE, outcome='succeeded')}
+        requests = {
+            'Ann': self.request(question, 'Ann', kind=ExpertDecision.GOTO, state='PICK'),
+            'Bob': self.request(question, 'Bob', kind=ExpertDecision.SUPERSEDE, outcome='succeeded')
+        }
         at_once = threading.Barrier(2)
 
         def answer(name: str) -> AnswerQueryResponse:
@@ -159,10 +167,12 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
-        gone = self.expert.claim(1, question.query.query_id, 'Bob', 3.0)  # for so long, never renewed
+        # for so long, never renewed
+        gone = self.expert.claim(1, question.query.query_id, 'Bob', 3.0)
         self.assertTrue(gone.ok, gone.message)
         self.assertFalse(self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok)
-        self.assertTrue(wait_for(lambda: self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok))
+        self.assertTrue(
+            wait_for(lambda: self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok))
         self.answer(question, kind=ExpertDecision.GOTO, state='PICK')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
 
@@ -181,11 +191,13 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded', 40.0), task.output())
         self.assertEqual(task.wait(), 0)
         events, = recorded_events(self.bags)
-        self.assertIn('MOVE', [event.state for event in events if event.kind == OracleEvent.FAILURE])
+        self.assertIn('MOVE',
+                      [event.state for event in events if event.kind == OracleEvent.FAILURE])
 
     def test_an_action_server_that_never_answers_runs_into_the_time_limit(self) -> None:
         server = self.server()
-        task = self.start(ACTION, states={'MOVE': {'time_limit_s': 1.0, 'grace_period_s': 0.5}}, max_recoveries=0)
+        task = self.start(ACTION, states={'MOVE': {'time_limit_s': 1.0, 'grace_period_s': 0.5}},
+                          max_recoveries=0)
         task.go_on()
         self.assertTrue(server.says('GOAL'), server.output() + task.output())
         question = self.expert.question(state='MOVE')

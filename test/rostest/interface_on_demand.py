@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Interfaces that are started when an expert chooses them: the documentation's own example, and starts that fail."""
+"""Interfaces that are started when an expert chooses them: the documentation's own example, and
+starts that fail.
+"""
 import os
 import re
 import shutil
@@ -18,11 +20,11 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import make_question  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.expert.followed_server import ServerGoneError, call_service  # noqa: E402
 from smach_oracle.msg import InterfaceOutput  # noqa: E402
-from smach_oracle.oracle.config import Settings  # noqa: E402
 from smach_oracle.oracle.errors import InterfaceError  # noqa: E402
-from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.oracle.settings.settings import Settings  # noqa: E402
+from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
+from smach_oracle.ros.service_calls import ServerGoneError, call_service  # noqa: E402
 from smach_oracle.srv import FinishInterface, FinishInterfaceRequest  # noqa: E402
 
 PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'shared_autonomy.md')
@@ -45,9 +47,13 @@ class InterfaceOnDemand(unittest.TestCase):
         cls.folder = tempfile.mkdtemp()
         package = os.path.join(cls.folder, 'my_robot')
         os.mkdir(package)
-        files = {'package.xml': '<package><name>my_robot</name><version>1.0.0</version><description>x</description>'
-                                '<maintainer email="a@b.c">a</maintainer><license>BSD</license></package>',
-                 'by_hand.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN, 'idle': IDLE}
+        files = {
+            'package.xml': '<package><name>my_robot</name><version>1.0.0</version>'
+            '<description>x</description>'
+            '<maintainer email="a@b.c">a</maintainer><license>BSD</license></package>',
+            'by_hand.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN,
+            'idle': IDLE
+        }
         for name, text in files.items():
             with open(os.path.join(package, name), 'w') as file:
                 file.write(text)
@@ -68,13 +74,16 @@ class InterfaceOnDemand(unittest.TestCase):
         return Settings.from_dict({'interfaces': {'by_hand': entry}}).offers_for('', 'PICK')[0]
 
     def run_interface(self, offer, work):
-        """Run it while a person works in a thread; the answer. Nobody waits on when the person has gone."""
+        """Run it while a person works in a thread; the answer. Nobody waits on when the person has
+        gone.
+        """
         del self.told[:]
         gone = threading.Event()
         thread = threading.Thread(target=self.at_work, args=(work, gone))
         thread.start()
         try:
-            return self.client.run_interface(offer, make_question(self.id(), output_keys=('object_name',)),
+            return self.client.run_interface(offer,
+                                             make_question(self.id(), output_keys=('object_name',)),
                                              gone, lambda *what: None)
         finally:
             thread.join()
@@ -85,13 +94,17 @@ class InterfaceOnDemand(unittest.TestCase):
             gone.set()
 
     def said(self, text):
-        return wait_for(lambda: any(text in line for told in list(self.told) for line in told.lines), 60.0)
+        return wait_for(
+            lambda: any(text in line for told in list(self.told) for line in told.lines), 60.0)
 
     def finish(self):
-        """What a front end does: as soon as the interface has said that it is ready. Whether it has done so."""
+        """What a front end does: as soon as the interface has said that it is ready. Whether it has
+        done so.
+        """
         def finished():
             try:
-                return call_service('/by_hand/finish', FinishInterface, FinishInterfaceRequest(outcome='succeeded')).ok
+                return call_service('/by_hand/finish', FinishInterface,
+                                    FinishInterfaceRequest(outcome='succeeded')).ok
             except ServerGoneError:
                 return False
         self.seen = bool(self.said('Now do the work of PICK'))
@@ -110,8 +123,9 @@ class InterfaceOnDemand(unittest.TestCase):
 
     def test_the_example_of_the_documentation_does_the_work_and_is_gone_afterwards(self):
         self.assert_works(self.offer())
-        self.assertTrue(wait_for(lambda: '/by_hand/status' not in dict(rosgraph.Master('/t').getPublishedTopics(''))),
-                        'it ended in order')
+        self.assertTrue(
+            wait_for(lambda: '/by_hand/status' not in dict(
+                rosgraph.Master('/t').getPublishedTopics(''))), 'it ended in order')
 
     def test_so_does_a_launch_file(self):
         self.assert_works(self.offer(node=None, launch='my_robot/by_hand.launch'))
@@ -121,16 +135,19 @@ class InterfaceOnDemand(unittest.TestCase):
             self.run_interface(offer, lambda: True)
         for text in texts:
             self.assertIn(text, str(raised.exception))
-        self.assertTrue(wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED))
+        self.assertTrue(
+            wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED))
         self.assertEqual(self.told[-1].text, str(raised.exception))
 
     def test_a_start_that_fails_is_said_with_its_last_words(self):
         self.assert_fails(self.offer(node='my_robot broken'), 'exit code 5', 'it has no camera')
-        self.assert_fails(self.offer(node='my_robot nothing'), 'there is no node nothing in package my_robot')
+        self.assert_fails(self.offer(node='my_robot nothing'),
+                          'there is no node nothing in package my_robot')
         self.assert_fails(self.offer(node='no_robot nothing'), 'there is no package no_robot')
 
     def test_what_never_brings_up_its_server_is_ended(self):
-        self.assert_fails(self.offer(node='my_robot idle', start_limit_s=1.5), 'no action server /by_hand within 1.5 s')
+        self.assert_fails(self.offer(node='my_robot idle', start_limit_s=1.5),
+                          'no action server /by_hand within 1.5 s')
         self.assert_gone()
 
     def test_one_that_nobody_can_start_is_waited_for_only_so_long(self):

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Joy
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from machine_lag import MachineLag  # noqa: E402
 from teleoperation_fixtures import FakeArm, Person  # noqa: E402
-from waiting import assert_soon, wait_for  # noqa: E402
+from waiting import assert_soon, stays, wait_for  # noqa: E402
 
 STOPS_WITHIN_S = 0.1
 SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it
@@ -35,16 +35,19 @@ class JoyTeleoperation(unittest.TestCase):
 
     def push_until_it_moves(self, axes, buttons):
         begun_s = time.monotonic()
-        while self.arm.moved_s < begun_s + 0.3 and time.monotonic() < begun_s + 15.0:
-            self.push(axes, buttons)
-            time.sleep(0.02)
+        self.push_until(axes, buttons, lambda: self.arm.moved_s >= begun_s + 0.3)
         self.assertGreater(self.arm.moved_s, begun_s + 0.3)
+
+    def push_until(self, axes, buttons, condition):
+        """Push again and again, 50 times a second; whether the condition holds in the end."""
+        return wait_for(lambda: self.push(axes, buttons) or condition(), 15.0)
 
     def assert_stops(self, within_s, move, let_go):
         def measure():
             self.push_until_it_moves(*move)
             begun_s = time.monotonic()
-            # two processes have a part in it, and this one, each of which a busy machine keeps waiting
+            # two processes have a part in it, and this one, each of which a busy machine keeps
+            # waiting
             return self.arm.stands_after(let_go, within_s + 0.5), 3 * self.lag.most_s(begun_s - 0.1)
         assert_soon(measure, within_s)
 
@@ -53,7 +56,8 @@ class JoyTeleoperation(unittest.TestCase):
 
     def test_it_moves_while_the_button_is_held_and_stops_when_it_is_let_go(self):
         before = self.ann.tool()
-        self.assert_stops(STOPS_WITHIN_S, ([0, 0, 1, 0, 0, 0], [1, 0]), lambda: self.let_go(0, 0, 1, 0, 0, 0))
+        self.assert_stops(STOPS_WITHIN_S, ([0, 0, 1, 0, 0, 0], [1, 0]),
+                          lambda: self.let_go(0, 0, 1, 0, 0, 0))
         way = self.ann.tool() - before
         self.assertGreater(way[2], 0.02)
         self.assertLess(abs(way[0]) + abs(way[1]), 0.1 * way[2])
@@ -63,7 +67,8 @@ class JoyTeleoperation(unittest.TestCase):
         self.assert_stops(SILENCE_S + STOPS_WITHIN_S, ([0, 0, -1, 0, 0, 0], [1, 0]), lambda: None)
 
     def test_each_axis_moves_the_hand_its_own_way(self):
-        self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])  # from the stretched arm of another test
+        # from the stretched arm of another test
+        self.push_until_it_moves([0, 0, -1, 0, 0, 0], [1, 0])
         self.arm.stands_after(self.let_go)
         for axis in (0, 1, 2):
             before = self.ann.tool()
@@ -74,22 +79,16 @@ class JoyTeleoperation(unittest.TestCase):
 
     def test_without_the_button_nothing_moves(self):
         before_s = self.arm.moved_s
-        for _ in range(20):
-            self.push([1, 1, 1, 1, 1, 1], [0, 1])
-            time.sleep(0.02)
-        self.assertEqual(self.arm.moved_s, before_s)
+        self.assertTrue(stays(lambda: self.push([1, 1, 1, 1, 1, 1], [0, 1])
+                              or self.arm.moved_s == before_s, 0.4))
 
     def test_the_second_button_closes_the_gripper_and_opens_it_again(self):
         self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
         for stalled in (True, False):
-            begun_s = time.monotonic()
-            while self.ann.states[-1].gripper_stalled != stalled and time.monotonic() < begun_s + 15.0:
-                self.push([0, 0, 0, 0, 0, 0], [1, 1])
-                time.sleep(0.02)
-            self.assertEqual(self.ann.states[-1].gripper_stalled, stalled)
-            for _ in range(20):
-                self.push([0, 0, 0, 0, 0, 0], [1, 0])
-                time.sleep(0.02)
+            self.assertTrue(self.push_until(
+                [0] * 6, [1, 1],
+                lambda stalled=stalled: self.ann.states[-1].gripper_stalled == stalled))
+            self.assertTrue(stays(lambda: self.push([0] * 6, [1, 0]) or True, 0.4), 'let go')
         self.assertGreater(self.ann.states[-1].gripper, 0.08)
 
 

@@ -1,4 +1,6 @@
-"""How busy the machine is with others: what that adds to delays that a test measures by the clock."""
+"""How busy the machine is with others: what that adds to delays that a test measures by the
+clock.
+"""
 import threading
 import time
 from collections import deque
@@ -20,5 +22,5 @@ class MachineLag:
     def _nap(self):
         while True:
             begun_s = time.monotonic()
-            time.sleep(_NAP_S)
+            time.sleep(_NAP_S)  # how late it is woken is what is measured
             self._late.append((time.monotonic(), time.monotonic() - begun_s - _NAP_S))

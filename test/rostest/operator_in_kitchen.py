@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
-"""The scripted operator in the simulated kitchen: it takes the drink and hands it over by hand, or sends to a state."""
+"""The scripted operator in the simulated kitchen: it takes the drink and hands it over by hand, or
+sends to a state.
+"""
 import os
 import sys
 import threading
 import unittest
 
 import rospy
+
 import smach
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import Asked, make_question  # noqa: E402
 
-from smach_oracle.oracle.question import AnswerKind, InterfaceOffer, OutcomeChoice, StateChoice  # noqa: E402
-from smach_oracle.ros.expert_client import ExpertQueryClient  # noqa: E402
+from smach_oracle.oracle.asking.question import AnswerKind, OutcomeChoice, StateChoice
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
+from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
 from smach_oracle.srv import Judge, ResetWorld, Reveal  # noqa: E402
 from smach_oracle.tasks import drink_retrieval  # noqa: E402
 
@@ -55,7 +59,10 @@ class InKitchen(unittest.TestCase):
         for label in ('RAISE_TORSO', 'OPEN_FRIDGE', 'MOVE_IN'):
             self.run_state(label)
         self.by_hand('PICK_DRINK', ('grasp',))
-        held = [body.name for body in rospy.ServiceProxy('world/reveal', Reveal)([]).bodies if body.held == 'right']
+        held = [
+            body.name for body in rospy.ServiceProxy('world/reveal', Reveal)([]).bodies
+            if body.held == 'right'
+        ]
         self.assertEqual(len(held), 1)
         for label in ('MOVE_OUT', 'MOVE_HOME'):
             self.run_state(label)

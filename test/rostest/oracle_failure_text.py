@@ -6,8 +6,8 @@ import unittest
 
 import actionlib
 import rospy
-
 from oracle_support import FrontEnd, oracle_run, script
+
 from smach_oracle.msg import ExpertDecision, MoveArmsAsideAction
 from smach_oracle.srv import AnswerQueryRequest
 
@@ -25,8 +25,9 @@ print('OUTCOME', sm.execute(), flush=True)
 
 class FailureTextTest(unittest.TestCase):
     def test_the_words_of_the_action_server_reach_the_expert(self) -> None:
-        server = actionlib.SimpleActionServer('move', MoveArmsAsideAction, auto_start=False,
-                                              execute_cb=lambda goal: server.set_aborted(text=REASON))
+        server = actionlib.SimpleActionServer(
+            'move', MoveArmsAsideAction, auto_start=False,
+            execute_cb=lambda goal: server.set_aborted(text=REASON))
         server.start()
         config = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 30}), 'oracle.yaml')
         expert = FrontEnd(self, '/task/expert_query')

@@ -8,10 +8,16 @@ import actionlib
 import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
-
 from oracle_support import EventLog, FrontEnd, Process, oracle_run, script
 from waiting import wait_for
-from smach_oracle.msg import ExpertDecision, MoveArmsAsideAction, MoveArmsAsideGoal, OracleEvent, OracleRates
+
+from smach_oracle.msg import (
+    ExpertDecision,
+    MoveArmsAsideAction,
+    MoveArmsAsideGoal,
+    OracleEvent,
+    OracleRates,
+)
 from smach_oracle.srv import AnswerQueryRequest
 
 PRELUDE = '''
@@ -130,7 +136,8 @@ class LibraryTest(unittest.TestCase):
         program = self.start(WRAPPED_BEFORE_THE_NODE)
         self.assertTrue(program.says('OUTCOME succeeded'), program.output())
         rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)
-        self.assertEqual([(row.path, row.state, row.failures) for row in rates.states], [('ROBOT', 'PICK', 1)])
+        self.assertEqual([(row.path, row.state, row.failures) for row in rates.states],
+                         [('ROBOT', 'PICK', 1)])
         self.assertTrue(self.published('/task/smach/container_status'))
         self.finish(program)
 
@@ -154,8 +161,10 @@ class LibraryTest(unittest.TestCase):
         self.assertIn('LOOKED 1', program.output())
 
     def test_many_robots_may_share_one_server(self) -> None:
-        server = Process([sys.executable, '-c', 'import rospy; from smach_oracle.ros.expert_server import '
-                          'ExpertQueryServer; rospy.init_node("desk"); ExpertQueryServer("/desk"); rospy.spin()'])
+        server = Process([
+            sys.executable, '-c', 'import rospy; from smach_oracle.ros.expert.server import '
+            'ExpertQueryServer; rospy.init_node("desk"); ExpertQueryServer("/desk"); rospy.spin()'
+        ])
         self.addCleanup(server.stop)
         self.set_param('expert_query_server', '/desk')
         self.set_param('oracle', {'max_recoveries': 0})
@@ -195,7 +204,8 @@ class LibraryTest(unittest.TestCase):
                 self.assertEqual(program.wait(), 0, program.output())
                 rospy.delete_param('/task/' + name)
                 self.assertEqual(program.output().count('ATTEMPT'), 3, program.output())
-                self.assertEqual(program.output().count('memory: ' if name == 'oracle' else '/proc/nowhere'), 3)
+                self.assertEqual(
+                    program.output().count('memory: ' if name == 'oracle' else '/proc/nowhere'), 3)
 
     def test_machines_that_are_gone_leave_nothing_behind(self) -> None:
         program = self.start(A_NEW_MACHINE_EACH_TRIAL)
@@ -212,7 +222,7 @@ class LibraryTest(unittest.TestCase):
         self.assertTrue(client.wait_for_result(rospy.Duration(20.0)), task.output())
         self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED)
         log = EventLog(self, 'task')
-        self.assertTrue(wait_for(lambda: bool(log._subscriber.get_num_connections())))
+        self.assertTrue(wait_for(log.connected))
         client.send_goal(MoveArmsAsideGoal())
         self.assertEqual(log.wait_for(OracleEvent.TRIAL_END)[0].outcome, 'succeeded')
 

@@ -10,7 +10,7 @@ import rospy
 from waiting import wait_for
 
 from smach_oracle.msg import OracleEvent, OracleRates
-from smach_oracle.oracle.events import EventKind, EventSource
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.publishers import EventPublisher, RatesPublisher
 
 
@@ -99,7 +99,7 @@ class PublishersTest(unittest.TestCase):
         started = time.monotonic()
         while time.monotonic() - started < 1.5:
             self.machine.step()
-            time.sleep(0.001)
+            time.sleep(0.001)  # the pace of a brisk machine
         self.assertTrue(wait_for(lambda: early[-1].states[0].successes == self.machine.visits))
         elapsed_s = time.monotonic() - started
         self.assertLessEqual(len(early), 2 + elapsed_s / 0.2)
@@ -116,7 +116,8 @@ class PublishersTest(unittest.TestCase):
         publisher.watch(self.machine)
         self.machine.step()
         self.machine.events.emit(EventKind.TRIAL_END, 'TOP', outcome='succeeded')
-        self.assertTrue(wait_for(lambda: len(received) == 1 and received[0].states[0].successes == 1))
+        self.assertTrue(
+            wait_for(lambda: len(received) == 1 and received[0].states[0].successes == 1))
 
     def test_a_machine_that_is_gone_is_forgotten(self) -> None:
         publisher = RatesPublisher('~oracle/rates_of_nobody', period_s=0.01)
@@ -124,7 +125,7 @@ class PublishersTest(unittest.TestCase):
         observer = publisher.watch(self.machine)
         self.machine = None
         observer(_end_event())
-        self.assertIsNone(observer._container())
+        self.assertIsNone(observer._machine())
 
 
 def _end_event() -> object:

@@ -11,10 +11,10 @@ import actionlib
 import rosbag
 import rosgraph
 import rospy
-from smach_msgs.msg import SmachContainerStructure
-
 from oracle_support import EventLog, FrontEnd, oracle_run, script
 from waiting import wait_for
+
+from smach_msgs.msg import SmachContainerStructure
 from smach_oracle.msg import ExpertDecision, MoveArmsAsideAction, OracleEvent, OracleRates
 from smach_oracle.srv import AnswerQueryRequest
 
@@ -35,17 +35,20 @@ TWO_TRIALS = ('one', 'two')
 
 
 class MoveServer:
-    """An action server that ends goals as it is told, in turn; succeeds when it has not been told."""
+    """An action server that ends goals as it is told, in turn; succeeds when it has not been
+    told.
+    """
 
     def __init__(self) -> None:
         self.results: List[str] = []
-        self._server = actionlib.SimpleActionServer('move', MoveArmsAsideAction, self._execute, auto_start=False)
+        self._server = actionlib.SimpleActionServer('move', MoveArmsAsideAction, self._execute,
+                                                    auto_start=False)
         self._server.start()
 
     def _execute(self, goal: object) -> None:
         result = self.results.pop(0) if self.results else 'succeed'
         if result == 'take long':
-            rospy.sleep(0.5)
+            rospy.sleep(0.5)  # a motion takes its time, in which a recorder finds the topics
         if result == 'abort':
             self._server.set_aborted()
         else:
@@ -68,9 +71,10 @@ class OracleRunTest(unittest.TestCase):
         self.server.results = ['succeed', 'succeed', 'abort']
         task = self.run_task(trials=TWO_TRIALS)
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
-        self.assertTrue(wait_for(lambda: bool(log._subscriber.get_num_connections())))
+        self.assertTrue(wait_for(log.connected))
         task.go_on()
-        self.assertTrue(wait_for(lambda: task.output().count('OUTCOME succeeded') == 2), task.output())
+        self.assertTrue(wait_for(lambda: task.output().count('OUTCOME succeeded') == 2),
+                        task.output())
         task.go_on()
         self.assertEqual(task.wait(), 0, task.output())
         end = log.wait_for(OracleEvent.TRIAL_END)[-1]
@@ -95,21 +99,27 @@ class OracleRunTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         master = rosgraph.Master('/test')
         types = dict(master.getPublishedTopics(''))
-        expected = {'/task/oracle/events': 'smach_oracle/OracleEvent', '/task/oracle/rates': 'smach_oracle/OracleRates',
-                    '/task/expert_query/open': 'smach_oracle/OpenQueries',
-                    '/task/expert_query/result': 'smach_oracle/ExpertQueryActionResult',
-                    '/task/smach/container_structure': 'smach_msgs/SmachContainerStructure',
-                    '/task/smach/container_status': 'smach_msgs/SmachContainerStatus'}
+        expected = {
+            '/task/oracle/events': 'smach_oracle/OracleEvent',
+            '/task/oracle/rates': 'smach_oracle/OracleRates',
+            '/task/expert_query/open': 'smach_oracle/OpenQueries',
+            '/task/expert_query/result': 'smach_oracle/ExpertQueryActionResult',
+            '/task/smach/container_structure': 'smach_msgs/SmachContainerStructure',
+            '/task/smach/container_status': 'smach_msgs/SmachContainerStatus'
+        }
         self.assertEqual({name: types.get(name) for name in expected}, expected)
         services = [name for name, _ in master.getSystemState()[2]]
         self.assertIn('/task/expert_query/claim', services)
         self.assertIn('/task/expert_query/answer', services)
-        rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)  # latched: nothing moves any more
+        # latched: nothing moves any more
+        rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)
         self.assertEqual({(row.path, row.state, row.successes) for row in rates.states},
                          {('TASK', 'MOVE', 1), ('TASK', 'AGAIN', 1)})
-        self.assertIn(('MOVE', 'succeeded', 'AGAIN', 1),
-                      [(edge.state, edge.outcome, edge.target, edge.count) for edge in rates.transitions])
-        structure = rospy.wait_for_message('/task/smach/container_structure', SmachContainerStructure, 10.0)
+        self.assertIn(
+            ('MOVE', 'succeeded', 'AGAIN', 1),
+            [(edge.state, edge.outcome, edge.target, edge.count) for edge in rates.transitions])
+        structure = rospy.wait_for_message('/task/smach/container_structure',
+                                           SmachContainerStructure, 10.0)
         edges = set(zip(structure.outcomes_from, structure.outcomes_to))
         self.assertEqual(structure.path, '/TASK')
         self.assertIn(('MOVE', 'ORACLE'), edges)
@@ -118,11 +128,13 @@ class OracleRunTest(unittest.TestCase):
         self.assertEqual(task.wait(), 0)
 
     def test_an_introspection_server_of_the_scripts_own_is_not_doubled(self) -> None:
-        own = SCRIPT.replace('for name in', "viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')\n"
-                             'viewer.start()\nfor name in')
+        own = SCRIPT.replace(
+            'for name in', "viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')\n"
+            'viewer.start()\nfor name in')
         task = oracle_run(self, script(self, own), 'one')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
-        structure = rospy.wait_for_message('/mine/smach/container_structure', SmachContainerStructure, 10.0)
+        structure = rospy.wait_for_message('/mine/smach/container_structure',
+                                           SmachContainerStructure, 10.0)
         self.assertIn('ORACLE', structure.children)
         published = [topic for topic, _ in rosgraph.Master('/test').getPublishedTopics('')]
         self.assertNotIn('/task/smach/container_structure', published)
@@ -161,7 +173,8 @@ class OracleRunTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.server.results = ['abort', 'take long', 'take long', 'take long', 'take long']
-        task = self.run_task('--record', folder.name, '--record-topic', '/move/goal', trials=TWO_TRIALS)
+        task = self.run_task('--record', folder.name, '--record-topic', '/move/goal',
+                             trials=TWO_TRIALS)
         for _ in TWO_TRIALS:
             task.go_on()
         self.assertEqual(task.wait(), 0, task.output())
@@ -174,7 +187,8 @@ class OracleRunTest(unittest.TestCase):
                 topics = bag.get_type_and_topic_info()[1]
             events = seen['/task/oracle/events']
             self.assertEqual([event.seq for event in events], list(range(len(events))))
-            self.assertEqual((events[0].kind, events[-1].kind), (OracleEvent.TRIAL_START, OracleEvent.TRIAL_END))
+            self.assertEqual((events[0].kind, events[-1].kind),
+                             (OracleEvent.TRIAL_START, OracleEvent.TRIAL_END))
             self.assertTrue(seen['/task/oracle/rates'])
             self.assertIn('/move/goal', topics)
             self.assertIn('/task/smach/container_status', topics)

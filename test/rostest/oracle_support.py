@@ -1,4 +1,6 @@
-"""What the rostests of the ROS side share: scripts under oracle_run as real processes, masters of their own."""
+"""What the rostests of the ROS side share: scripts under oracle_run as real processes, masters of
+their own.
+"""
 import glob
 import os
 import signal
@@ -13,11 +15,11 @@ import rosbag
 import rospy
 from waiting import wait_for
 
+from smach_oracle.experiment.launching import free_port
 from smach_oracle.msg import OpenQueries, OracleEvent
-from smach_oracle.simulation.experiment.launching import free_port
 from smach_oracle.srv import AnswerQuery, ClaimQuery
 
-RUNNER = 'from smach_oracle.ros.script_runner import main; main()'
+RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
 
 
 class Process:
@@ -25,7 +27,8 @@ class Process:
 
     def __init__(self, command: List[str], env: Optional[Dict[str, str]] = None) -> None:
         self._output = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output, stderr=subprocess.STDOUT,
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output,
+                                        stderr=subprocess.STDOUT,
                                         env=dict(os.environ, PYTHONUNBUFFERED='1', **(env or {})))
 
     def output(self) -> str:
@@ -34,7 +37,8 @@ class Process:
 
     def says(self, text: str, limit_s: float = 20.0) -> bool:
         """Wait until it has said this."""
-        return bool(wait_for(lambda: text in self.output() or not self.running(), limit_s)) and text in self.output()
+        return bool(wait_for(lambda: text in self.output() or not self.running(),
+                             limit_s)) and text in self.output()
 
     def go_on(self) -> None:
         """Let it go on that waits for a line of input."""
@@ -119,11 +123,14 @@ class OwnMaster:
 
 
 def recorded_events(folder: str, node: str = 'task') -> List[List[OracleEvent]]:
-    """The events in each of the bags in a folder, oldest first; raises where a bag is not closed."""
+    """The events in each of the bags in a folder, oldest first; raises where a bag is not
+    closed.
+    """
     trials = []
     for path in sorted(glob.glob(os.path.join(folder, '*.bag'))):
         with rosbag.Bag(path) as bag:
-            trials.append([event for _, event, _ in bag.read_messages('/{}/oracle/events'.format(node))])
+            trials.append(
+                [event for _, event, _ in bag.read_messages('/{}/oracle/events'.format(node))])
     return trials
 
 
@@ -132,8 +139,13 @@ class EventLog:
 
     def __init__(self, test: Any, node: str) -> None:
         self.events: List[OracleEvent] = []
-        self._subscriber = rospy.Subscriber('/{}/oracle/events'.format(node), OracleEvent, self.events.append)
+        self._subscriber = rospy.Subscriber('/{}/oracle/events'.format(node), OracleEvent,
+                                            self.events.append)
         test.addCleanup(self._subscriber.unregister)
+
+    def connected(self) -> bool:
+        """Whether the node's events arrive here."""
+        return bool(self._subscriber.get_num_connections())
 
     def of(self, kind: int) -> List[OracleEvent]:
         return [event for event in list(self.events) if event.kind == kind]

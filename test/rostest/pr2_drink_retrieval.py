@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The second use case on the simulated PR2, over its nodes: the script as it is, and under an oracle; bad goals."""
+"""The second use case on the simulated PR2, over its nodes: the script as it is, and under an
+oracle; bad goals.
+"""
 import math
 import subprocess
 import tempfile
@@ -10,35 +12,47 @@ import actionlib
 import rospkg
 import rospy
 import rostest
-import smach
 import yaml
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import SingleJointPositionAction, SingleJointPositionGoal
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from roslib.packages import find_node
 from std_msgs.msg import Header
 
+import smach
+from control_msgs.msg import SingleJointPositionAction, SingleJointPositionGoal
 from smach_oracle import OracleContainer
 from smach_oracle.analysis.trials import load_trials
-from smach_oracle.msg import (CloseDoorAction, CloseDoorGoal, DetectDrinkAction, DetectDrinkGoal, HandOverAction,
-                              HandOverGoal, OpenDoorAction, OpenDoorGoal)
-from smach_oracle.simulation.world.kitchen_scene import draw
+from smach_oracle.msg import (
+    CloseDoorAction,
+    CloseDoorGoal,
+    DetectDrinkAction,
+    DetectDrinkGoal,
+    HandOverAction,
+    HandOverGoal,
+    OpenDoorAction,
+    OpenDoorGoal,
+)
+from smach_oracle.simulation.scenes.kitchen_scene import draw
 from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import drink_retrieval
 
-STATES = ['RAISE_TORSO', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT', 'CLOSE_FRIDGE',
-          'MOVE_HOME', 'HAND_OVER']
+STATES = [
+    'RAISE_TORSO', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
+    'CLOSE_FRIDGE', 'MOVE_HOME', 'HAND_OVER'
+]
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'
 SETTINGS = TASKS / 'drink_retrieval.yaml'
 PEACEFUL = 3  # a seed without causes to fail
 LIMIT = rospy.Duration(900.0)  # of ROS time, which runs fast while nothing moves
-NOWHERE = PoseStamped(Header(frame_id='odom_combined'), Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
+NOWHERE = PoseStamped(Header(frame_id='odom_combined'),
+                      Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
 
 
 def seed_with(kind):
     """The first seed of which this is the only cause to fail."""
-    return next(seed for seed in range(10000) if [cause.kind for cause in draw(seed).causes] == [kind])
+    return next(seed for seed in range(10000)
+                if [cause.kind for cause in draw(seed).causes] == [kind])
 
 
 class DrinkRetrievalTest(unittest.TestCase):
@@ -71,14 +85,20 @@ class DrinkRetrievalTest(unittest.TestCase):
     def test_3_bad_goals_end_with_the_reason(self):
         self.assertTrue(self.reset(seed=PEACEFUL).ok)
         for name, spec, goal, status, text in [
-                ('open_door', OpenDoorAction, OpenDoorGoal('third'), GoalStatus.ABORTED, "unknown arm 'third'"),
-                ('close_door', CloseDoorAction, CloseDoorGoal(''), GoalStatus.ABORTED, "unknown arm ''"),
-                ('hand_over', HandOverAction, HandOverGoal('right', NOWHERE), GoalStatus.ABORTED, 'not finite'),
-                ('detect_drink', DetectDrinkAction, DetectDrinkGoal(math.nan), GoalStatus.ABORTED, 'min_height is nan'),
-                ('detect_drink', DetectDrinkAction, DetectDrinkGoal(0.05), GoalStatus.ABORTED, 'the door hides'),
-                ('move_base', MoveBaseAction, MoveBaseGoal(NOWHERE), GoalStatus.REJECTED, 'finite'),
-                ('torso_controller/position_joint_action', SingleJointPositionAction,
-                 SingleJointPositionGoal(position=math.nan), GoalStatus.REJECTED, 'nan')]:
+            ('open_door', OpenDoorAction, OpenDoorGoal('third'), GoalStatus.ABORTED,
+             "unknown arm 'third'"),
+            ('close_door', CloseDoorAction, CloseDoorGoal(''), GoalStatus.ABORTED,
+             "unknown arm ''"),
+            ('hand_over', HandOverAction, HandOverGoal('right',
+                                                       NOWHERE), GoalStatus.ABORTED, 'not finite'),
+            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(math.nan), GoalStatus.ABORTED,
+             'min_height is nan'),
+            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(0.05), GoalStatus.ABORTED,
+             'the door hides'),
+            ('move_base', MoveBaseAction, MoveBaseGoal(NOWHERE), GoalStatus.REJECTED, 'finite'),
+            ('torso_controller/position_joint_action', SingleJointPositionAction,
+             SingleJointPositionGoal(position=math.nan), GoalStatus.REJECTED, 'nan')
+        ]:
             client = actionlib.SimpleActionClient(name, spec)
             self.assertTrue(client.wait_for_server(LIMIT), name)
             client.send_goal(goal)
@@ -98,9 +118,12 @@ class DrinkRetrievalTest(unittest.TestCase):
 
     def test_5_with_the_oracle_a_dazzled_camera_looks_again(self):
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([find_node('smach_oracle', 'oracle_run')[0], '--config', str(SETTINGS), '--record', folder,
-                            str(TASKS / 'drink_retrieval.py'), '--seed', str(seed_with('glare'))],
-                           check=True, timeout=140)
+            subprocess.run([
+                find_node('smach_oracle', 'oracle_run')[0], '--config',
+                str(SETTINGS), '--record', folder,
+                str(TASKS / 'drink_retrieval.py'), '--seed',
+                str(seed_with('glare'))
+            ], check=True, timeout=140)
             trial, = load_trials([folder]).trials
         self.assertEqual((trial.outcome, trial.questions), ('succeeded', 0))
         self.assertIn('DRINK_RETRIEVAL/DETECT_DRINK', dict(trial.failures_by_state))

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The simulated PR2's eyes over ROS, and an expert's in their place, against where things truly are."""
+"""The simulated PR2's eyes over ROS, and an expert's in their place, against where things truly
+are.
+"""
 import unittest
 from typing import Any
 
@@ -9,11 +11,23 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from waiting import wait_for
 
-from smach_oracle.msg import (DetectDrinkAction, DetectDrinkGoal, DetectTabletopAction, DetectTabletopGoal,
-                              SharedAutonomyAction, SharedAutonomyGoal)
+from smach_oracle.msg import (
+    DetectDrinkAction,
+    DetectDrinkGoal,
+    DetectTabletopAction,
+    DetectTabletopGoal,
+    SharedAutonomyAction,
+    SharedAutonomyGoal,
+)
+from smach_oracle.pr2.ros_robot import RosRobot
 from smach_oracle.ros.userdata_codec import decode_all
-from smach_oracle.simulation.robot.ros_robot import RosRobot
-from smach_oracle.srv import (FinishInterface, ResetWorld, Reveal, SegmentObject, SegmentObjectRequest)
+from smach_oracle.srv import (
+    FinishInterface,
+    ResetWorld,
+    Reveal,
+    SegmentObject,
+    SegmentObjectRequest,
+)
 
 LIMIT_S = 60.0
 NEAR_M = 0.015
@@ -44,7 +58,8 @@ class Eyes(unittest.TestCase):
         client = actionlib.ActionClient(name, spec)
         self.assertTrue(wait_for(client.wait_for_server, LIMIT_S))
         handle = client.send_goal(goal)
-        self.assertTrue(wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
+        self.assertTrue(
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
         return handle
 
     def off_by(self, pose: Any) -> float:
@@ -69,7 +84,8 @@ class Eyes(unittest.TestCase):
             self.assertIn('allowed: 0 to 0.3', handle.get_result().reason)
 
     def test_an_empty_scene_aborts_and_says_what_is_missing(self) -> None:
-        for target, height, words in (((0.75, 0.0, 0.75), 0.3, 'there is nothing on the table that stands higher than'),
+        for target, height, words in (((0.75, 0.0, 0.75), 0.3,
+                                       'there is nothing on the table that stands higher than'),
                                       ((0.5, -1.5, 1.6), 0.02, 'no table in view')):
             self.robot.look_at(target)
             handle = self.ended('detect_tabletop', DetectTabletopAction, DetectTabletopGoal(height))
@@ -91,14 +107,18 @@ class Eyes(unittest.TestCase):
             output_keys=['table', 'objects', 'sizes']))
         self.assertTrue(wait_for(lambda: handle.get_goal_status() == GoalStatus.ACTIVE, LIMIT_S))
         seen = max(self.things, key=lambda body: body.region.width * body.region.height)
-        answer = call('perception_interface/segment', SegmentObject, SegmentObjectRequest(region=seen.region))
+        answer = call('perception_interface/segment', SegmentObject,
+                      SegmentObjectRequest(region=seen.region))
         self.assertTrue(answer.ok, answer.message)
         self.assertLess(float(np.linalg.norm(place(answer.object) - place(seen.pose))), 2 * NEAR_M)
-        self.assertTrue(call('perception_interface/finish', FinishInterface, 'succeeded', [], '', '').ok)
-        self.assertTrue(wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
+        self.assertTrue(
+            call('perception_interface/finish', FinishInterface, 'succeeded', [], '', '').ok)
+        self.assertTrue(
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
         outputs = decode_all(handle.get_result().outputs)
         self.assertEqual(sorted(outputs), ['objects', 'sizes', 'table'])
-        self.assertLess(float(np.linalg.norm(place(outputs['objects'][0]) - place(seen.pose))), 2 * NEAR_M)
+        self.assertLess(float(np.linalg.norm(place(outputs['objects'][0]) - place(seen.pose))),
+                        2 * NEAR_M)
 
 
 if __name__ == '__main__':

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The first use case on the simulated PR2, over its nodes: as the task does it, and with goals that cannot be."""
+"""The first use case on the simulated PR2, over its nodes: as the task does it, and with goals that
+cannot be.
+"""
 import math
 import threading
 import unittest
@@ -7,14 +9,23 @@ import unittest
 import actionlib
 import rospy
 import rostest
-import smach
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from smach_oracle.msg import (CollisionBoxes, MoveArmsAsideAction, MoveArmsAsideGoal, PickAction, PickGoal, PlaceAction,
-                              PlaceGoal, PointHeadAction, PointHeadGoal)
+import smach
+from smach_oracle.msg import (
+    CollisionBoxes,
+    MoveArmsAsideAction,
+    MoveArmsAsideGoal,
+    PickAction,
+    PickGoal,
+    PlaceAction,
+    PlaceGoal,
+    PointHeadAction,
+    PointHeadGoal,
+)
 from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import pick_and_place
 
@@ -43,7 +54,9 @@ class PickAndPlaceTest(unittest.TestCase):
         return client
 
     def ended(self, client):
-        """How it ended: (status, result); the reason is what the status says, too, for those who see that alone."""
+        """How it ended: (status, result); the reason is what the status says, too, for those who
+        see that alone.
+        """
         self.assertTrue(client.wait_for_result(LIMIT), client.action_client.ns)
         if client.get_state() == GoalStatus.ABORTED:
             self.assertEqual(client.get_goal_status_text(), client.get_result().reason)
@@ -53,15 +66,20 @@ class PickAndPlaceTest(unittest.TestCase):
         self.assertTrue(self.reset(seed=3).ok)
         good = pose(0.6, -0.1, 0.78)
         for name, spec, goal, text in [
-                ('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal(['third']), "unknown arm 'third'"),
-                ('point_head', PointHeadAction,
-                 PointHeadGoal(PointStamped(Header(frame_id='moon'), Point(1, 0, 1))), "frame 'moon'; allowed"),
-                ('pick', PickAction, PickGoal('right', pose(math.nan, 0, 0), SIZE, ''), 'not finite'),
-                ('pick', PickAction, PickGoal('right', good, SIZE, 'map of the moon'), 'no collision map'),
-                ('pick', PickAction, PickGoal('right', pose(2.5, 0.0, 0.8), SIZE, ''), 'out of reach'),
-                ('place', PlaceAction, PlaceGoal('right', good, good, ''), 'there is nothing to stand on'),
-                ('place', PlaceAction, PlaceGoal('right', pose(math.inf, 0, 0), good, ''), 'pose: '),
-                ('place', PlaceAction, PlaceGoal('up', good, good, ''), "unknown arm 'up'")]:
+            ('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal(['third']),
+             "unknown arm 'third'"),
+            ('point_head', PointHeadAction,
+             PointHeadGoal(PointStamped(Header(frame_id='moon'),
+                                        Point(1, 0, 1))), "frame 'moon'; allowed"),
+            ('pick', PickAction, PickGoal('right', pose(math.nan, 0, 0), SIZE, ''), 'not finite'),
+            ('pick', PickAction, PickGoal('right', good, SIZE,
+                                          'map of the moon'), 'no collision map'),
+            ('pick', PickAction, PickGoal('right', pose(2.5, 0.0, 0.8), SIZE, ''), 'out of reach'),
+            ('place', PlaceAction, PlaceGoal('right', good, good,
+                                             ''), 'there is nothing to stand on'),
+            ('place', PlaceAction, PlaceGoal('right', pose(math.inf, 0, 0), good, ''), 'pose: '),
+            ('place', PlaceAction, PlaceGoal('up', good, good, ''), "unknown arm 'up'")
+        ]:
             status, result = self.ended(self.sent(name, spec, goal))
             self.assertEqual((name, status), (name, GoalStatus.ABORTED))
             self.assertIn(text, result.reason)
@@ -94,7 +112,8 @@ class PickAndPlaceTest(unittest.TestCase):
         gone, *cubes = rospy.wait_for_message('collision_map_markers', MarkerArray, 60.0).markers
         self.assertEqual(gone.action, Marker.DELETEALL)
         self.assertIn('table', boxes.names)
-        self.assertEqual([(cube.text, cube.pose, cube.scale, cube.header.frame_id) for cube in cubes],
+        self.assertEqual([(cube.text, cube.pose, cube.scale, cube.header.frame_id)
+                          for cube in cubes],
                          [(name, where, size, 'base_footprint')
                           for name, where, size in zip(boxes.names, boxes.poses, boxes.sizes)])
         self.assertEqual({(cube.type, cube.action, cube.ns) for cube in cubes},

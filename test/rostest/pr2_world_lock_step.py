@@ -9,9 +9,6 @@ import numpy as np
 import rospy
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import (FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult,
-                              GripperCommandAction, GripperCommandGoal, PointHeadAction, PointHeadGoal,
-                              SingleJointPositionAction, SingleJointPositionGoal)
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
@@ -20,10 +17,21 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from waiting import wait_for
 
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    GripperCommandAction,
+    GripperCommandGoal,
+    PointHeadAction,
+    PointHeadGoal,
+    SingleJointPositionAction,
+    SingleJointPositionGoal,
+)
 from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.msg import TrialCause
-from smach_oracle.simulation.robot.interface import ARM_JOINTS, RobotError
-from smach_oracle.simulation.robot.ros_robot import RosRobot
+from smach_oracle.pr2.robot import ARM_JOINTS, RobotError
+from smach_oracle.pr2.ros_robot import RosRobot
 from smach_oracle.srv import Judge, ResetWorld, Reveal, Snapshot
 
 RIGHT = ARM_JOINTS['right']
@@ -43,7 +51,9 @@ class Heard:
         self.subscriber = rospy.Subscriber(topic, kind, self.messages.append, queue_size=100)
 
     def stamped(self, stamp: rospy.Time) -> Any:
-        return wait_for(lambda: next((each for each in self.messages if each.header.stamp == stamp), None), LIMIT_S)
+        return wait_for(
+            lambda: next((each for each in self.messages if each.header.stamp == stamp), None),
+            LIMIT_S)
 
 
 class Goal:
@@ -56,7 +66,8 @@ class Goal:
             self.clients[name] = actionlib.ActionClient(name, spec)
             assert wait_for(self.clients[name].wait_for_server, LIMIT_S)
         self.feedback: List[Any] = []
-        self.handle = self.clients[name].send_goal(goal, feedback_cb=lambda _, feedback: self.feedback.append(feedback))
+        self.handle = self.clients[name].send_goal(
+            goal, feedback_cb=lambda _, feedback: self.feedback.append(feedback))
 
     def status(self) -> int:
         assert wait_for(lambda: self.handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S)
@@ -67,11 +78,12 @@ class Goal:
         return self.handle.get_goal_status_text()
 
 
-def arm_goal(positions: List[List[float]], times: List[float], joints: Any = None) -> FollowJointTrajectoryGoal:
+def arm_goal(positions: List[List[float]], times: List[float],
+             joints: Any = None) -> FollowJointTrajectoryGoal:
     points = [JointTrajectoryPoint(positions=position, time_from_start=rospy.Duration(moment))
               for position, moment in zip(positions, times)]
-    return FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=RIGHT if joints is None else joints,
-                                                                points=points))
+    return FollowJointTrajectoryGoal(
+        trajectory=JointTrajectory(joint_names=RIGHT if joints is None else joints, points=points))
 
 
 def send_arm(goal: FollowJointTrajectoryGoal) -> Goal:
@@ -98,8 +110,8 @@ class Pr2World(unittest.TestCase):
             felt.append(repr(sorted(self.robot.joints().items())).encode())
         feel()
         self.robot.look_at((0.8, 0.0, 0.7))
-        frame = self.robot.see()
-        felt += [frame.colour.tobytes(), frame.depth.tobytes(), frame.base_from_camera.tobytes()]
+        image = self.robot.see()
+        felt += [image.colour.tobytes(), image.depth.tobytes(), image.base_from_camera.tobytes()]
         self.robot.follow(RIGHT[:2], np.array([[-1.2, 0.3], [-1.0, 0.1]]), np.array([0.6, 1.2]))
         feel()
         self.robot.gripper('right', 0.03)
@@ -131,11 +143,15 @@ class Pr2World(unittest.TestCase):
         self.assertGreater(axis[:3, 2] @ way / np.linalg.norm(way), 0.9995)
 
     def test_a_snapshot_is_of_one_moment_and_no_two_have_the_same(self) -> None:
-        topics = [Heard(name, kind) for name, kind in (
-            ('joint_states', JointState), ('head_camera/rgb/image_raw', Image),
-            ('head_camera/rgb/camera_info', CameraInfo),
-            ('head_camera/depth_registered/image_raw', Image), ('head_camera/depth_registered/points', PointCloud2))]
-        self.assertTrue(wait_for(lambda: all(topic.subscriber.get_num_connections() for topic in topics)))
+        topics = [
+            Heard(name, kind)
+            for name, kind in (('joint_states', JointState), ('head_camera/rgb/image_raw', Image),
+                               ('head_camera/rgb/camera_info',
+                                CameraInfo), ('head_camera/depth_registered/image_raw', Image),
+                               ('head_camera/depth_registered/points', PointCloud2))
+        ]
+        self.assertTrue(
+            wait_for(lambda: all(topic.subscriber.get_num_connections() for topic in topics)))
         first, second = (call('world/snapshot', Snapshot, camera) for camera in (False, True))
         self.assertTrue(first.ok and second.ok)
         self.assertLess(first.stamp, second.stamp)
@@ -152,8 +168,10 @@ class Pr2World(unittest.TestCase):
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
         self.assertTrue(wait_for(lambda: states.messages and odometry.messages, LIMIT_S))
-        self.assertTrue(wait_for(lambda: buffer.can_transform('odom_combined', 'r_gripper_tool_frame', rospy.Time()),
-                                 LIMIT_S))
+        self.assertTrue(
+            wait_for(
+                lambda: buffer.can_transform('odom_combined', 'r_gripper_tool_frame', rospy.Time()),
+                LIMIT_S))
         place = odometry.messages[-1].pose.pose.position
         self.assertTrue(np.allclose((place.x, place.y), self.robot.odom_from_base()[:2, 3]))
         states.subscriber.unregister()
@@ -163,7 +181,10 @@ class Pr2World(unittest.TestCase):
     def test_tf_takes_odometry_to_every_link_of_the_description(self) -> None:
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
-        links = [link.get('name') for link in ElementTree.fromstring(rospy.get_param('robot_description')).iter('link')]
+        links = [
+            link.get('name')
+            for link in ElementTree.fromstring(rospy.get_param('robot_description')).iter('link')
+        ]
         self.assertGreater(len(links), 60)
 
         def missing() -> List[str]:
@@ -187,20 +208,26 @@ class Pr2World(unittest.TestCase):
                (arm_goal([], []), 'no points'),
                (arm_goal([[float('nan')] * 7], [1.0]), 'cannot be at nan'),
                (arm_goal([here[:3]], [1.0]), '3 positions'),
-               (arm_goal([[-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0], [0.5, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]], [0.1, 0.2]),
-                'its limit is')]
+               (arm_goal([[-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0],
+                          [0.5, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]], [0.1, 0.2]), 'its limit is')]
         for goal, words in bad:
             sent = send_arm(goal)
             self.assertEqual(sent.status(), GoalStatus.REJECTED)
             self.assertIn(words, sent.text)
             self.assertIn(words, sent.handle.get_result().error_string)
-        others = [Goal('r_gripper_controller/gripper_action', GripperCommandAction, GripperCommandGoal()),
-                  Goal('head_traj_controller/point_head_action', PointHeadAction, PointHeadGoal()),
-                  Goal('torso_controller/position_joint_action', SingleJointPositionAction,
-                       SingleJointPositionGoal(position=3.0)),
-                  Goal('move_base', MoveBaseAction, MoveBaseGoal(PoseStamped(
-                      Header(frame_id='map'), Pose(Point(), Quaternion(0.0, 0.0, 0.0, 1.0)))))]
-        self.assertEqual([goal.status() for goal in others], [GoalStatus.SUCCEEDED] + [GoalStatus.REJECTED] * 3)
+        others = [
+            Goal('r_gripper_controller/gripper_action', GripperCommandAction, GripperCommandGoal()),
+            Goal('head_traj_controller/point_head_action', PointHeadAction, PointHeadGoal()),
+            Goal('torso_controller/position_joint_action', SingleJointPositionAction,
+                 SingleJointPositionGoal(position=3.0)),
+            Goal(
+                'move_base', MoveBaseAction,
+                MoveBaseGoal(
+                    PoseStamped(Header(frame_id='map'), Pose(Point(),
+                                                             Quaternion(0.0, 0.0, 0.0, 1.0)))))
+        ]
+        self.assertEqual([goal.status() for goal in others],
+                         [GoalStatus.SUCCEEDED] + [GoalStatus.REJECTED] * 3)
         self.assertIn('allowed: 0', others[2].text)
         self.assertIn("unknown frame 'map'", others[3].text)
         with self.assertRaisesRegex(RobotError, 'head: rejected: target'):
@@ -225,9 +252,11 @@ class Pr2World(unittest.TestCase):
     def test_of_two_who_command_an_arm_the_newer_wins(self) -> None:
         older = self.moving()
         newer = send_arm(arm_goal([[-1.55]], [0.5], RIGHT[:1]))
-        self.assertEqual((older.status(), newer.status()), (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED))
+        self.assertEqual((older.status(), newer.status()),
+                         (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED))
         self.assertIn('newer', older.text)
-        self.assertEqual(newer.handle.get_result().error_code, FollowJointTrajectoryResult.SUCCESSFUL)
+        self.assertEqual(newer.handle.get_result().error_code,
+                         FollowJointTrajectoryResult.SUCCESSFUL)
 
     def test_a_reset_aborts_what_moves_and_tells_the_cause(self) -> None:
         sent = self.moving()
@@ -241,7 +270,9 @@ class Pr2World(unittest.TestCase):
     def test_a_stream_of_targets_is_answered_target_by_target(self) -> None:
         states = Heard('joint_states', JointState)
         stream = rospy.Publisher('r_arm_controller/command', JointTrajectory, queue_size=1)
-        self.assertTrue(wait_for(lambda: stream.get_num_connections() and states.subscriber.get_num_connections()))
+        self.assertTrue(
+            wait_for(
+                lambda: stream.get_num_connections() and states.subscriber.get_num_connections()))
         position = self.robot.joints()[RIGHT[0]]
         for _ in range(5):
             position += 0.01

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The simulated PR2 as a process: how it begins, keeps the wall's time, and ends with its last words written."""
+"""The simulated PR2 as a process: how it begins, keeps the wall's time, and ends with its last
+words written.
+"""
 import json
 import os
 import signal
@@ -16,12 +18,12 @@ from sensor_msgs.msg import Image
 from waiting import wait_for
 
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.simulation.robot.interface import RobotError
-from smach_oracle.simulation.robot.ros_robot import RosRobot
+from smach_oracle.pr2.robot import RobotError
+from smach_oracle.pr2.ros_robot import RosRobot
 from smach_oracle.srv import ResetWorld
 
 LIMIT_S = 40.0
-RUN = 'from smach_oracle.simulation.world.node.main import main; main()'
+RUN = 'from smach_oracle.simulation.node.main import main; main()'
 
 
 class Pr2WorldProcess(unittest.TestCase):
@@ -52,7 +54,8 @@ class Pr2WorldProcess(unittest.TestCase):
         began = time.monotonic()
         process.signal(number)
         self.assertIn(process.wait(LIMIT_S), (0, 128 + number, -number), process.output())
-        self.assertLess(time.monotonic() - began, 6.0)  # 2 s, where nothing else keeps the machine busy
+        # 2 s, where nothing else keeps the machine busy
+        self.assertLess(time.monotonic() - began, 6.0)
         self.assertNotIn('Traceback', process.output())
 
     def test_sigterm_in_the_middle_of_a_motion_leaves_a_line_on_each_trial(self) -> None:
@@ -101,7 +104,8 @@ class Pr2WorldProcess(unittest.TestCase):
     def test_a_bad_parameter_ends_it_in_words(self) -> None:
         process = self.world(task='dance')
         self.assertEqual(process.wait(LIMIT_S), 2)
-        self.assertIn("~task: 'dance' is not allowed; allowed: pick_and_place, drink_retrieval", process.output())
+        self.assertIn("~task: 'dance' is not allowed; allowed: pick_and_place, drink_retrieval",
+                      process.output())
 
 
 if __name__ == '__main__':

@@ -1,4 +1,6 @@
-"""A camera on real topics whose frames are cast from a scene: it streams, and it answers snapshots."""
+"""A camera on real topics whose frames are cast from a scene: it streams, and it answers
+snapshots.
+"""
 import os
 import sys
 import threading
@@ -10,7 +12,8 @@ from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'unit', 'perception'))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'unit',
+                                'support'))
 from ray_camera import INTRINSICS, camera_at, see  # noqa: E402
 
 from smach_oracle.geometry.transforms import quaternion  # noqa: E402
@@ -42,11 +45,18 @@ class PublishedCamera:
     def tell_place(self, *more) -> None:
         """Where its frame is, and that these are there, too."""
         place = Transform(Vector3(*POSE[:3, 3]), Quaternion(*quaternion(POSE)))
-        self._transforms.sendTransform([TransformStamped(Header(frame_id='base_footprint'), frame, place)
-                                        for frame in (OPTICAL,) + more])
+        self._transforms.sendTransform([
+            TransformStamped(Header(frame_id='base_footprint'), frame, place)
+            for frame in (OPTICAL,) + more
+        ])
 
     def show(self, bodies) -> None:
         self._seen = see(bodies, POSE, np.random.default_rng(5))
+
+    @property
+    def viewers(self) -> int:
+        """How many look at its colour pictures."""
+        return self._rgb.get_num_connections()
 
     def pixels(self, index: int) -> np.ndarray:
         """(h, w) bool: where a body is seen."""
@@ -55,7 +65,7 @@ class PublishedCamera:
     def _stream(self) -> None:
         while not rospy.is_shutdown():
             self._publish(rospy.Time.now())
-            rospy.rostime.wallsleep(0.1)
+            rospy.rostime.wallsleep(0.1)  # ten pictures a second
 
     def _snap(self, _request) -> SnapshotResponse:
         stamp = rospy.Time.now()
@@ -68,6 +78,7 @@ class PublishedCamera:
             if not self._rgb.get_num_connections():
                 return
             header = Header(stamp=stamp, frame_id=OPTICAL)
-            self._info.publish(CameraInfo(header=header, height=480, width=640, K=list(INTRINSICS.ravel())))
-            self._depth.publish(depth_image(self._seen.frame.depth, header))
-            self._rgb.publish(colour_image(self._seen.frame.colour, header))
+            self._info.publish(
+                CameraInfo(header=header, height=480, width=640, K=list(INTRINSICS.ravel())))
+            self._depth.publish(depth_image(self._seen.image.depth, header))
+            self._rgb.publish(colour_image(self._seen.image.colour, header))

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""A recorder under simulated time: its bags bear it, and a paused simulation does not stop them from being written."""
+"""A recorder under simulated time: its bags bear it, and a paused simulation does not stop them
+from being written.
+"""
 import glob
 import os
 import shutil
@@ -7,13 +9,15 @@ import sys
 import tempfile
 import time
 import unittest
+from pathlib import Path
 from typing import List
 
 import rosbag
 import rospy
 from rosgraph_msgs.msg import Clock
+from waiting import wait_for
 
-from smach_oracle.oracle.events import EventKind, EventSource
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
 
 WAIT_S = 20.0
@@ -34,20 +38,24 @@ class RecordSimTime(unittest.TestCase):
         self.source.begin_trial('t')
 
     def set_clock(self, seconds: int) -> None:
-        deadline = time.monotonic() + WAIT_S
-        while rospy.get_rostime() != rospy.Time(seconds):
-            self.assertLess(time.monotonic(), deadline)
-            self.clock.publish(rospy.Time(seconds))
-            time.sleep(0.05)
+        self.assertTrue(wait_for(lambda: self.clock.publish(rospy.Time(seconds))
+                                 or rospy.get_rostime() == rospy.Time(seconds), WAIT_S))
 
     def bag_files(self, pattern: str) -> List[str]:
         return glob.glob(os.path.join(self.folder, pattern))
+
+    def written(self, text: bytes) -> bool:
+        """Whether the bag that is being written has this text in it."""
+        return any(text in Path(path).read_bytes() for path in self.bag_files('*.bag.active'))
 
     def stamps(self) -> List[float]:
         self.assertTrue(self.recorder.close(WAIT_S))
         (path,) = self.bag_files('*.bag')
         with rosbag.Bag(path) as bag:
-            return [item.timestamp.to_sec() for item in bag.read_messages(topics=['/record_sim_time/oracle/events'])]
+            return [
+                item.timestamp.to_sec()
+                for item in bag.read_messages(topics=['/record_sim_time/oracle/events'])
+            ]
 
     def test_1_before_the_clock_runs_a_bag_has_wall_time(self) -> None:
         self.assertEqual(rospy.get_rostime(), rospy.Time(0))
@@ -57,8 +65,8 @@ class RecordSimTime(unittest.TestCase):
         self.assertTrue(all(abs(stamp - time.time()) < 60 for stamp in self.stamps()))
 
     def test_2_a_bag_has_simulated_time_also_when_it_jumps_back(self) -> None:
-        for seconds, kind in ((100, EventKind.TRIAL_START), (130, EventKind.STATE_START), (120, EventKind.STATE_START),
-                              (140, EventKind.TRIAL_END)):
+        for seconds, kind in ((100, EventKind.TRIAL_START), (130, EventKind.STATE_START),
+                              (120, EventKind.STATE_START), (140, EventKind.TRIAL_END)):
             self.set_clock(seconds)
             self.source.emit(kind, 'TOP')
         self.assertEqual(self.stamps(), [100, 120, 130, 140])
@@ -66,12 +74,9 @@ class RecordSimTime(unittest.TestCase):
     def test_3_events_are_written_while_the_simulation_is_paused(self) -> None:
         self.set_clock(200)
         self.source.emit(EventKind.TRIAL_START, 'TOP')
-        time.sleep(0.5)
+        self.assertTrue(wait_for(lambda: self.written(b'/oracle/events'), WAIT_S))
         self.source.emit(EventKind.WARNING, 'TOP', text='written while time stands still')
-        deadline = time.monotonic() + 10.0
-        while b'stands still' not in open(self.bag_files('*.bag.active')[0], 'rb').read():
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.05)
+        self.assertTrue(wait_for(lambda: self.written(b'stands still'), 10.0))
         self.assertEqual(self.stamps(), [200, 200])
 
 

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""A recorder in a node: other topics, names, status; and the bags in the hands of rosbag's own tools."""
+"""A recorder in a node: other topics, names, status; and the bags in the hands of rosbag's own
+tools.
+"""
 import glob
 import os
 import shutil
@@ -7,27 +9,24 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 import unittest
+from pathlib import Path
 from typing import Any, Callable, List
 
 import rosbag
 import rospy
+import waiting
 from std_msgs.msg import Int32, String
 
 from smach_oracle.msg import OracleEvent, OracleRates, RecorderStatus
-from smach_oracle.oracle.events import EventKind, EventSource
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
 
 WAIT_S = 40.0
 
 
 def wait_for(condition: Callable[[], Any], what: str) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError('waited in vain for {}'.format(what))
-        time.sleep(0.02)
+    assert waiting.wait_for(condition, WAIT_S), 'waited in vain for {}'.format(what)
 
 
 class RecordTopics(unittest.TestCase):
@@ -52,6 +51,12 @@ class RecordTopics(unittest.TestCase):
         (path,) = glob.glob(os.path.join(self.folder, '*.bag'))
         return path
 
+    def wait_until_written(self, text: bytes) -> None:
+        """Until the bag that is being written has this text in it."""
+        pattern = os.path.join(self.folder, '*.bag.active')
+        wait_for(lambda: any(text in Path(path).read_bytes() for path in glob.glob(pattern)),
+                 '{!r} in the bag'.format(text))
+
     def read(self, path: str, topic: str) -> List[Any]:
         with rosbag.Bag(path) as bag:
             return [item.message for item in bag.read_messages(topics=[topic])]
@@ -74,8 +79,9 @@ class RecordTopics(unittest.TestCase):
         for number in range(5):
             publisher.publish('hello {}'.format(number))
         wait_for(lambda: len(received) == 5, 'the robot\'s own callback')
-        time.sleep(0.1)
-        self.assertEqual([message.data for message in self.read(self.end(recorder), topic)], received)
+        self.wait_until_written(b'hello 4')
+        self.assertEqual([message.data for message in self.read(self.end(recorder), topic)],
+                         received)
 
     def test_a_topic_that_the_node_subscribes_to_already(self) -> None:
         self.check_with_own_subscriber('/subscribed_before', True)
@@ -107,20 +113,28 @@ class RecordTopics(unittest.TestCase):
         publisher.publish('kitchen')
         recorder = self.start('/map_name')
         wait_for(publisher.get_num_connections, 'the connection')
-        time.sleep(0.2)
+        self.begin()
+        self.wait_until_written(b'kitchen')  # before this trial or in it
+        self.source.emit(EventKind.TRIAL_END, 'TOP')
         for _ in range(2):
             self.begin()
             self.source.emit(EventKind.TRIAL_END, 'TOP')
         recorder.close(WAIT_S)
-        for path in glob.glob(os.path.join(self.folder, '*.bag')):
-            self.assertEqual([message.data for message in self.read(path, '/map_name')], ['kitchen'])
+        bags = glob.glob(os.path.join(self.folder, '*.bag'))
+        self.assertEqual(len(bags), 3)
+        for path in bags:
+            self.assertEqual([message.data for message in self.read(path, '/map_name')],
+                             ['kitchen'])
 
     def test_the_recorders_own_topics_are_relative_to_the_node(self) -> None:
         recorder = self.start(rates=lambda: OracleRates(trial_id='t'))
         self.begin()
         path = self.end(recorder)
         with rosbag.Bag(path) as bag:
-            topics = {name: info.msg_type for name, info in bag.get_type_and_topic_info().topics.items()}
+            topics = {
+                name: info.msg_type
+                for name, info in bag.get_type_and_topic_info().topics.items()
+            }
         self.assertEqual(topics, {
             '/record_topics/oracle/events': 'smach_oracle/OracleEvent',
             '/record_topics/oracle/rates': 'smach_oracle/OracleRates',
@@ -131,7 +145,7 @@ class RecordTopics(unittest.TestCase):
         before = rospy.get_rostime()
         self.begin()
         after = rospy.get_rostime()
-        time.sleep(0.5)
+        self.wait_until_written(b'recovers')
         with rosbag.Bag(self.end(recorder)) as bag:
             event, message, stamp = next(bag.read_messages(topics=['/record_topics/oracle/events']))
         self.assertTrue(before <= message.header.stamp <= after)
@@ -140,7 +154,8 @@ class RecordTopics(unittest.TestCase):
     def test_the_operator_is_told_of_a_failing_disk(self) -> None:
         told: List[int] = []
         recorder = self.start()
-        rospy.Subscriber('/record_topics/record/status', RecorderStatus, lambda message: told.append(message.state))
+        rospy.Subscriber('/record_topics/record/status', RecorderStatus,
+                         lambda message: told.append(message.state))
         self.begin()
         wait_for(lambda: RecorderStatus.RECORDING in told, 'the status of recording')
         shutil.rmtree(self.folder)
@@ -159,7 +174,8 @@ class RecordTopics(unittest.TestCase):
         for number in range(20):
             self.source.emit(EventKind.STATE_START, 'TOP', state='S{}'.format(number))
         path = self.end(recorder)
-        info = subprocess.run(['rosbag', 'info', path], check=True, stdout=subprocess.PIPE, universal_newlines=True)
+        info = subprocess.run(['rosbag', 'info', path], check=True, stdout=subprocess.PIPE,
+                              universal_newlines=True)
         self.assertIn('22 msgs', info.stdout)
         played: List[int] = []
         done = threading.Event()

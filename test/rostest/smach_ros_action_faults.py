@@ -5,15 +5,15 @@ import unittest
 
 import rospy
 import rostest
-import smach
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus
-
-from smach_ros import goal_run, server_watch
-from smach_ros.action_link import link_to
 from smach_ros_action_node import Behaviour
 from smach_ros_support import ActionNodeProcess, InBackground, LogWatch, TellingState, userdata
 from waiting import wait_for
+
+import smach
+from smach_ros import goal_run, server_watch
+from smach_ros.action_link import link_to
 
 
 class ActionFaultsTest(unittest.TestCase):
@@ -28,7 +28,9 @@ class ActionFaultsTest(unittest.TestCase):
         return TellingState(self.name, TestAction, goal=TestGoal(number), **arguments)
 
     def start_server(self):
-        """Start it, and wait until a goal can be sent: a process takes its time to come up on a busy machine."""
+        """Start it, and wait until a goal can be sent: a process takes its time to come up on a
+        busy machine.
+        """
         self.server.start()
         self.assertTrue(wait_for(link_to(self.name, TestAction).ready))
 
@@ -39,7 +41,8 @@ class ActionFaultsTest(unittest.TestCase):
     def test_killed_server_is_noticed_and_its_successor_is_used(self):
         self.start_server()
         results = []
-        state = self.state(Behaviour.DIE, result_cb=lambda ud, status, result: results.append((status, result)))
+        state = self.state(Behaviour.DIE, result_cb=lambda ud, status, result: results.append(
+            (status, result)))
         with LogWatch() as log:
             run = InBackground(state, userdata())
             self.server.process.wait(30)
@@ -59,8 +62,10 @@ class ActionFaultsTest(unittest.TestCase):
         self.server.start()
         machine = smach.StateMachine(outcomes=['done', 'recovered', 'preempted'])
         with machine:
-            smach.StateMachine.add('WORK', self.state(Behaviour.DIE), {'succeeded': 'done', 'aborted': 'RECOVER'})
-            smach.StateMachine.add('RECOVER', smach.CBState(lambda ud: 'recovered', outcomes=['recovered']))
+            smach.StateMachine.add('WORK', self.state(Behaviour.DIE),
+                                   {'succeeded': 'done', 'aborted': 'RECOVER'})
+            smach.StateMachine.add('RECOVER',
+                                   smach.CBState(lambda ud: 'recovered', outcomes=['recovered']))
         self.assertEqual(InBackground(machine).outcome(), 'recovered')
 
     def test_frozen_server_is_given_up_after_its_time(self):
@@ -77,14 +82,16 @@ class ActionFaultsTest(unittest.TestCase):
         self.with_limit(server_watch, 'WITHDRAWN_AFTER_S', 1.0)
         self.server.start()
         with LogWatch() as log:
-            self.assertEqual(InBackground(self.state(Behaviour.CLOSE), userdata()).outcome(), 'aborted')
+            self.assertEqual(
+                InBackground(self.state(Behaviour.CLOSE), userdata()).outcome(), 'aborted')
         self.assertIn('no longer serves the action', log.text())
 
     def test_goal_the_server_never_acknowledges_is_given_up(self):
         self.with_limit(goal_run, 'UNSEEN_AFTER_S', 1.0)
         self.server.start()
         with LogWatch() as log:
-            self.assertEqual(InBackground(self.state(Behaviour.UNSEEN), userdata()).outcome(), 'aborted')
+            self.assertEqual(
+                InBackground(self.state(Behaviour.UNSEEN), userdata()).outcome(), 'aborted')
         self.assertIn('no notice', log.text())
         self.assertEqual(self.state(150).execute(userdata()), 'succeeded')
 
@@ -117,7 +124,8 @@ class ActionFaultsTest(unittest.TestCase):
         self.assertTrue(state.active.wait(30))
         self.server.process.kill()
         state.request_preempt()
-        self.assertEqual(run.outcome(20.0), 'preempted')  # not after the 60 s that a server has for a cancel
+        # not after the 60 s that a server has for a cancel
+        self.assertEqual(run.outcome(20.0), 'preempted')
 
 
 if __name__ == '__main__':

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""An action server whose goals say how it shall behave; it serves actionlib/TestAction for the smach_ros tests.
+"""An action server whose goals say how it shall behave; it serves actionlib/TestAction for the
+smach_ros tests.
 
-Run as ``smach_ros_action_node.py ACTION_NAME``. The number of the goal chooses the behaviour (see ``Behaviour``); a
-goal of 100 or more succeeds at once, with a result one greater.
+Run as ``smach_ros_action_node.py ACTION_NAME``. The number of the goal chooses the behaviour (see
+``Behaviour``); a goal of 100 or more succeeds at once, with a result one greater.
 """
 import os
 import signal
@@ -34,7 +35,8 @@ class ActionNode(object):
     def __init__(self, name):
         self.running = {}
         self.lock = threading.Lock()
-        self.server = actionlib.ActionServer(name, TestAction, self.on_goal, self.on_cancel, auto_start=False)
+        self.server = actionlib.ActionServer(name, TestAction, self.on_goal, self.on_cancel,
+                                             auto_start=False)
         self.accept_goal = self.server.internal_goal_callback
         self.server.internal_goal_callback = self.on_raw_goal
         self.server.start()
@@ -56,10 +58,10 @@ class ActionNode(object):
         elif number == Behaviour.FEEDBACK:
             for i in range(3):
                 handle.publish_feedback(TestFeedback(feedback=i))
-                rospy.sleep(0.02)
+                rospy.sleep(0.02)  # a server cannot know when its feedback has arrived
             handle.set_succeeded(TestResult(result=3))
         elif number in (Behaviour.DIE, Behaviour.FREEZE):
-            rospy.sleep(0.3)
+            rospy.sleep(0.3)  # nor when the client has seen that the goal is accepted
             os.kill(os.getpid(), signal.SIGKILL if number == Behaviour.DIE else signal.SIGSTOP)
         elif number == Behaviour.CLOSE:
             for topic in (self.server.status_pub, self.server.result_pub, self.server.feedback_pub):

@@ -9,15 +9,22 @@ import unittest
 
 import rospy
 import rostest
-import smach
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from smach_ros_action_node import Behaviour
+from smach_ros_support import (
+    HERE,
+    ActionNodeProcess,
+    InBackground,
+    LogWatch,
+    TellingState,
+    userdata,
+)
+from waiting import wait_for
 
+import smach
 import smach_ros
 from smach_ros import SimpleActionState
-from smach_ros_action_node import Behaviour
-from smach_ros_support import HERE, ActionNodeProcess, InBackground, LogWatch, TellingState, userdata
-from waiting import wait_for
 
 
 def action_state(number=None, **arguments):
@@ -65,8 +72,8 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertIs(smach_ros.simple_action_state.SimpleActionState, SimpleActionState)
 
     def test_outcome_follows_the_goal(self):
-        for number, outcome in ((150, 'succeeded'), (Behaviour.ABORT, 'aborted'), (Behaviour.REJECT, 'aborted'),
-                                (Behaviour.FEEDBACK, 'succeeded')):
+        for number, outcome in ((150, 'succeeded'), (Behaviour.ABORT, 'aborted'),
+                                (Behaviour.REJECT, 'aborted'), (Behaviour.FEEDBACK, 'succeeded')):
             self.assertEqual(action_state(number).execute(userdata()), outcome)
 
     def test_a_round_trip_costs_milliseconds(self):
@@ -75,7 +82,8 @@ class SimpleActionStateTest(unittest.TestCase):
             begin = time.monotonic()
             self.assertEqual(state.execute(nothing), 'succeeded')
             times.append(time.monotonic() - begin)
-        print('goal round trip: median %.2f ms, max %.2f ms' % (1e3 * statistics.median(times), 1e3 * max(times)))
+        print('goal round trip: median %.2f ms, max %.2f ms' %
+              (1e3 * statistics.median(times), 1e3 * max(times)))
         quick = statistics.quantiles(times)[0]  # what else the machine does can only make it slower
         self.assertLess(quick, 0.025)
 
@@ -89,7 +97,8 @@ class SimpleActionStateTest(unittest.TestCase):
 
     def test_goal_and_result_go_through_userdata(self):
         data = userdata(goal=200)
-        self.assertEqual(action_state(goal_slots=['goal'], result_slots=['result']).execute(data), 'succeeded')
+        self.assertEqual(
+            action_state(goal_slots=['goal'], result_slots=['result']).execute(data), 'succeeded')
         self.assertEqual(data.result, 201)
         data = userdata(g=TestGoal(300))
         self.assertEqual(action_state(goal_key='g', result_key='r').execute(data), 'succeeded')
@@ -97,7 +106,8 @@ class SimpleActionStateTest(unittest.TestCase):
 
     def test_a_result_comes_with_a_failure_too(self):
         data = userdata()
-        self.assertEqual(action_state(Behaviour.ABORT, result_slots=['result']).execute(data), 'aborted')
+        self.assertEqual(
+            action_state(Behaviour.ABORT, result_slots=['result']).execute(data), 'aborted')
         self.assertEqual(data.result, -1)
 
     def test_goal_callback_fills_or_replaces_and_leaves_the_scripts_goal_alone(self):
@@ -111,8 +121,9 @@ class SimpleActionStateTest(unittest.TestCase):
             self.assertEqual(state.execute(data), 'succeeded')
             self.assertEqual(data.result, 121)
         self.assertEqual(goal.goal, 100)
-        self.assertEqual(action_state(goal_cb=lambda ud, g: TestGoal(400), result_slots=['result']).execute(data),
-                         'succeeded')
+        self.assertEqual(
+            action_state(goal_cb=lambda ud, g: TestGoal(400),
+                         result_slots=['result']).execute(data), 'succeeded')
         self.assertEqual(data.result, 401)
 
     def test_callbacks_bring_their_keys_and_outcomes(self):
@@ -134,7 +145,8 @@ class SimpleActionStateTest(unittest.TestCase):
             goal.goal = ud.number
 
         state = action_state(goal_cb=fill)
-        self.assertEqual(set(state.get_registered_outcomes()), {'succeeded', 'aborted', 'preempted'})
+        self.assertEqual(set(state.get_registered_outcomes()),
+                         {'succeeded', 'aborted', 'preempted'})
         self.assertEqual(state.execute(userdata(number=100)), 'succeeded')
 
     def test_a_subclass_finds_a_simple_action_client_for_the_states_goal(self):
@@ -145,7 +157,8 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertEqual(client.get_result().result, 151)
         self.assertTrue(client.wait_for_result(rospy.Duration(5.0)))
         self.assertTrue(client.wait_for_server(rospy.Duration(5.0)))
-        self.assertEqual(client.send_goal_and_wait(TestGoal(100), rospy.Duration(5.0)), GoalStatus.SUCCEEDED)
+        self.assertEqual(client.send_goal_and_wait(TestGoal(100), rospy.Duration(5.0)),
+                         GoalStatus.SUCCEEDED)
         self.assertEqual(client.get_result().result, 101)
 
     def test_a_subclass_may_cancel_the_states_goal_through_that_client(self):
@@ -162,20 +175,25 @@ class SimpleActionStateTest(unittest.TestCase):
             ud.result = 'from the callback'
 
         data = userdata()
-        self.assertEqual(action_state(150, result_cb=judge, result_slots=['result'], output_keys=['result'])
-                         .execute(data), 'succeeded')
+        self.assertEqual(
+            action_state(150, result_cb=judge, result_slots=['result'],
+                         output_keys=['result']).execute(data), 'succeeded')
         self.assertEqual(data.result, 151)
 
     def test_a_callback_that_raises_or_invents_an_outcome_aborts_and_says_so(self):
         with LogWatch() as log:
-            self.assertEqual(action_state(goal_cb=lambda ud, goal: 1 / 0).execute(userdata()), 'aborted')
-            self.assertEqual(action_state(150, result_cb=lambda *_: 1 / 0).execute(userdata()), 'aborted')
-            self.assertEqual(action_state(150, result_cb=lambda *_: 'invented').execute(userdata()), 'aborted')
+            self.assertEqual(
+                action_state(goal_cb=lambda ud, goal: 1 / 0).execute(userdata()), 'aborted')
+            self.assertEqual(
+                action_state(150, result_cb=lambda *_: 1 / 0).execute(userdata()), 'aborted')
+            self.assertEqual(
+                action_state(150, result_cb=lambda *_: 'invented').execute(userdata()), 'aborted')
         self.assertEqual(log.text().count('ZeroDivisionError: division by zero'), 2)
         self.assertIn("'invented'", log.text())
 
     def test_wrong_arguments_are_named(self):
-        for wrong, name in (({'goal_slots': ['gaol']}, 'gaol'), ({'result_slots': ['rusult']}, 'rusult'),
+        for wrong, name in (({'goal_slots': ['gaol']}, 'gaol'), ({'result_slots': ['rusult']},
+                                                                 'rusult'),
                             ({'goal_cb': 5}, 'goal_cb'), ({'goal': lambda ud: None}, 'goal_cb')):
             with self.assertRaisesRegex(smach.InvalidStateError, name):
                 action_state(**wrong)
@@ -186,7 +204,8 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertEqual(action_state(150).execute(userdata()), 'succeeded')
 
     def test_overridden_callbacks_are_told_everything(self):
-        for _ in range(3):  # status, feedback and result come by a topic each: what is late is not told
+        # status, feedback and result come by a topic each: what is late is not told
+        for _ in range(3):
             state = HooksState()
             self.assertEqual(state.execute(userdata()), 'succeeded')
             told, end = state.seen[:-1], state.seen[-1]
@@ -247,17 +266,20 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertIn("'absent' did not come", log.text())
         patient = SimpleActionState('absent', TestAction)
         run = InBackground(patient, userdata())
-        time.sleep(0.2)
+        self.assertTrue(run.waits())
         patient.request_preempt()
-        self.assertEqual(run.outcome(20.0), 'preempted')  # not after the minute that a server may take to come
+        # not after the minute that a server may take to come
+        self.assertEqual(run.outcome(20.0), 'preempted')
 
     def test_ctrl_c_ends_the_state_and_cancels_the_goal(self):
         statuses = {}
         rospy.Subscriber('work/status', GoalStatusArray, lambda message: statuses.update(
             {status.goal_id.id: status.status for status in message.status_list}))
-        script = subprocess.Popen([sys.executable, HERE + '/smach_ros_hanging_script.py'], stdout=subprocess.PIPE)
+        script = subprocess.Popen([sys.executable, HERE + '/smach_ros_hanging_script.py'],
+                                  stdout=subprocess.PIPE)
         goals = lambda: [goal for goal in statuses if 'hanging_script' in goal]  # noqa: E731
-        self.assertTrue(wait_for(lambda: any(statuses[goal] == GoalStatus.ACTIVE for goal in goals())))
+        self.assertTrue(
+            wait_for(lambda: any(statuses[goal] == GoalStatus.ACTIVE for goal in goals())))
         begin = time.monotonic()
         script.send_signal(2)
         said, _ = script.communicate(timeout=20)

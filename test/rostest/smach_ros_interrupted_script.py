@@ -4,9 +4,9 @@ import sys
 import threading
 
 import rospy
-import smach
 from std_msgs.msg import Empty
 
+import smach
 from smach_ros import MonitorState, set_preempt_handler
 
 
@@ -14,10 +14,16 @@ def main(where, handler):
     rospy.init_node('interrupted_script', anonymous=True, disable_signals=handler == 'unsignalled')
     machine = smach.StateMachine(outcomes=['valid', 'invalid', 'preempted'])
     up = ['not told']
+
+    def tell_when_it_waits(ud, states):
+        threading.Timer(  # nothing shows that the subscriber is registered
+            0.5, print, ['waiting'], {'flush': True}).start()
+
     with machine:
         smach.StateMachine.add('WAIT', MonitorState('never', Empty, lambda ud, message: True))
-    machine.register_start_cb(lambda ud, states: threading.Timer(0.5, print, ['waiting'], {'flush': True}).start(), [])
-    machine.register_termination_cb(lambda ud, states, outcome: up.append(not rospy.is_shutdown()), [])
+    machine.register_start_cb(tell_when_it_waits, [])
+    machine.register_termination_cb(lambda ud, states, outcome: up.append(not rospy.is_shutdown()),
+                                    [])
     if handler != 'none':
         set_preempt_handler(machine)
     outcomes = []

@@ -4,20 +4,23 @@ import base64
 import pickle
 import subprocess
 import threading
-import time
 import unittest
 from unittest import mock
 
 import rospy
 import rostest
-import smach
-from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus, SmachContainerStructure
+from smach_ros_support import InBackground, LogWatch, userdata
+from waiting import stays, wait_for
 
+import smach
 import smach_ros
+from smach_msgs.msg import (
+    SmachContainerInitialStatusCmd,
+    SmachContainerStatus,
+    SmachContainerStructure,
+)
 from smach_ros import IntrospectionClient, IntrospectionServer
 from smach_ros.plain_pickle import decode_userdata
-from smach_ros_support import InBackground, LogWatch, userdata
-from waiting import wait_for
 
 MD5 = {SmachContainerStatus: '5ba2bb79ac19e3842d562a191f2a675b',
        SmachContainerStructure: '3d3d1e0d0f99779ee9e58101a5dcf7ea',
@@ -75,19 +78,23 @@ class IntrospectionTest(unittest.TestCase):
 
     def listen(self):
         subscribers = [
-            rospy.Subscriber(self.name + '/smach/container_status', SmachContainerStatus, self.statuses.append),
+            rospy.Subscriber(self.name + '/smach/container_status', SmachContainerStatus,
+                             self.statuses.append),
             rospy.Subscriber(self.name + '/smach/container_structure', SmachContainerStructure,
-                             self.structures.append)]
+                             self.structures.append)
+        ]
         for subscriber in subscribers:
             self.addCleanup(subscriber.unregister)
         self.assertTrue(wait_for(lambda: self.statuses and self.structures))
+        return subscribers
 
     def active_states_of(self, path):
         return [tuple(status.active_states) for status in list(self.statuses)
                 if status.path == path and status.info not in ('HEARTBEAT', 'REMOTE_INIT')]
 
     def command(self, path, labels, local_data=''):
-        publisher = rospy.Publisher(self.name + '/smach/container_init', SmachContainerInitialStatusCmd, queue_size=5)
+        publisher = rospy.Publisher(self.name + '/smach/container_init',
+                                    SmachContainerInitialStatusCmd, queue_size=5)
         self.addCleanup(publisher.unregister)
         self.assertTrue(wait_for(publisher.get_num_connections))
         publisher.publish(path, labels, local_data)
@@ -98,10 +105,16 @@ class IntrospectionTest(unittest.TestCase):
             self.assertEqual(message._type, 'smach_msgs/' + message.__name__)
 
     def test_new_viewer_is_told_the_whole_tree_at_once(self):
+        def knows_the_tree():
+            return {message.path for message in self.structures} == {'/ROOT', '/ROOT/IN'}
         self.serve(machine_with_inner()[0])
-        time.sleep(0.3)
+        first = self.listen()
+        self.assertTrue(wait_for(knows_the_tree), 'what is told of at the start')
+        for subscriber in first:
+            subscriber.unregister()
+        self.statuses, self.structures = [], []
         self.listen()
-        self.assertTrue(wait_for(lambda: {message.path for message in self.structures} == {'/ROOT', '/ROOT/IN'}, 1.5))
+        self.assertTrue(wait_for(knows_the_tree, 1.5))
         top = [message for message in self.structures if message.path == '/ROOT'][0]
         self.assertEqual(sorted(top.children), ['A', 'B', 'IN'])
         edges = set(zip(top.internal_outcomes, top.outcomes_from, top.outcomes_to))
@@ -113,23 +126,28 @@ class IntrospectionTest(unittest.TestCase):
         machine.userdata.image = b'x' * 300000
         with machine:
             for number in range(60):
-                smach.StateMachine.add(str(number), Step(), {'next': str(number + 1) if number < 59 else 'done'})
+                smach.StateMachine.add(str(number), Step(),
+                                       {'next': str(number + 1) if number < 59 else 'done'})
         read = threading.Event()
-        with mock.patch.object(smach_ros.introspection, 'BACKLOG_BYTES', 3000000), LogWatch() as log:
+        with mock.patch.object(smach_ros.introspection, 'BACKLOG_BYTES',
+                               3000000), LogWatch() as log:
             server = self.serve(machine)
-            viewer = rospy.Subscriber(self.name + '/smach/container_status', SmachContainerStatus,
-                                      lambda message: (read.wait(30), self.statuses.append(message)), buff_size=1000)
+            viewer = rospy.Subscriber(
+                self.name + '/smach/container_status', SmachContainerStatus, lambda message:
+                (read.wait(30), self.statuses.append(message)), buff_size=1000)
             self.addCleanup(viewer.unregister)
             self.assertTrue(wait_for(server._status_pub.get_num_connections))
             machine.execute()
             self.assertTrue(wait_for(lambda: not server._changes))
-            time.sleep(0.2)
-            waiting = smach_ros.introspection._waiting_bytes(server._status_pub)
+            self.assertTrue(stays(lambda: smach_ros.introspection._waiting_bytes(
+                server._status_pub) < 4000000, 0.2))
         self.assertIn('does not keep up', log.text())
-        self.assertLess(waiting, 4000000)
         read.set()
-        self.assertTrue(wait_for(lambda: any(status.info.startswith('TERM') for status in self.statuses)))
-        labels = [status.active_states[0] for status in self.statuses if status.info == 'TRANSITION']
+        self.assertTrue(
+            wait_for(lambda: any(status.info.startswith('TERM') for status in self.statuses)))
+        labels = [
+            status.active_states[0] for status in self.statuses if status.info == 'TRANSITION'
+        ]
         self.assertEqual(labels, [str(number) for number in range(1, 60)])
         self.assertIn('image', decode_userdata(self.statuses[0].local_data))
 
@@ -147,7 +165,9 @@ class IntrospectionTest(unittest.TestCase):
     def test_heartbeat_comes_every_two_seconds(self):
         self.serve(machine_with_inner()[0])
         self.listen()
-        heartbeats = lambda: [status for status in self.statuses if status.path == '/ROOT']  # noqa: E731
+        def heartbeats():
+            return [status for status in self.statuses if status.path == '/ROOT']
+
         self.assertTrue(wait_for(lambda: len(heartbeats()) >= 3))
         gap_s = (heartbeats()[-1].header.stamp - heartbeats()[-2].header.stamp).to_sec()
         self.assertAlmostEqual(gap_s, 2.0, delta=1.0)
@@ -161,7 +181,8 @@ class IntrospectionTest(unittest.TestCase):
             smach.StateMachine.add('Z', Step())
         with machine:
             smach.StateMachine.add('LATE', late, {'next': 'done'})
-        self.assertTrue(wait_for(lambda: any(message.path == '/ROOT/LATE' for message in self.structures)))
+        self.assertTrue(
+            wait_for(lambda: any(message.path == '/ROOT/LATE' for message in self.structures)))
 
     def test_userdata_that_cannot_be_pickled_is_left_out_and_named_once(self):
         machine, _ = machine_with_inner()
@@ -187,7 +208,10 @@ class IntrospectionTest(unittest.TestCase):
                     smach.StateMachine.add('X', Step(), {'next': 'done'})
                 smach.StateMachine.add('IN%d' % i, inner)
         server = IntrospectionServer(self.name, machine, '/ROOT')
-        ours = lambda: [t for t in threading.enumerate() if t.name == 'introspection ' + self.name]  # noqa: E731
+        def ours():
+            return [t for t in threading.enumerate()
+                    if t.name == 'introspection ' + self.name]
+
         server.start()
         server.start()
         self.assertEqual(len(ours()), 1)
@@ -206,7 +230,9 @@ class IntrospectionTest(unittest.TestCase):
         self.serve(machine)
         client = IntrospectionClient()
         self.assertIn('/' + self.name, client.get_servers())
-        self.assertTrue(client.set_initial_state(self.name, '/ROOT', ['B'], userdata(x=b'5'), rospy.Duration(30.0)))
+        self.assertTrue(
+            client.set_initial_state(self.name, '/ROOT', ['B'], userdata(x=b'5'),
+                                     rospy.Duration(30.0)))
         machine.execute()
         self.assertEqual((visits, machine.userdata.x), (['B'], b'5'))
         self.assertTrue(client.set_initial_state(self.name, '/ROOT/IN', ['Y'], timeout=30.0))
@@ -224,7 +250,8 @@ class IntrospectionTest(unittest.TestCase):
         self.serve(machine)
         run = InBackground(machine)
         self.assertTrue(wait_for(lambda: visits == ['A']))
-        self.assertTrue(IntrospectionClient().set_initial_state(self.name, '/ROOT', ['B'], userdata(y=1), 30.0))
+        self.assertTrue(IntrospectionClient().set_initial_state(self.name, '/ROOT', ['B'],
+                                                                userdata(y=1), 30.0))
         gate.release(5)
         self.assertEqual(run.outcome(), 'done')
         self.assertEqual((visits, machine.userdata.y), (['A', 'B'], 1))
@@ -244,8 +271,11 @@ class IntrospectionTest(unittest.TestCase):
         self.assertIn('string local_data', subprocess.check_output(
             ['rosmsg', 'show', 'smach_msgs/SmachContainerStatus']).decode())
         self.serve(machine_with_inner()[0])
-        self.assertIn('path: "/ROOT', subprocess.check_output(
-            ['rostopic', 'echo', '-n', '1', '/%s/smach/container_structure' % self.name], timeout=20).decode())
+        self.assertIn(
+            'path: "/ROOT',
+            subprocess.check_output(
+                ['rostopic', 'echo', '-n', '1',
+                 '/%s/smach/container_structure' % self.name], timeout=20).decode())
 
     def test_machine_with_a_server_can_still_be_pickled(self):
         machine = smach.StateMachine(outcomes=['next'])

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""ServiceState, MonitorState and ConditionState against real services and topics; the Ctrl-C handler."""
+"""ServiceState, MonitorState and ConditionState against real services and topics; the Ctrl-C
+handler.
+"""
 import os
 import subprocess
 import sys
@@ -10,15 +12,14 @@ import unittest
 import rosgraph
 import rospy
 import rostest
-import smach
+from smach_ros_support import HERE, InBackground, LogWatch, userdata
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
-
-from smach_ros import ConditionState, MonitorState, ServiceState
-from smach_ros_support import HERE, InBackground, LogWatch, userdata
 from waiting import wait_for
 
-from smach_oracle.simulation.experiment.launching import free_port
+import smach
+from smach_oracle.experiment.launching import free_port
+from smach_ros import ConditionState, MonitorState, ServiceState
 
 
 def set_bool(request):
@@ -58,8 +59,8 @@ class ServiceStateTest(unittest.TestCase):
             return 'well'
 
         data = userdata(wish=True, whole=SetBoolRequest(False))
-        state = ServiceState('switch', SetBool, request_key='whole', request_cb=ask, request_cb_args=[False],
-                             response_cb=hear)
+        state = ServiceState('switch', SetBool, request_key='whole', request_cb=ask,
+                             request_cb_args=[False], response_cb=hear)
         self.assertEqual(state.execute(data), 'well')
         self.assertEqual(data.said, 'done')
         self.assertFalse(data.whole.data)
@@ -70,8 +71,8 @@ class ServiceStateTest(unittest.TestCase):
             ud.message = 'from the callback'
 
         data = userdata()
-        state = ServiceState('switch', SetBool, SetBoolRequest(True), response_cb=hear, response_slots=['message'],
-                             output_keys=['message'])
+        state = ServiceState('switch', SetBool, SetBoolRequest(True), response_cb=hear,
+                             response_slots=['message'], output_keys=['message'])
         self.assertEqual(state.execute(data), 'succeeded')
         self.assertEqual(data.message, 'done')
 
@@ -90,10 +91,14 @@ class ServiceStateTest(unittest.TestCase):
     def test_what_goes_wrong_aborts_and_is_logged(self):
         request = SetBoolRequest(True)
         for state, words in ((ServiceState('switch', SetBool, SetBoolRequest(False)), 'will not'),
-                             (ServiceState('switch', SetBool, request, request_cb=lambda *_: 1 / 0), 'ZeroDivision'),
-                             (ServiceState('switch', SetBool, request, response_cb=lambda *_: 1 / 0), 'ZeroDivision'),
-                             (ServiceState('switch', SetBool, request, response_cb=lambda *_: 'odd'), "'odd'"),
-                             (ServiceState('switch', SetBool, request_slots=['data']), 'data')):
+                             (ServiceState('switch', SetBool, request,
+                                           request_cb=lambda *_: 1 / 0), 'ZeroDivision'),
+                             (ServiceState('switch', SetBool, request,
+                                           response_cb=lambda *_: 1 / 0), 'ZeroDivision'),
+                             (ServiceState('switch', SetBool, request,
+                                           response_cb=lambda *_: 'odd'),
+                              "'odd'"), (ServiceState('switch', SetBool,
+                                                      request_slots=['data']), 'data')):
             with LogWatch() as log:
                 self.assertEqual(state.execute(userdata()), 'aborted')
             self.assertIn(words, log.text())
@@ -101,7 +106,7 @@ class ServiceStateTest(unittest.TestCase):
     def test_absent_service_is_awaited_and_a_preempt_ends_the_wait(self):
         state = ServiceState('later', SetBool, SetBoolRequest(True))
         run = InBackground(state, userdata())
-        time.sleep(0.3)
+        self.assertTrue(run.waits())
         state.request_preempt()
         self.assertEqual(run.outcome(), 'preempted')
         run = InBackground(state, userdata())
@@ -118,20 +123,22 @@ class ServiceStateTest(unittest.TestCase):
         self.release.set()
 
     def test_call_that_ends_soon_after_a_preempt_counts(self):
-        called = threading.Event()
+        called, preempted = threading.Event(), threading.Event()
 
-        def half_a_second(request):
+        def until_preempted(request):
             called.set()
-            time.sleep(0.5)
+            preempted.wait(30)
             return SetBoolResponse(True, 'kept')
 
-        rospy.Service('half_second', SetBool, half_a_second)
+        rospy.Service('until_preempted', SetBool, until_preempted)
         data = userdata()
-        state = ServiceState('half_second', SetBool, SetBoolRequest(True), response_slots=['message'],
-                             preempt_timeout=30.0)
+        state = ServiceState('until_preempted', SetBool, SetBoolRequest(True),
+                             response_slots=['message'], preempt_timeout=30.0)
         run = InBackground(state, data)
         self.assertTrue(called.wait(30))
         state.request_preempt()
+        self.assertEqual(run.outcome(0.1), 'still running', 'it waits for the answer')
+        preempted.set()
         self.assertEqual(run.outcome(), 'succeeded')
         self.assertEqual(data.message, 'kept')
         self.assertTrue(state.preempt_requested())
@@ -152,7 +159,8 @@ class MonitorStateTest(unittest.TestCase):
 
     def test_first_false_message_is_invalid(self):
         seen = []
-        state = MonitorState(self.topic, Int32, lambda ud, message: seen.append(message.data) or message.data > 0)
+        state = MonitorState(self.topic, Int32,
+                             lambda ud, message: seen.append(message.data) or message.data > 0)
         for _ in range(2):
             del seen[:]
             self.assertEqual(self.watch(state, userdata(), [1, 2, 0, 3]).outcome(), 'invalid')
@@ -206,8 +214,8 @@ class MonitorStateTest(unittest.TestCase):
 class ConditionStateTest(unittest.TestCase):
     def count(self, true_at, **arguments):
         calls = []
-        state = ConditionState(lambda ud: calls.append(1) or len(calls) == true_at, poll_rate=rospy.Duration(0.01),
-                               **arguments)
+        state = ConditionState(lambda ud: calls.append(1) or len(calls) == true_at,
+                               poll_rate=rospy.Duration(0.01), **arguments)
         return state.execute(userdata()), len(calls)
 
     def test_true_at_once_or_within_its_checks(self):
@@ -238,9 +246,11 @@ class ConditionStateTest(unittest.TestCase):
         self.assertEqual(self.count(5, max_checks=-1, timeout=rospy.Duration(0)), ('true', 5))
 
     def test_preempt_ends_a_long_pause(self):
-        state = ConditionState(lambda ud: False, poll_rate=rospy.Duration(60.0), max_checks=-1)
+        looked = threading.Event()
+        state = ConditionState(lambda ud: looked.set(), poll_rate=rospy.Duration(60.0),
+                               max_checks=-1)
         run = InBackground(state, userdata())
-        time.sleep(0.1)
+        self.assertTrue(looked.wait(30) and run.waits())
         state.request_preempt()
         self.assertEqual(run.outcome(), 'preempted')
 
@@ -251,8 +261,10 @@ class ConditionStateTest(unittest.TestCase):
 
 class CtrlCTest(unittest.TestCase):
     def press(self, where, handler):
-        script = subprocess.Popen([sys.executable, os.path.join(HERE, 'smach_ros_interrupted_script.py'), where,
-                                   handler], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        script = subprocess.Popen(
+            [sys.executable,
+             os.path.join(HERE, 'smach_ros_interrupted_script.py'), where, handler],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         said = b''
         while b'waiting' not in said:
             line = script.stdout.readline()
@@ -282,12 +294,15 @@ class CtrlCTest(unittest.TestCase):
 class NoMasterTest(unittest.TestCase):
     def test_ctrl_c_ends_states_that_began_while_the_master_was_away(self):
         port = free_port()
-        master = subprocess.Popen(['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL)
+        master = subprocess.Popen(
+            ['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL)
         self.addCleanup(master.kill)
         uri = 'http://localhost:%d' % port
         self.assertTrue(wait_for(lambda: rosgraph.is_master_online(uri)))
-        script = subprocess.Popen([sys.executable, os.path.join(HERE, 'smach_ros_masterless_script.py'),
-                                   str(master.pid)], stdout=subprocess.PIPE, env=dict(os.environ, ROS_MASTER_URI=uri))
+        script = subprocess.Popen(
+            [sys.executable,
+             os.path.join(HERE, 'smach_ros_masterless_script.py'),
+             str(master.pid)], stdout=subprocess.PIPE, env=dict(os.environ, ROS_MASTER_URI=uri))
         self.addCleanup(script.kill)
         self.assertEqual(script.stdout.readline(), b'waiting\n')
         begin = time.monotonic()

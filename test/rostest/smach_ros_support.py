@@ -6,8 +6,9 @@ import sys
 import threading
 import time
 
-import smach
+from waiting import wait_for, waits
 
+import smach
 from smach_ros import SimpleActionState
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -35,7 +36,9 @@ class ActionNodeProcess(object):
 
 
 class TellingState(SimpleActionState):
-    """Says when its server has begun with the goal; until then nothing is to be seen of how it treats a cancel."""
+    """Says when its server has begun with the goal; until then nothing is to be seen of how it
+    treats a cancel.
+    """
 
     def __init__(self, *arguments, **keywords):
         SimpleActionState.__init__(self, *arguments, **keywords)
@@ -58,13 +61,18 @@ class InBackground(object):
 
     def __init__(self, state, *args):
         self._outcome = []
-        self._thread = threading.Thread(target=lambda: self._outcome.append(state.execute(*args)), daemon=True)
+        self._thread = threading.Thread(target=lambda: self._outcome.append(state.execute(*args)),
+                                        daemon=True)
         self.started_at = time.monotonic()
         self._thread.start()
 
     def outcome(self, timeout_s=40.0):
         self._thread.join(timeout_s)
         return self._outcome[0] if self._outcome else 'still running'
+
+    def waits(self):
+        """Until the state waits for something; whether it does."""
+        return wait_for(lambda: waits(self._thread))
 
     def took_s(self):
         return time.monotonic() - self.started_at

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The unmodified pick and place script on the simulated PR2, under oracle_run: what fails is recovered, or asked."""
+"""The unmodified pick and place script on the simulated PR2, under oracle_run: what fails is
+recovered, or asked.
+"""
 import json
 import subprocess
 import tempfile
@@ -11,7 +13,7 @@ import rospy
 from roslib.packages import find_node
 
 from smach_oracle.analysis.trials import TrialSummary, load_trials
-from smach_oracle.simulation.world.tabletop_scene import draw
+from smach_oracle.simulation.scenes.tabletop_scene import draw
 from smach_oracle.srv import Judge
 
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'
@@ -19,7 +21,8 @@ TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle'
 
 def seed_with(kind: str) -> int:
     """The first seed of which this is the only cause to fail."""
-    return next(seed for seed in range(10000) if [cause.kind for cause in draw(seed).causes] == [kind])
+    return next(seed for seed in range(10000)
+                if [cause.kind for cause in draw(seed).causes] == [kind])
 
 
 class Recoveries(unittest.TestCase):
@@ -32,10 +35,13 @@ class Recoveries(unittest.TestCase):
         """Run one trial of the script as a user would, and read its bag."""
         rospy.set_param('/pick_and_place/oracle', settings or {'memory': 10})
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([find_node('smach_oracle', 'oracle_run')[0], '--config', str(TASKS / 'pick_and_place.yaml'),
-                            '--record', folder, '--record-topic', '/world/cause', *options,
-                            str(TASKS / 'pick_and_place.py'), '--seed', str(seed_with('glare'))],
-                           check=True, timeout=100)
+            subprocess.run([
+                find_node('smach_oracle', 'oracle_run')[0], '--config',
+                str(TASKS / 'pick_and_place.yaml'), '--record', folder, '--record-topic',
+                '/world/cause', *options,
+                str(TASKS / 'pick_and_place.py'), '--seed',
+                str(seed_with('glare'))
+            ], check=True, timeout=100)
             trial, = load_trials([folder]).trials
         self.assertEqual((trial.cause.kinds, trial.lost_events), (('glare',), 0))
         return trial

@@ -4,7 +4,7 @@ import socket
 import struct
 import threading
 
-from smach_oracle.simulation.experiment.launching import free_port
+from smach_oracle.experiment.launching import free_port
 
 _RESET = struct.pack('ii', 1, 0)  # SO_LINGER: what is closed is reset
 

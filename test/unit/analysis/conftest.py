@@ -1,14 +1,8 @@
 """The analysis is tried on bags that the real recorder has written."""
-import sys
-from pathlib import Path
-
 import pytest
+from fake_trials import play
 
-sys.path.insert(0, str(Path(__file__).parents[1] / 'recorder'))
-
-from fake_trials import play  # noqa: E402
-
-from smach_oracle.ros.recorder import TrialRecorder  # noqa: E402
+from smach_oracle.ros.recorder import TrialRecorder
 
 
 @pytest.fixture
@@ -24,7 +18,7 @@ def record(tmp_path):
 
 
 @pytest.fixture(scope='session')
-def both_arms(tmp_path_factory):
+def both_variants(tmp_path_factory):
     """150 trials with and 150 without the oracle, same seeds."""
     base = tmp_path_factory.mktemp('trials')
     for folder, recovers in (('with_oracle', True), ('without_oracle', False)):

@@ -8,41 +8,49 @@ from pathlib import Path
 
 import pytest
 
-from smach_oracle.analysis import bag_statistics, course, sweep, what_if
+from smach_oracle.analysis import bag_statistics, sweep, trial_steps, what_if
 
 ROOT = Path(__file__).parents[3]
 
 
-def test_the_table_of_both_arms(both_arms, capsys):
-    assert bag_statistics.main([str(both_arms)]) == 0
+def test_the_table_of_both_variants(both_variants, capsys):
+    assert bag_statistics.main([str(both_variants)]) == 0
     out, err = capsys.readouterr()
     assert err == ''
     rows = [line.split() for line in out.splitlines() if line.startswith('PICK_AND_PLACE  ')]
     assert [row[1:4] for row in rows] == [['with', 'oracle', '150'], ['without', 'oracle', '150']]
-    assert rows[0][4] == rows[1][8]  # the same faults: a trial that was recovered fails without the oracle
+    # the same faults: a trial that was recovered fails without the oracle
+    assert rows[0][4] == rows[1][8]
 
 
-def test_the_same_bags_give_the_same_output(both_arms, capsys, tmp_path):
+def test_the_same_bags_give_the_same_output(both_variants, capsys, tmp_path):
     outputs = []
     for _run in range(2):
-        bag_statistics.main([str(both_arms), '--json', str(tmp_path / 'json'), '--csv', str(tmp_path / 'csv')])
-        outputs.append((capsys.readouterr().out, (tmp_path / 'json').read_text(), (tmp_path / 'csv').read_text()))
+        bag_statistics.main(
+            [str(both_variants), '--json',
+             str(tmp_path / 'json'), '--csv',
+             str(tmp_path / 'csv')])
+        outputs.append((capsys.readouterr().out, (tmp_path / 'json').read_text(),
+                        (tmp_path / 'csv').read_text()))
     assert outputs[0] == outputs[1]
 
 
-def test_folders_may_be_given_one_by_one_and_bags_too(both_arms, capsys):
-    bag_statistics.main([str(both_arms)])
+def test_folders_may_be_given_one_by_one_and_bags_too(both_variants, capsys):
+    bag_statistics.main([str(both_variants)])
     whole = capsys.readouterr().out
-    bag_statistics.main([str(both_arms / 'without_oracle'), str(both_arms / 'with_oracle')])
+    bag_statistics.main([str(both_variants / 'without_oracle'), str(both_variants / 'with_oracle')])
     assert capsys.readouterr().out == whole
-    bag = sorted((both_arms / 'with_oracle').iterdir())[0]
+    bag = sorted((both_variants / 'with_oracle').iterdir())[0]
     assert bag_statistics.main([str(bag)]) == 0
     assert 'with oracle: 1 runs' in capsys.readouterr().out
 
 
-def test_files_are_written_where_asked(both_arms, tmp_path, capsys):
+def test_files_are_written_where_asked(both_variants, tmp_path, capsys):
     figure = tmp_path / 'time_series.png'  # with or without an ending
-    assert bag_statistics.main([str(both_arms), '--figure', str(figure), '--json', str(tmp_path / 'a.json')]) == 0
+    assert bag_statistics.main(
+        [str(both_variants), '--figure',
+         str(figure), '--json',
+         str(tmp_path / 'a.json')]) == 0
     assert figure.stat().st_size > 10_000 and (tmp_path / 'time_series.svg').stat().st_size > 10_000
     data = json.loads((tmp_path / 'a.json').read_text())
     assert len(data['trials']) == 300 and data['skipped'] == []
@@ -93,9 +101,12 @@ def test_an_output_that_cannot_be_written_is_an_error(record, tmp_path, capsys):
 def test_every_path_may_begin_with_the_home_folder(record, tmp_path, monkeypatch, capsys):
     record('bags', 2)
     monkeypatch.setenv('HOME', str(tmp_path))
-    assert bag_statistics.main(['~/bags', '--csv', '~/a.csv', '--json', '~/a.json', '--figure', '~/f']) == 0
-    assert {path.name for path in tmp_path.iterdir()} == {'bags', 'a.csv', 'a.json', 'f.svg', 'f.png'}
-    for command, folders in ((sweep, ['~/bags']), (what_if, ['~/bags']), (course, ['~/bags', '~/bags'])):
+    assert bag_statistics.main(
+        ['~/bags', '--csv', '~/a.csv', '--json', '~/a.json', '--figure', '~/f']) == 0
+    assert {path.name
+            for path in tmp_path.iterdir()} == {'bags', 'a.csv', 'a.json', 'f.svg', 'f.png'}
+    for command, folders in ((sweep, ['~/bags']), (what_if, ['~/bags']), (trial_steps,
+                                                                          ['~/bags', '~/bags'])):
         command.main(folders)
         assert 'no such folder' not in capsys.readouterr().err
 
@@ -103,33 +114,36 @@ def test_every_path_may_begin_with_the_home_folder(record, tmp_path, monkeypatch
 def test_other_words_for_failure(record, capsys):
     folder = record('bags', 4)
     bag_statistics.main([folder, '--failing-outcomes', 'succeeded'])
-    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('  ended in failure'))
+    line = next(line for line in capsys.readouterr().out.splitlines()
+                if line.startswith('  ended in failure'))
     assert line.split()[3] == '4'
 
 
-def test_neither_ros_nor_smach_need_be_installed(both_arms, tmp_path):
+def test_neither_ros_nor_smach_need_be_installed(both_variants, tmp_path):
     """Everything of ROS is hidden from the interpreter, not only the network."""
-    refused = ('rospy', 'rosbag', 'genpy', 'roslib', 'rosgraph', 'actionlib', 'smach', 'smach_ros', 'std_msgs',
-               'smach_oracle.msg', 'smach_oracle.ros')
+    refused = ('rospy', 'rosbag', 'genpy', 'roslib', 'rosgraph', 'actionlib', 'smach', 'smach_ros',
+               'std_msgs', 'smach_oracle.msg', 'smach_oracle.ros')
     script = '\n'.join([
-        'import sys',
-        'class Refuse:',
-        '    def find_spec(self, name, path=None, target=None):',
-        '        if name in {!r}: raise ImportError(name + " is not installed here")'.format(refused),
-        'sys.meta_path.insert(0, Refuse())',
+        'import sys', 'class Refuse:', '    def find_spec(self, name, path=None, target=None):',
+        '        if name in {!r}: raise ImportError(name + " is not installed here")'.format(
+            refused), 'sys.meta_path.insert(0, Refuse())',
         'sys.path.insert(0, {!r})'.format(str(ROOT / 'src')),
-        'from smach_oracle.analysis.bag_statistics import main',
-        'sys.exit(main(sys.argv[1:]))'])
-    run = subprocess.run([sys.executable, '-c', script, str(both_arms), '--figure', str(tmp_path / 'f')],
-                         env={'PATH': os.environ['PATH'], 'HOME': str(tmp_path)}, timeout=100,
-                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+        'from smach_oracle.analysis.bag_statistics import main', 'sys.exit(main(sys.argv[1:]))'
+    ])
+    run = subprocess.run(
+        [sys.executable, '-c', script,
+         str(both_variants), '--figure',
+         str(tmp_path / 'f')], env={'PATH': os.environ['PATH'], 'HOME': str(tmp_path)}, timeout=100,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
     assert run.returncode == 0, run.stderr
     assert 'with oracle: 150 runs' in run.stdout
 
 
-def test_the_command_counts_300_bags_in_seconds(both_arms):
+def test_the_command_counts_300_bags_in_seconds(both_variants):
     began = time.monotonic()
-    run = subprocess.run([sys.executable, str(ROOT / 'scripts' / 'bag_statistics'), str(both_arms)], timeout=100,
-                         stdout=subprocess.PIPE, universal_newlines=True)
+    run = subprocess.run(
+        [sys.executable,
+         str(ROOT / 'scripts' / 'bag_statistics'),
+         str(both_variants)], timeout=100, stdout=subprocess.PIPE, universal_newlines=True)
     assert run.returncode == 0 and 'PICK_AND_PLACE' in run.stdout
     assert time.monotonic() - began < 20.0  # half a second on an idle machine

@@ -1,10 +1,13 @@
-"""From a real wrapped machine through the real recorder to the table: the counts are those of what the machine did."""
+"""From a real wrapped machine through the real recorder to the table: the counts are those of what
+the machine did.
+"""
 import pytest
-import smach
 
-from smach_oracle.analysis.trials import Ending, load_trials
+import smach
+from smach_oracle.analysis.trial_counter import TrialEnding
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.ros.recorder import TrialRecorder
 
 
@@ -37,8 +40,8 @@ def run_trials(folder, failures, recover=True, expert=None):
     pick = Pick()
     machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
     with machine:
-        smach.StateMachine.add('LOOK', smach.CBState(lambda _: 'succeeded', outcomes=['succeeded']), {
-            'succeeded': 'PICK'})
+        smach.StateMachine.add('LOOK', smach.CBState(lambda _: 'succeeded', outcomes=['succeeded']),
+                               {'succeeded': 'PICK'})
         smach.StateMachine.add('PICK', pick)
     OracleContainer.wrap(machine, name='TOP', recover=recover, expert=expert,
                          settings={'max_recoveries': 3, 'memory': 100, 'policy': 'prose'})
@@ -57,8 +60,9 @@ def test_recoveries_of_a_low_failure_state_are_counted(tmp_path):
     assert outcomes == ['succeeded'] * 3
     counts = [(trial.failures, trial.recoveries, trial.questions) for trial in trials]
     assert counts == [(0, 0, 0), (1, 1, 0), (2, 2, 0)]
-    assert all(trial.ending is Ending.SUCCESS and trial.lost_events == 0 for trial in trials)
-    assert {trial.experiment for trial in trials} == {'TOP'} and all(trial.recovers for trial in trials)
+    assert all(trial.ending is TrialEnding.SUCCESS and trial.lost_events == 0 for trial in trials)
+    assert {trial.experiment
+            for trial in trials} == {'TOP'} and all(trial.recovers for trial in trials)
 
 
 def test_an_answered_question_is_counted_beside_the_recoveries_before_it(tmp_path):
@@ -70,12 +74,14 @@ def test_an_answered_question_is_counted_beside_the_recoveries_before_it(tmp_pat
 def test_an_unanswered_question_ends_the_trial(tmp_path):
     outcomes, (trial,) = run_trials(tmp_path, [10], expert=FakeExpert(answers=False))
     assert outcomes == ['aborted']
-    assert (trial.recoveries, trial.questions, trial.answered, trial.ending) == (3, 1, 0, Ending.FAILURE)
+    assert (trial.recoveries, trial.questions, trial.answered,
+            trial.ending) == (3, 1, 0, TrialEnding.FAILURE)
 
 
 def test_without_the_oracle_a_failure_ends_the_trial(tmp_path):
     outcomes, trials = run_trials(tmp_path, [0, 1], recover=False)
     assert outcomes == ['succeeded', 'aborted']
-    assert [trial.ending for trial in trials] == [Ending.SUCCESS, Ending.FAILURE]
+    assert [trial.ending for trial in trials] == [TrialEnding.SUCCESS, TrialEnding.FAILURE]
     assert [trial.failures for trial in trials] == [0, 1]
-    assert not any(trial.recovers for trial in trials) and sum(trial.recoveries for trial in trials) == 0
+    assert not any(trial.recovers for trial in trials) and sum(trial.recoveries
+                                                               for trial in trials) == 0

@@ -7,25 +7,37 @@ import math
 import pytest
 
 from smach_oracle.analysis import table
-from smach_oracle.analysis.bag_events import Cause, Skipped
-from smach_oracle.analysis.groups import (ANSWERED, NOT_ANSWERED, QUESTIONS, RECOVERIES, TRUE_SUCCESS, find_arms,
-                                          make_groups, time_series)
+from smach_oracle.analysis.bag_events import RecordedCause, SkippedBag
 from smach_oracle.analysis.intervals import replicate_interval, t_quantile, wilson_interval
-from smach_oracle.analysis.trials import Ending, TrialSummary
+from smach_oracle.analysis.trial_counter import TrialEnding
+from smach_oracle.analysis.trials import TrialSummary
 from smach_oracle.analysis.truth import Truth
+from smach_oracle.analysis.variants import (
+    ANSWERED,
+    NOT_ANSWERED,
+    QUESTIONS,
+    RECOVERIES,
+    TRUE_SUCCESS,
+    count_variants,
+    find_variants,
+    time_series,
+)
 
 
 def trial(number=0, **fields):
-    defaults = dict(trial_id=str(number), experiment='PICK_AND_PLACE', recovers=True, start_time=float(number),
-                    duration_s=1.0, ending=Ending.SUCCESS, outcome='succeeded', failures=0, recoveries=0, questions=0,
-                    answered=0, failures_by_state=(), lost_events=0, bags=())
+    defaults = dict(trial_id=str(number), experiment='PICK_AND_PLACE', recovers=True,
+                    start_time=float(number), duration_s=1.0, ending=TrialEnding.SUCCESS,
+                    outcome='succeeded', failures=0, recoveries=0, questions=0, answered=0,
+                    failures_by_state=(), lost_events=0, bags=())
     return TrialSummary(**dict(defaults, **fields))
 
 
 # scipy 1.10: stats.binomtest(successes, runs).proportion_ci(method='wilson')
-@pytest.mark.parametrize('successes, runs, low, high', [
-    (39, 150, 0.196421, 0.335564), (6, 150, 0.018459, 0.084513), (0, 10, 0.0, 0.277533), (10, 10, 0.722467, 1.0),
-    (1, 2, 0.094531, 0.905469)])
+@pytest.mark.parametrize('successes, runs, low, high', [(39, 150, 0.196421, 0.335564),
+                                                        (6, 150, 0.018459, 0.084513),
+                                                        (0, 10, 0.0, 0.277533),
+                                                        (10, 10, 0.722467, 1.0),
+                                                        (1, 2, 0.094531, 0.905469)])
 def test_wilson_interval(successes, runs, low, high):
     assert wilson_interval(successes, runs) == pytest.approx((low, high), abs=1e-6)
 
@@ -60,59 +72,72 @@ def test_the_interval_over_replicates(shares, low, high):
 
 
 # scipy 1.10: stats.t.ppf(0.975, freedom)
-@pytest.mark.parametrize('freedom, quantile', [(1, 12.7062), (9, 2.2622), (30, 2.0423), (31, 2.0395), (40, 2.0211),
-                                               (200, 1.9719)])
+@pytest.mark.parametrize('freedom, quantile', [(1, 12.7062), (9, 2.2622), (30, 2.0423),
+                                               (31, 2.0395), (40, 2.0211), (200, 1.9719)])
 def test_quantiles_of_students_distribution(freedom, quantile):
     assert t_quantile(freedom) == pytest.approx(quantile, abs=0.0005)
 
 
 def the_papers_first_experiment():
-    return [trial(number, failures=2 * (number < 39), recoveries=2 * (number < 39), questions=number < 6,
-                  answered=number < 6) for number in range(150)]
+    return [
+        trial(number, failures=2 * (number < 39), recoveries=2 * (number < 39), questions=number
+              < 6, answered=number < 6) for number in range(150)
+    ]
 
 
 def test_the_papers_table_comes_out_of_the_papers_counts():
-    (group,) = make_groups(the_papers_first_experiment())
-    assert group.runs == 150
-    assert (group.of(RECOVERIES).trials, group.of(RECOVERIES).events) == (39, 78)
-    assert (group.of(ANSWERED).trials, group.of(ANSWERED).events) == (6, 6)
-    row = next(line for line in table.format_text([group]).splitlines() if line.startswith('PICK_AND_PLACE  with'))
-    assert row.split() == ['PICK_AND_PLACE', 'with', 'oracle', '150', '39', '(26.0%)', '6', '(4.0%)', '0', '(0.0%)']
+    (variant,) = count_variants(the_papers_first_experiment())
+    assert variant.trials == 150
+    assert (variant.of(RECOVERIES).trials, variant.of(RECOVERIES).events) == (39, 78)
+    assert (variant.of(ANSWERED).trials, variant.of(ANSWERED).events) == (6, 6)
+    row = next(line for line in table.format_text([variant]).splitlines()
+               if line.startswith('PICK_AND_PLACE  with'))
+    assert row.split() == [
+        'PICK_AND_PLACE', 'with', 'oracle', '150', '39', '(26.0%)', '6', '(4.0%)', '0', '(0.0%)'
+    ]
 
 
 def test_the_text_shows_intervals_and_events():
-    text = table.format_text(make_groups(the_papers_first_experiment()))
+    text = table.format_text(count_variants(the_papers_first_experiment()))
     line = next(line for line in text.splitlines() if line.startswith('  oracle recoveries'))
     assert line.split() == ['oracle', 'recoveries', '39', '26.0%', '19.6', 'to', '33.6%', '78']
 
 
 def test_answered_and_unanswered_questions_are_told_apart():
-    (group,) = make_groups([trial(0, questions=2, answered=1), trial(1, questions=1), trial(2)])
-    counts = {name: (group.of(name).trials, group.of(name).events)
+    (variant,) = count_variants(
+        [trial(0, questions=2, answered=1),
+         trial(1, questions=1), trial(2)])
+    counts = {name: (variant.of(name).trials, variant.of(name).events)
               for name in (QUESTIONS, ANSWERED, NOT_ANSWERED)}
     assert counts == {QUESTIONS: (2, 3), ANSWERED: (1, 1), NOT_ANSWERED: (2, 2)}
 
 
-def test_arms_and_experiments_have_rows_of_their_own():
-    groups = make_groups([
-        trial(0, recovers=False, ending=Ending.FAILURE), trial(1), trial(2, recovers=None, ending=Ending.UNFINISHED),
-        trial(3, experiment='DRINK')])
-    assert [(group.experiment, group.arm, group.runs) for group in groups] == [
-        ('DRINK', 'with oracle', 1), ('PICK_AND_PLACE', 'with oracle', 1), ('PICK_AND_PLACE', 'without oracle', 1),
-        ('PICK_AND_PLACE', 'arm unknown', 1)]
-    assert groups[2].of('ended in failure').trials == 1
-    assert groups[3].of('unfinished').trials == 1
+def test_variants_and_experiments_have_rows_of_their_own():
+    variants = count_variants([
+        trial(0, recovers=False, ending=TrialEnding.FAILURE),
+        trial(1),
+        trial(2, recovers=None, ending=TrialEnding.UNFINISHED),
+        trial(3, experiment='DRINK')
+    ])
+    assert [(variant.experiment, variant.name, variant.trials)
+            for variant in variants] == [('DRINK', 'with oracle', 1),
+                                         ('PICK_AND_PLACE', 'with oracle', 1),
+                                         ('PICK_AND_PLACE', 'without oracle', 1),
+                                         ('PICK_AND_PLACE', 'variant unknown', 1)]
+    assert variants[2].of('ended in failure').trials == 1
+    assert variants[3].of('unfinished').trials == 1
 
 
 def test_every_trial_has_one_ending():
-    (group,) = make_groups([trial(number, ending=ending) for number, ending in enumerate(Ending)])
+    (variant,) = count_variants(
+        [trial(number, ending=ending) for number, ending in enumerate(TrialEnding)])
     endings = ('ended in success', 'ended in failure', 'preempted', 'unfinished')
-    assert [group.of(name).trials for name in endings] == [1, 1, 1, 1]
+    assert [variant.of(name).trials for name in endings] == [1, 1, 1, 1]
 
 
 def test_missing_events_are_said_beside_the_figures():
-    whole = table.format_text(make_groups([trial(0)]))
-    gaps = table.format_text(make_groups([trial(0, lost_events=7), trial(1)]))
+    whole = table.format_text(count_variants([trial(0)]))
+    gaps = table.format_text(count_variants([trial(0, lost_events=7), trial(1)]))
     assert 'missing' not in whole
     assert '7 events are missing in 1 trials' in gaps
 
@@ -120,12 +145,15 @@ def test_missing_events_are_said_beside_the_figures():
 def test_json_holds_table_trials_and_skipped_bags():
     target = io.StringIO()
     trials = [trial(0, failures=1, failures_by_state=(('TOP/PICK', 1),))]
-    table.write_json(target, make_groups(trials), trials, [Skipped('/x.bag', 'damaged')])
+    table.write_json(target, count_variants(trials), trials, [SkippedBag('/x.bag', 'damaged')])
     data = json.loads(target.getvalue())
     assert data['trials'][0]['failures_by_state'] == {'TOP/PICK': 1}
     assert data['trials'][0]['ending'] == 'success'
     assert data['skipped'] == [{'path': '/x.bag', 'reason': 'damaged'}]
-    counts = {item['name']: item for item in data['groups'][0]['counts']}
+    (variant,) = data['groups']
+    assert (variant['variant'], variant['trials']) == (variant['arm'],
+                                                       variant['runs']) == ('with oracle', 1)
+    counts = {item['name']: item for item in variant['counts']}
     assert counts['ended in success']['interval'] == pytest.approx([0.2065, 1.0], abs=1e-4)
 
 
@@ -133,59 +161,74 @@ def test_csv_has_one_line_a_trial():
     target = io.StringIO()
     table.write_csv(target, [trial(0, recoveries=3), trial(1, recovers=None)])
     rows = list(csv.DictReader(io.StringIO(target.getvalue())))
-    assert [(row['trial_id'], row['recovers'], row['recoveries'], row['ending']) for row in rows] == [
-        ('0', 'True', '3', 'success'), ('1', '', '0', 'success')]
+    assert [(row['trial_id'], row['recovers'], row['recoveries'], row['ending'])
+            for row in rows] == [('0', 'True', '3', 'success'), ('1', '', '0', 'success')]
 
 
 def told(number, said, true, kinds=(), **fields):
     """A trial of which the world has told how it ended."""
-    return trial(number, ending=Ending.SUCCESS if said else Ending.FAILURE,
-                 cause=Cause(number, 'pick_and_place', tuple(kinds), ('',) * len(kinds)),
+    return trial(number, ending=TrialEnding.SUCCESS if said else TrialEnding.FAILURE,
+                 cause=RecordedCause(number, 'pick_and_place', tuple(kinds), ('',) * len(kinds)),
                  truth=Truth(number, 'pick_and_place', true, '', (), 30.0, 5.0, {}), **fields)
 
 
 def test_what_the_machine_says_is_held_against_what_the_world_says():
-    trials = [told(0, True, True), told(1, True, False), told(2, False, True), told(3, False, False), trial(4)]
-    (group,) = make_groups(trials)
-    counts = [group.of(name).trials for name in (TRUE_SUCCESS, 'false success', 'false failure')]
-    assert (counts, group.truth_known) == ([2, 1, 1], 4)
-    assert group.of(TRUE_SUCCESS).share == 0.5, 'of those in which it is known'
-    text = table.format_text([group], trials)
+    trials = [
+        told(0, True, True),
+        told(1, True, False),
+        told(2, False, True),
+        told(3, False, False),
+        trial(4)
+    ]
+    (variant,) = count_variants(trials)
+    counts = [variant.of(name).trials for name in (TRUE_SUCCESS, 'false success', 'false failure')]
+    assert (counts, variant.truth_known) == ([2, 1, 1], 4)
+    assert variant.of(TRUE_SUCCESS).share == 0.5, 'of those in which it is known'
+    text = table.format_text([variant], trials)
     assert 'True success' in text and 'how a trial truly ended is known of 4 of 5' in text
-    assert 'True success' not in table.format_text(make_groups([trial(0)]))
+    assert 'True success' not in table.format_text(count_variants([trial(0)]))
 
 
 def test_trials_are_counted_by_what_the_world_was_given():
-    text = table.format_text(make_groups([]), [
+    text = table.format_text(count_variants([]), [
         told(0, True, True), told(1, True, True, ['noise'], failures=1, recoveries=1),
         told(2, False, False, ['noise', 'slippery'], failures=2, questions=1)])
-    rows = {line.split()[0]: line.split()[1:] for line in text.splitlines() if line.startswith('  ')}
-    assert rows == {'cause': ['trials', 'failed', 'recovered', 'asked', 'succeeded', 'true', 'success'],
-                    '(none)': ['1', '0', '0', '0', '1', '1'], 'noise': ['2', '2', '1', '1', '1', '1'],
-                    'slippery': ['1', '1', '0', '1', '0', '0']}
+    rows = {
+        line.split()[0]: line.split()[1:]
+        for line in text.splitlines() if line.startswith('  ')
+    }
+    assert rows == {
+        'cause': ['trials', 'failed', 'recovered', 'asked', 'succeeded', 'true',
+                  'success'], '(none)': ['1', '0', '0', '0', '1', '1'],
+        'noise': ['2', '2', '1', '1', '1', '1'], 'slippery': ['1', '1', '0', '1', '0', '0']
+    }
 
 
 def test_replicates_are_the_folders_and_have_an_interval_of_their_own():
-    trials = [trial(number, bags=('/r{}/{}.bag'.format(number % 3, number),), failures=int(number < 5))
-              for number in range(30)]
-    (group,) = make_groups(trials)
-    count = group.of('failures of states')
-    assert group.replicates == 3 and count.share == pytest.approx(1 / 6)
+    trials = [
+        trial(number, bags=('/r{}/{}.bag'.format(number % 3, number),), failures=int(number < 5))
+        for number in range(30)
+    ]
+    (variant,) = count_variants(trials)
+    count = variant.of('failures of states')
+    assert variant.replicates == 3 and count.share == pytest.approx(1 / 6)
     assert count.over_replicates == pytest.approx(replicate_interval([0.2, 0.2, 0.1]))
-    line = next(line for line in table.format_text([group]).splitlines() if line.startswith('  failures of states'))
+    line = next(line for line in table.format_text([variant]).splitlines()
+                if line.startswith('  failures of states'))
     assert line.split()[-3:] == ['2.3', 'to', '31.0%']
 
 
-def test_oracles_of_other_settings_are_other_arms():
-    arms = find_arms([trial(number, settings=(('memory', memory), ('policy', 'prose')))
+def test_oracles_of_other_settings_are_other_variants():
+    variants = find_variants([trial(number, settings=(('memory', memory), ('policy', 'prose')))
                       for number, memory in enumerate((10, 2, 10))] + [trial(3, recovers=False)])
-    assert [(arm.name, len(arm.trials)) for arm in arms] == [
+    assert [(variant.name, len(variant.trials)) for variant in variants] == [
         ('with oracle, memory 2', 1), ('with oracle, memory 10', 2), ('without oracle', 1)]
 
 
-def test_each_replicate_of_each_oracle_has_a_figure_with_the_arm_without_beside_it():
-    def place(arm, replicate, number, **fields):
-        return trial(number, bags=('/{}/replicate_{}/{}.bag'.format(arm, replicate, number),), **fields)
+def test_each_replicate_of_each_oracle_has_a_figure_with_the_trials_without_beside_it():
+    def place(folder, replicate, number, **fields):
+        return trial(number, bags=('/{}/replicate_{}/{}.bag'.format(folder, replicate, number),),
+                     **fields)
     without = [place('without', replicate, 0, recovers=False) for replicate in range(2)]
     one = [place('with', replicate, 1, settings=(('memory', 2),)) for replicate in range(2)]
     other = [place('with_other', 0, 2, settings=(('memory', 10),))]
@@ -196,7 +239,7 @@ def test_each_replicate_of_each_oracle_has_a_figure_with_the_arm_without_beside_
     assert time_series([one[0], without[0]]) == [((), (one[0], without[0]))]
     assert time_series(without[:1]) == [((), (without[0],))]
     several = time_series([one[0], trial(3, experiment='DRINK')])
-    assert [told for told, _ in several] == [('DRINK',), ('PICK_AND_PLACE',)]
+    assert [words for words, _ in several] == [('DRINK',), ('PICK_AND_PLACE',)]
 
 
 def test_csv_and_json_tell_seed_cause_and_truth():
@@ -208,11 +251,18 @@ def test_csv_and_json_tell_seed_cause_and_truth():
     table.write_json(target, [], [told(7, True, False, ['noise'])], [])
     data = json.loads(target.getvalue())
     assert data['trials'][0]['truth']['success'] is False and data['causes'][0]['kind'] == 'noise'
+    assert data['causes'][0]['variant'] == data['causes'][0]['arm'] == 'with oracle'
 
 
 def test_replicates_that_all_agree_are_given_no_interval_without_width():
-    trials = [trial(number, recoveries=int(number % 5 == 0), bags=('/{}/a.bag'.format(number // 10),))
-              for number in range(20)] + [trial(20, failures=1, bags=('/0/a.bag',))]
-    rows = {line.strip().split('  ')[0]: line for line in table.format_text(make_groups(trials)).splitlines()}
+    trials = [
+        trial(number, recoveries=int(number % 5 == 0), bags=('/{}/a.bag'.format(number // 10),))
+        for number in range(20)
+    ] + [trial(20, failures=1, bags=('/0/a.bag',))]
+    rows = {
+        line.strip().split('  ')[0]: line
+        for line in table.format_text(count_variants(trials)).splitlines()
+    }
     assert rows['unfinished'].endswith('   all alike')
-    assert rows['failures of states'].endswith('%') and 'all alike' not in rows['failures of states']
+    assert rows['failures of states'].endswith(
+        '%') and 'all alike' not in rows['failures of states']

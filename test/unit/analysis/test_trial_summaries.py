@@ -9,11 +9,12 @@ from fake_trials import FakeMachine
 from std_msgs.msg import String
 
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
-from smach_oracle.analysis.trials import Ending, load_trials, summarise
-from smach_oracle.oracle.events import NO_OUTCOME, Event, EventKind
-from smach_oracle.ros import bag_format
-from smach_oracle.ros.bag_writer import BagWriter
+from smach_oracle.analysis.trial_counter import TrialEnding
+from smach_oracle.analysis.trials import load_trials, summarise
+from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind
 from smach_oracle.ros.recorder import TrialRecorder
+from smach_oracle.ros.recording import bag_format
+from smach_oracle.ros.recording.bag_writer import BagWriter
 
 
 def story(*steps, trial_id='t', path='TOP'):
@@ -41,35 +42,46 @@ def answered(query_id, outcome='supersede'):
 
 def test_a_quiet_trial():
     trial = summarise(story(START, END))
-    assert (trial.experiment, trial.recovers, trial.ending, trial.outcome) == ('TOP', True, Ending.SUCCESS, 'succeeded')
-    assert (trial.failures, trial.recoveries, trial.questions, trial.answered, trial.lost_events) == (0, 0, 0, 0, 0)
+    assert (trial.experiment, trial.recovers, trial.ending,
+            trial.outcome) == ('TOP', True, TrialEnding.SUCCESS, 'succeeded')
+    assert (trial.failures, trial.recoveries, trial.questions, trial.answered,
+            trial.lost_events) == (0, 0, 0, 0, 0)
     assert (trial.start_time, trial.duration_s) == (100.0, 1.0)
 
 
 ENTERED = (EventKind.STATE_START, {'state': 'PICK'})
 
 
-@pytest.mark.parametrize('text, steps, ending', [
-    ('InvalidUserCodeError: no', (ENTERED,), Ending.FAILURE),
-    ('KeyboardInterrupt: ', (ENTERED,), Ending.PREEMPTED),
-    (NO_OUTCOME, (ENTERED,), Ending.PREEMPTED),  # a shutdown between two states
-    (NO_OUTCOME, (), Ending.FAILURE),  # an inconsistent machine
-])
-def test_a_trial_without_an_outcome_has_failed_unless_it_was_stopped_from_outside(text, steps, ending):
+@pytest.mark.parametrize(
+    'text, steps, ending',
+    [
+        ('InvalidUserCodeError: no', (ENTERED,), TrialEnding.FAILURE),
+        ('KeyboardInterrupt: ', (ENTERED,), TrialEnding.PREEMPTED),
+        (NO_OUTCOME, (ENTERED,), TrialEnding.PREEMPTED),  # a shutdown between two states
+        (NO_OUTCOME, (), TrialEnding.FAILURE),  # an inconsistent machine
+    ])
+def test_a_trial_without_an_outcome_has_failed_unless_it_was_stopped_from_outside(
+        text, steps, ending):
     assert summarise(story(START, *steps, (EventKind.TRIAL_END, {'text': text}))).ending is ending
 
 
-@pytest.mark.parametrize('steps, recoveries, questions, answers', [
-    ((FAILURE, REVISIT, JUMP), 1, 0, 0),
-    ((FAILURE, STEP_BACK, JUMP), 1, 0, 0),
-    ((FAILURE, REVISIT, JUMP, FAILURE, STEP_BACK, JUMP), 2, 0, 0),
-    ((FAILURE, REVISIT), 0, 0, 0),  # decided, but the machine was preempted before it jumped
-    ((FAILURE, ASK, opened('q'), answered('q', 'goto'), JUMP), 0, 1, 1),  # the expert's jump is not the oracle's
-    ((FAILURE, ASK, opened('q'), (EventKind.QUERY_EXPIRED, {'query_id': 'q'}), JUMP), 0, 1, 0),  # the fallback's jump
-    ((FAILURE, REVISIT, opened('q'), answered('q'), JUMP), 0, 1, 1),
-    ((FAILURE, ASK, opened('q'), answered('q'), opened('r'), (EventKind.QUERY_CANCELLED, {'query_id': 'r'})), 0, 2, 1),
-    ((FAILURE, ASK, opened('q'), answered('q', 'interface'), answered('q', 'supersede')), 0, 1, 1),
-])
+@pytest.mark.parametrize(
+    'steps, recoveries, questions, answers',
+    [
+        ((FAILURE, REVISIT, JUMP), 1, 0, 0),
+        ((FAILURE, STEP_BACK, JUMP), 1, 0, 0),
+        ((FAILURE, REVISIT, JUMP, FAILURE, STEP_BACK, JUMP), 2, 0, 0),
+        ((FAILURE, REVISIT), 0, 0, 0),  # decided, but the machine was preempted before it jumped
+        ((FAILURE, ASK, opened('q'), answered(
+            'q', 'goto'), JUMP), 0, 1, 1),  # the expert's jump is not the oracle's
+        ((FAILURE, ASK, opened('q'),
+          (EventKind.QUERY_EXPIRED, {'query_id': 'q'}), JUMP), 0, 1, 0),  # the fallback's jump
+        ((FAILURE, REVISIT, opened('q'), answered('q'), JUMP), 0, 1, 1),
+        ((FAILURE, ASK, opened('q'), answered('q'), opened('r'),
+          (EventKind.QUERY_CANCELLED, {'query_id': 'r'})), 0, 2, 1),
+        ((FAILURE, ASK, opened('q'), answered('q', 'interface'), answered('q',
+                                                                          'supersede')), 0, 1, 1),
+    ])
 def test_recoveries_and_questions(steps, recoveries, questions, answers):
     trial = summarise(story(START, *steps, END))
     assert (trial.recoveries, trial.questions, trial.answered) == (recoveries, questions, answers)
@@ -77,26 +89,30 @@ def test_recoveries_and_questions(steps, recoveries, questions, answers):
 
 def test_decisions_of_containers_side_by_side_are_kept_apart():
     inner = dict(path='TOP/PICK')
-    trial = summarise(story(START, REVISIT, (EventKind.DECISION, dict(ASK[1], **inner)), (opened('q')[0], dict(
-        query_id='q', **inner)), JUMP, (EventKind.JUMP, inner), END))
+    trial = summarise(
+        story(START, REVISIT, (EventKind.DECISION, dict(ASK[1], **inner)),
+              (opened('q')[0], dict(query_id='q', **inner)), JUMP, (EventKind.JUMP, inner), END))
     assert trial.recoveries == 1
 
 
 @pytest.mark.parametrize('end, ending', [
-    ((EventKind.TRIAL_END, {'outcome': 'succeeded'}), Ending.SUCCESS),
-    ((EventKind.TRIAL_END, {'outcome': 'drink_served'}), Ending.SUCCESS),
-    ((EventKind.TRIAL_END, {'outcome': 'aborted'}), Ending.FAILURE),
-    ((EventKind.TRIAL_END, {'outcome': 'grasp_failed'}), Ending.FAILURE),
-    ((EventKind.TRIAL_END, {'outcome': 'preempted'}), Ending.PREEMPTED),
-    ((EventKind.TRIAL_END, {'outcome': '', 'text': 'InvalidUserCodeError: ...'}), Ending.FAILURE),
-    ((EventKind.STATE_START, {'state': 'PICK'}), Ending.UNFINISHED),
+    ((EventKind.TRIAL_END, {'outcome': 'succeeded'}), TrialEnding.SUCCESS),
+    ((EventKind.TRIAL_END, {'outcome': 'drink_served'}), TrialEnding.SUCCESS),
+    ((EventKind.TRIAL_END, {'outcome': 'aborted'}), TrialEnding.FAILURE),
+    ((EventKind.TRIAL_END, {'outcome': 'grasp_failed'}), TrialEnding.FAILURE),
+    ((EventKind.TRIAL_END, {'outcome': 'preempted'}), TrialEnding.PREEMPTED),
+    ((EventKind.TRIAL_END, {'outcome': '', 'text': 'InvalidUserCodeError: ...'
+                            }), TrialEnding.FAILURE),
+    ((EventKind.STATE_START, {'state': 'PICK'}), TrialEnding.UNFINISHED),
 ])
 def test_how_a_trial_ended(end, ending):
     assert summarise(story(START, end)).ending is ending
 
 
 def test_failures_are_counted_by_state_and_container():
-    trial = summarise(story(START, FAILURE, FAILURE, (EventKind.FAILURE, {'state': 'PICK', 'path': 'TOP/SUB'}), END))
+    trial = summarise(
+        story(START, FAILURE, FAILURE, (EventKind.FAILURE, {'state': 'PICK', 'path': 'TOP/SUB'}),
+              END))
     assert trial.failures_by_state == (('TOP/PICK', 2), ('TOP/SUB/PICK', 1))
 
 
@@ -107,11 +123,13 @@ def test_gaps_in_the_numbering_are_lost_events():
     assert summarise(story(START, END)[1:]).lost_events == 1
 
 
-def test_the_arm_is_what_the_start_says_else_what_was_seen():
-    assert summarise(story((EventKind.TRIAL_START, {'data': {'recovers': False}}), END)).recovers is False
+def test_the_variant_is_what_the_start_says_else_what_was_seen():
+    assert summarise(story((EventKind.TRIAL_START, {'data': {'recovers': False}}),
+                           END)).recovers is False
     assert summarise(story(FAILURE, REVISIT, JUMP)).recovers is True
     assert summarise(story(FAILURE, END)).recovers is None
-    assert summarise(story((EventKind.TRIAL_START, {'data': ['no', 'mapping']}), END)).recovers is None
+    assert summarise(story((EventKind.TRIAL_START, {'data': ['no', 'mapping']}),
+                           END)).recovers is None
 
 
 def test_trials_come_in_the_order_of_their_beginning_whatever_their_files_are_called(record):
@@ -131,7 +149,8 @@ def test_a_trial_in_several_bags_is_one_trial(tmp_path):
         machine.run(seed=3)
         assert recorder.close(20.0)
     (trial,), skipped = load_trials([str(tmp_path)])
-    assert (trial.ending, trial.lost_events, len(trial.bags), skipped) == (Ending.SUCCESS, 0, 2, [])
+    assert (trial.ending, trial.lost_events, len(trial.bags), skipped) == (TrialEnding.SUCCESS, 0,
+                                                                           2, [])
 
 
 def test_a_copied_folder_does_not_count_twice(record, tmp_path):
@@ -166,8 +185,9 @@ def test_unusable_bags_are_named_with_the_reason_and_the_others_counted(record, 
     trials, skipped = load_trials([folder])
     assert len(trials) == 3
     reasons = {os.path.basename(item.path): item.reason for item in skipped}
-    assert sorted(reasons) == ['cut.bag', 'foreign.bag', 'nothing.bag', 'orphan.bag.active', 'text.bag',
-                               'unindexed.bag']
+    assert sorted(reasons) == [
+        'cut.bag', 'foreign.bag', 'nothing.bag', 'orphan.bag.active', 'text.bag', 'unindexed.bag'
+    ]
     assert 'no events of the executive' in reasons['foreign.bag']
     assert 'rosbag reindex' in reasons['orphan.bag.active']
     assert 'reindex' in reasons['unindexed.bag']
@@ -206,8 +226,9 @@ def test_a_killed_recorders_bag_is_counted_after_rosbag_reindex(record):
     take_index_away(path)
     assert [item.path for item in load_trials([folder]).skipped] == [path]
     subprocess.run(['rosbag', 'reindex', '-q', path], check=True, timeout=60)
-    trials, skipped = load_trials([folder])  # also leaves rosbag's backup of the unindexed bag alone
-    assert ([trial.ending for trial in trials], skipped) == ([Ending.SUCCESS] * 2, [])
+    # also leaves rosbag's backup of the unindexed bag alone
+    trials, skipped = load_trials([folder])
+    assert ([trial.ending for trial in trials], skipped) == ([TrialEnding.SUCCESS] * 2, [])
 
 
 def test_what_is_not_there_is_said_clearly(tmp_path):

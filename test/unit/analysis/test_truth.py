@@ -9,20 +9,25 @@ from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.trials import load_trials
 from smach_oracle.analysis.truth import read_truth
 from smach_oracle.msg import TrialCause
-from smach_oracle.oracle.events import EventSource, EventKind
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
 
-LINE = {'seed': 7, 'task': 'pick_and_place', 'success': True, 'why': '', 'causes': [{'kind': 'noise', 'text': 'x4'}],
-        'sim_s': 30, 'wall_s': 4.5, 'share': {'physics': 0.5}}
+LINE = {
+    'seed': 7, 'task': 'pick_and_place', 'success': True, 'why': '',
+    'causes': [{'kind': 'noise',
+                'text': 'x4'}], 'sim_s': 30, 'wall_s': 4.5, 'share': {'physics': 0.5}
+}
 
 
 def write(path, *lines, end='\n'):
-    path.write_text('\n'.join(line if isinstance(line, str) else json.dumps(line) for line in lines) + end)
+    path.write_text('\n'.join(line if isinstance(line, str) else json.dumps(line)
+                              for line in lines) + end)
     return str(path)
 
 
 def test_the_latest_line_of_a_seed_counts_and_a_torn_last_line_does_not(tmp_path):
-    path = write(tmp_path / 'truth.jsonl', dict(LINE, success=False), LINE, '{"seed": 8, "ta', end='')
+    path = write(tmp_path / 'truth.jsonl', dict(LINE, success=False), LINE, '{"seed": 8, "ta',
+                 end='')
     found = read_truth(path)
     assert list(found) == [7] and found[7].success and found[7].causes == (('noise', 'x4'),)
 
@@ -31,10 +36,12 @@ def test_a_last_line_that_lacks_nothing_but_its_end_counts(tmp_path):
     assert list(read_truth(write(tmp_path / 'truth.jsonl', LINE, end=''))) == [7]
 
 
-@pytest.mark.parametrize('line, words', [
-    ('{', 'line 1: not JSON'), ('[]', 'not a JSON object'), (dict(LINE, success=1), 'success: 1 is not allowed'),
-    (dict(LINE, seed=True), 'seed: True'), (dict(LINE, causes=['noise']), 'causes: each needs'),
-    (dict(LINE, share={'physics': 'much'}), 'share'), ({'seed': 7}, 'task: None')])
+@pytest.mark.parametrize('line, words', [('{', 'line 1: not JSON'), ('[]', 'not a JSON object'),
+                                         (dict(LINE, success=1), 'success: 1 is not allowed'),
+                                         (dict(LINE, seed=True), 'seed: True'),
+                                         (dict(LINE, causes=['noise']), 'causes: each needs'),
+                                         (dict(LINE, share={'physics': 'much'}), 'share'),
+                                         ({'seed': 7}, 'task: None')])
 def test_a_wrong_line_is_named(tmp_path, line, words):
     with pytest.raises(BagError, match=words):
         read_truth(write(tmp_path / 'truth.jsonl', line, LINE))
@@ -45,7 +52,10 @@ def record(folder, *causes):
     recorder = TrialRecorder(str(folder), warn=pytest.fail)
     source = EventSource(pytest.fail)
     recorder.attach(source, {'/world/cause': lambda: causes_left.pop(0) if causes_left else None})
-    causes_left = [TrialCause(seed=seed, task='pick_and_place', kinds=['noise'], details=['x4']) for seed in causes]
+    causes_left = [
+        TrialCause(seed=seed, task='pick_and_place', kinds=['noise'], details=['x4'])
+        for seed in causes
+    ]
     for cause in causes_left:
         cause.header.stamp = Time(1)
     source.begin_trial('trial-1')

@@ -2,13 +2,13 @@
 import random
 
 import pytest
-import smach
 
+import smach
 from smach_oracle.analysis import what_if
 from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.events import EventKind
-from smach_oracle.oracle.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.ros.recorder import TrialRecorder
 
 KEPT = {'memory': 10, 'policy': 'prose', 'prior': 0.1}
@@ -50,7 +50,8 @@ def run(count, seed=1, states=None, **settings):
         smach.StateMachine.add('PICK', Chance(generator, 0.5), {'succeeded': 'INNER'})
         smach.StateMachine.add('INNER', inner, {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Chance(generator, 0.3))
-    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator), preconditions={'PICK': ['LOOK']},
+    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator),
+                         preconditions={'PICK': ['LOOK']},
                          settings=dict(KEPT, states=states or {}, **settings))
     events = []
     machine.events.observers.append(events.append)
@@ -60,13 +61,15 @@ def run(count, seed=1, states=None, **settings):
     return [[event for event in events if event.trial_id == trial_id] for trial_id in ids]
 
 
-@pytest.mark.parametrize('settings', [{}, {'memory': 2}, {'policy': 'algorithm1'}, {'estimator': 'exponential'},
-                                      {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
+@pytest.mark.parametrize(
+    'settings', [{}, {'memory': 2}, {'policy': 'algorithm1'}, {'estimator': 'exponential'},
+                 {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
 def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
     tried = what_if.compare(run(60, **{**KEPT, **settings}), {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
-    assert tried.counts['not known'] == 0, 'preconditions that were not run are needed by nobody here'
+    assert tried.counts[
+        'not known'] == 0, 'preconditions that were not run are needed by nobody here'
 
 
 def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():
@@ -80,7 +83,8 @@ def test_what_was_not_tried_is_not_known():
     trials = run(60, memory=1)  # every failure is HIGH: no precondition was run, if there are any
     tried = what_if.compare(trials, {'memory': 50})
     assert tried.counts['not known'] > 5 and tried.counts['would recover'] == 0
-    assert tried.other_trials <= sum(tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
+    assert tried.other_trials <= sum(
+        tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
 
 
 def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
@@ -104,15 +108,18 @@ def record(folder, trials):
 
 def test_what_cannot_be_replayed_is_named_and_the_rest_is(tmp_path, capsys):
     told = run(3)
-    untold = [[event._replace(data={'recovers': True}) if event.kind == EventKind.TRIAL_START else event
-               for event in trial] for trial in run(3, seed=2)]
+    untold = [[
+        event._replace(data={'recovers': True}) if event.kind == EventKind.TRIAL_START else event
+        for event in trial
+    ] for trial in run(3, seed=2)]
     record(tmp_path / 'a', untold)
     record(tmp_path / 'b', told)
     (tmp_path / 'b' / 'trial.bag.active').write_bytes(b'')
     capsys.readouterr()
     assert what_if.main([str(tmp_path), '--memory', '5']) == 1
     out, err = capsys.readouterr()
-    assert out.startswith(str(tmp_path / 'b') + '\n') and ' of 3\n' in out and str(tmp_path / 'a') not in out
+    assert out.startswith(str(tmp_path / 'b') + '\n') and ' of 3\n' in out and str(
+        tmp_path / 'a') not in out
     assert 'Skipped {}: its trials do not tell the settings'.format(tmp_path / 'a') in err
     assert 'Skipped {}: still being'.format(tmp_path / 'b' / 'trial.bag.active') in err
     assert what_if.main([str(tmp_path / 'a')]) == 2
@@ -124,7 +131,8 @@ def test_what_cannot_be_replayed_is_named_and_the_rest_is(tmp_path, capsys):
 def test_the_command(tmp_path, capsys):
     record(tmp_path, run(40))
     capsys.readouterr()
-    assert what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose', 'algorithm1']) == 0
+    assert what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose',
+                         'algorithm1']) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == str(tmp_path) and len(lines) == 6
     row = next(line for line in lines if line.startswith('memory 10, policy prose'))

@@ -1,14 +1,16 @@
-"""A job and what can happen to its launches: trials that hang or die, what is tried again and what is lost."""
+"""A job and what can happen to its launches: trials that hang or die, what is tried again and what
+is lost.
+"""
 from types import SimpleNamespace
 
 import pytest
 
-from smach_oracle.simulation.experiment import job as job_module
-from smach_oracle.simulation.experiment.command import parse
-from smach_oracle.simulation.experiment.job import Job
-from smach_oracle.simulation.experiment.launching import LOG_FILE
-from smach_oracle.simulation.experiment.plan import ExperimentError
-from smach_oracle.simulation.experiment.records import Progress
+from smach_oracle.experiment import job as job_module
+from smach_oracle.experiment.command import parse
+from smach_oracle.experiment.job import ExperimentJob
+from smach_oracle.experiment.launching import LOG_FILE
+from smach_oracle.experiment.plan import ExperimentError
+from smach_oracle.experiment.records import JobProgress
 
 FIRST_SEED = 100
 
@@ -20,11 +22,17 @@ class FakeRecords:
         self.folder, self.rates, self.truth = folder, folder / 'rates.json', folder / 'truth.jsonl'
         self._trials = trials
         self.done, self.lost = [], {}
+        FakeLaunch.records = self
 
-    def settle(self):
-        left = [number for number in range(self._trials) if number not in self.done and number not in self.lost]
-        done = [SimpleNamespace(summary=SimpleNamespace(bags=(path,))) for path in self.closed_bags()]
-        return Progress(done, dict(self.lost), (), left[0] if left else self._trials)
+    def tidy_up(self):
+        left = [
+            number for number in range(self._trials)
+            if number not in self.done and number not in self.lost
+        ]
+        done = [
+            SimpleNamespace(summary=SimpleNamespace(bags=(path,))) for path in self.closed_bags()
+        ]
+        return JobProgress(done, dict(self.lost), (), left[0] if left else self._trials)
 
     def closed_bags(self):
         return ['{}.bag'.format(number) for number in sorted(self.done)]
@@ -32,12 +40,14 @@ class FakeRecords:
     def read(self, path):
         return SimpleNamespace(summary=SimpleNamespace(bags=(path,)))
 
-    def lose(self, number, why):
+    def mark_lost(self, number, why):
         self.lost[number] = why
 
 
 class FakeLaunch:
-    """Runs trials as told: by number of the launch, how many it completes and whether it then hangs or ends."""
+    """Runs trials as told: by number of the launch, how many it completes and whether it then hangs
+    or ends.
+    """
 
     script = []
     started = []
@@ -60,18 +70,21 @@ class FakeLaunch:
 
 @pytest.fixture
 def run(monkeypatch, tmp_path):
-    """Run a job of six trials with launches that do as told; returns it, and how each launch was started."""
+    """Run a job of six trials with launches that do as told; returns it, and how each launch was
+    started.
+    """
     def run_job(*script):
         FakeLaunch.script, FakeLaunch.started = list(script), []
         monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
-        monkeypatch.setattr(job_module, 'JobRecords', FakeRecords)
+        monkeypatch.setattr(job_module, 'ReplicateRecords', FakeRecords)
         plan = parse(['--trials', '6', '--seed', str(FIRST_SEED), '--memory', '5']).plan
-        job = Job(plan, plan.arms[0], 0, tmp_path, hung_after_s=-1.0)  # whatever runs on is hung
-        FakeLaunch.records = job._records
+        # whatever runs on is hung
+        job = ExperimentJob(plan, plan.variants[0], 0, tmp_path, hung_after_s=-1.0)
         job.start()
         while not job.over:
             job.watch()
-        return job, [(arguments['seed'] - FIRST_SEED, arguments['trials']) for arguments in FakeLaunch.started]
+        return job, [(arguments['seed'] - FIRST_SEED, arguments['trials'])
+                     for arguments in FakeLaunch.started]
     return run_job
 
 
@@ -91,22 +104,24 @@ def test_a_trial_that_hangs_or_dies_is_tried_once_more(run, hangs):
     assert job.messages[0].endswith('started again')
 
 
-@pytest.mark.parametrize('signs, why', [(4, 'nothing has happened for 100 s'), (6, 'no trial has ended for 500 s')])
-def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(monkeypatch, tmp_path, signs, why):
+@pytest.mark.parametrize('signs, why', [(4, 'nothing has happened for 100 s'),
+                                        (6, 'no trial has ended for 500 s')])
+def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(
+        monkeypatch, tmp_path, signs, why):
     now = [0.0]
     monkeypatch.setattr(job_module, 'time', SimpleNamespace(monotonic=lambda: now[0]))
     monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
-    monkeypatch.setattr(job_module, 'JobRecords', FakeRecords)
+    monkeypatch.setattr(job_module, 'ReplicateRecords', FakeRecords)
     FakeLaunch.script, FakeLaunch.started = [(0, True), (0, True)], []
     plan = parse(['--trials', '6', '--seed', str(FIRST_SEED)]).plan
-    job = Job(plan, plan.arms[0], 0, tmp_path, hung_after_s=100.0)
-    FakeLaunch.records = job._records
-    job._records.folder.mkdir(parents=True)
+    job = ExperimentJob(plan, plan.variants[0], 0, tmp_path, hung_after_s=100.0)
+    folder = FakeLaunch.records.folder
+    folder.mkdir(parents=True)
     job.start()
     for second in range(1, 506):
         now[0] = second
         if second % 99 == 0 and second <= 99 * signs:
-            with (job._records.folder / LOG_FILE).open('a') as log:
+            with (folder / LOG_FILE).open('a') as log:
                 log.write('PICK began\n')
         job.watch()
         if job.messages:
@@ -117,7 +132,8 @@ def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(monkey
 def test_a_trial_that_hangs_twice_is_lost_and_the_next_one_begins(run):
     job, started = run((2, True), (0, True), (3, False))
     assert started == [(0, 6), (2, 4), (3, 3)]
-    assert list(job.lost) == [FIRST_SEED + 2] and job.messages[-1].endswith('LOST') and job.finished == 6
+    assert list(job.lost) == [FIRST_SEED + 2
+                              ] and job.messages[-1].endswith('LOST') and job.finished == 6
 
 
 def test_each_trial_has_its_own_second_attempt(run):

@@ -1,21 +1,28 @@
-"""Servers come and go: a front end that finds them forgets those that are gone for good; no master."""
+"""Servers come and go: a front end that finds them forgets those that are gone for good; no
+master.
+"""
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from smach_oracle.expert import front_end as module
-from smach_oracle.expert.followed_server import Listed, ServerGoneError
+from smach_oracle.expert.claims import ClaimKeeper
+from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question
 from smach_oracle.msg import OpenQueries, OpenQuery
+from smach_oracle.ros.service_calls import ServerGoneError
 
 LIST = ['/robot/expert_query/open', OpenQueries._type]
 
 
 class FakeServer:
-    """A server that is followed."""
+    """A server that is followed; the last one is kept."""
+
+    made = None
 
     def __init__(self, name, _on_change):
+        FakeServer.made = self
         self.name = name
         self.connected = True
         self.stopped = False
@@ -37,8 +44,8 @@ def make_clock(monkeypatch):
         now_s = 0.0
     monkeypatch.setattr(module, 'FollowedServer', FakeServer)
     monkeypatch.setattr(module.time, 'monotonic', lambda: Clock.now_s)
-    for name in ('_keep_connected', '_keep_claims'):
-        monkeypatch.setattr(FrontEnd, name, lambda self: None)
+    monkeypatch.setattr(FrontEnd, '_keep_connected', lambda self: None)
+    monkeypatch.setattr(ClaimKeeper, '_run', lambda self: None)
     monkeypatch.setattr(module.rospy, 'resolve_name', lambda name: name)
     return Clock
 
@@ -51,7 +58,7 @@ def look_after(front_end, clock, seconds, *published):
 def test_a_server_that_is_gone_for_good_is_forgotten_and_found_again(clock):
     front_end = FrontEnd('ann')
     look_after(front_end, clock, 0.0, LIST)
-    server, = front_end._servers.values()
+    server = FakeServer.made
     server.connected = False
     look_after(front_end, clock, 1.0)
     look_after(front_end, clock, module._FORGET_S - 10.0)
@@ -59,7 +66,7 @@ def test_a_server_that_is_gone_for_good_is_forgotten_and_found_again(clock):
     look_after(front_end, clock, 20.0)
     assert front_end.servers == [] and server.stopped
     with pytest.raises(ServerGoneError, match='/robot/expert_query is gone'):
-        front_end.server(Listed('/robot/expert_query', None, 0, '', 0.0, 0.0))
+        front_end.server(ListedQuestion('/robot/expert_query', None, 0, '', 0.0, 0.0))
     look_after(front_end, clock, 1.0, LIST)
     assert front_end.servers == ['/robot/expert_query']
 
@@ -67,23 +74,25 @@ def test_a_server_that_is_gone_for_good_is_forgotten_and_found_again(clock):
 def test_one_that_was_away_for_a_while_begins_anew(clock):
     front_end = FrontEnd('ann')
     look_after(front_end, clock, 0.0, LIST)
-    next(iter(front_end._servers.values())).connected = False
-    for seconds, published in ((1.0, []), (module._FORGET_S - 10.0, [LIST]), (20.0, []), (20.0, [])):
+    FakeServer.made.connected = False
+    for seconds, published in ((1.0, []), (module._FORGET_S - 10.0, [LIST]), (20.0, []), (20.0,
+                                                                                          [])):
         look_after(front_end, clock, seconds, *published)
     assert front_end.servers == ['/robot/expert_query']
 
 
 def test_one_that_was_named_is_followed_for_ever(clock):
     front_end = FrontEnd('ann', ['/robot/expert_query'])
-    next(iter(front_end._servers.values())).connected = False
+    FakeServer.made.connected = False
     for _ in range(3):
         look_after(front_end, clock, 2 * module._FORGET_S)
     assert front_end.servers == ['/robot/expert_query']
 
 
 def listed(key, status, holder=''):
-    goal = SimpleNamespace(query_id=key, failed_state='PICK', choices=[SimpleNamespace(state='DETECT')])
-    return Listed('/robot/expert_query', goal, status, holder, 0.0, float('inf'))
+    goal = SimpleNamespace(query_id=key, failed_state='PICK',
+                           choices=[SimpleNamespace(state='DETECT')])
+    return ListedQuestion('/robot/expert_query', goal, status, holder, 0.0, float('inf'))
 
 
 OTHERS = [listed('held', OpenQuery.CLAIMED, 'bob'), listed('by hand', OpenQuery.INTERFACE_RUNNING)]
@@ -125,7 +134,8 @@ def test_a_question_that_somebody_works_on_is_not_waited_for(free, found):
     assert (question.goal.query_id if question else None) == found
 
 
-def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_outlives_a_server(monkeypatch):
+def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_outlives_a_server(
+        monkeypatch):
     page = (Path(__file__).resolve().parents[3] / 'doc' / 'expert.md').read_text(encoding='utf-8')
     program = page.split('## A front end in')[1].split('```python\n')[1].split('```')[0]
     front_end = Asking('first', 'second', 'third', fails=1)
@@ -144,4 +154,5 @@ def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_out
     with pytest.raises(KeyboardInterrupt):
         exec(compile(program, 'expert.md', 'exec'), {'input': type_in})
     assert front_end.answers == [('first', 'DETECT'), ('second', 'DETECT')]
-    assert front_end.claimed == ['first', 'second', 'third'] and front_end.released[-1] == 'third', 'left by Ctrl-C'
+    assert front_end.claimed == ['first', 'second', 'third'
+                                 ] and front_end.released[-1] == 'third', 'left by Ctrl-C'

@@ -4,11 +4,13 @@ import time
 
 import pytest
 from expert_fixtures import make_question
+from waiting import Once
 
 from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
-from smach_oracle.expert.scripted import load_rules, servers_of
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.question import Answer, AnswerKind, InterfaceOffer
+from smach_oracle.expert.scripted_expert import load_rules, servers_of
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 GOTO = {'kind': 'goto', 'state': 'DETECT'}
 ASSIST = {'kind': 'interface', 'interface': 'assist'}
@@ -40,17 +42,20 @@ def test_robots_do_not_use_up_each_other_s_rules():
     ('PICK', "rules: 'PICK' is not allowed; allowed: a mapping"),
     ({'PICK': []}, 'PICK: .* is not allowed; allowed: a rule'),
     ({'PICK': 'goto DETECT'}, "PICK: 'goto DETECT' is not allowed; allowed: a mapping with a kind"),
-    ({'PICK': {'kind': 'go'}}, "PICK.kind: 'go' is not allowed; .*: give_up, goto, interface, supersede or ignore"),
+    ({'PICK': {'kind': 'go'}
+      }, "PICK.kind: 'go' is not allowed; .*: give_up, goto, interface, supersede or ignore"),
     ({'PICK': {'state': 'DETECT'}}, 'PICK.kind: None is not allowed'),
-    ({'PICK': [GOTO, {'kind': 'goto'}]}, r'PICK\[1\].state: None is not allowed; allowed: a name; goto needs one'),
+    ({'PICK': [GOTO, {'kind': 'goto'}]
+      }, r'PICK\[1\].state: None is not allowed; allowed: a name; goto needs one'),
     ({'PICK': dict(GOTO, delay=3)}, 'PICK.delay: .* allowed: the keys kind, state'),
     ({'PICK': dict(GOTO, delay_s=-1)}, 'PICK.delay_s: -1 is not allowed; allowed: seconds from 0'),
     ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
     ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
     ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed; allowed: a string'),
-    ({3: GOTO}, 'allowed: labels of states as keys')])
+    ({3: GOTO}, 'allowed: labels of states as keys')
+])
 def test_wrong_rules_are_refused_with_what_is_allowed(settings, text):
-    with pytest.raises(ConfigError, match=text):
+    with pytest.raises(SettingsError, match=text):
         Rules.parse(settings)
 
 
@@ -62,31 +67,36 @@ def test_rules_come_from_a_file(tmp_path):
     french = tmp_path / 'french.yaml'
     french.write_bytes(b'PICK: {why: \xe9t\xe9}')
     for wrong in (str(path), str(french), str(tmp_path), str(tmp_path / 'none.yaml'), 7, ''):
-        with pytest.raises(ConfigError, match='~rules'):
+        with pytest.raises(SettingsError, match='~rules'):
             load_rules(None, wrong)
 
 
-@pytest.mark.parametrize('value, names', [('all', []), ('', []), ('/a/q /b/q', ['/a/q', '/b/q']), (['all'], []),
-                                          (['/a/q', '/b/q'], ['/a/q', '/b/q'])])
+@pytest.mark.parametrize('value, names', [('all', []), ('', []), ('/a/q /b/q', ['/a/q', '/b/q']),
+                                          (['all'], []), (['/a/q', '/b/q'], ['/a/q', '/b/q'])])
 def test_servers_are_a_text_or_a_list(value, names):
     assert servers_of(value) == names
 
 
 @pytest.mark.parametrize('value', [7, None, ['/a/q', 7], ['/a/q', ''], {'/a/q': 1}])
 def test_servers_that_are_none_are_refused(value):
-    with pytest.raises(ConfigError, match='~servers'):
+    with pytest.raises(SettingsError, match='~servers'):
         servers_of(value)
 
 
 def ask(rules, cancelled=None, **changes):
-    return RuleExpert(Rules.parse(rules)).ask(make_question(**changes), cancelled or threading.Event(),
-                                              lambda *_: None)
+    return RuleExpert(Rules.parse(rules)).ask(make_question(**changes), cancelled
+                                              or threading.Event(), lambda *_: None)
 
 
 def test_an_expert_by_rules_answers_in_the_same_process():
-    answer = ask({'PICK': {'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'grasped': 'mug'}, 'why': 'test'}})
-    assert answer == Answer(AnswerKind.SUPERSEDE, outcome='succeeded', outputs={'grasped': 'mug'}, by='scripted',
-                            why='test')
+    answer = ask({
+        'PICK': {
+            'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'grasped': 'mug'},
+            'why': 'test'
+        }
+    })
+    assert answer == Answer(AnswerKind.SUPERSEDE, outcome='succeeded', outputs={'grasped': 'mug'},
+                            by='scripted', why='test')
 
 
 def test_an_answer_that_comes_after_the_deadline_is_none():
@@ -97,9 +107,16 @@ def test_an_answer_that_comes_after_the_deadline_is_none():
 
 
 def test_a_question_taken_back_is_not_waited_for():
-    cancelled = threading.Event()
-    threading.Timer(0.1, cancelled.set).start()
+    class Cancelled(threading.Event):
+        waited_for = False
+
+        def wait(self, timeout=None):
+            self.waited_for = True
+            return super().wait(timeout)
+    cancelled = Cancelled()
+    asker = Once(lambda: cancelled.waited_for, cancelled.set)
     assert ask({'PICK': {'kind': 'ignore'}}, cancelled) is None
+    asker.join()
 
 
 def test_an_expert_by_rules_runs_the_interfaces_it_was_given():

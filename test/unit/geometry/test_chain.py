@@ -1,10 +1,12 @@
-"""Serial chains: positions, Jacobians, limits and inverse kinematics, on an arm with the PR2's proportions."""
+"""Serial chains: positions, Jacobians, limits and inverse kinematics, on an arm with the PR2's
+proportions.
+"""
 import time
 
 import numpy as np
 import pytest
 
-from smach_oracle.geometry.chain import Chain
+from smach_oracle.geometry.chain import JointChain
 from smach_oracle.geometry.transforms import from_rpy, rotation_vector
 
 LINKS = [('lift', 'prismatic', '0 0 0.7', '0 0 0', '0 0 1', 0.0, 0.3),
@@ -23,27 +25,30 @@ def arm_urdf() -> str:
     """A robot with one arm."""
     text, parent = ['<robot name="arm"><link name="base"/>'], 'base'
     for name, kind, xyz, rpy, axis, lower, upper in LINKS:
-        text.append('<link name="{0}_link"/><joint name="{0}" type="{1}"><parent link="{2}"/><child link="{0}_link"/>'
-                    '<origin xyz="{3}" rpy="{4}"/><axis xyz="{5}"/><limit lower="{6}" upper="{7}" velocity="2"/>'
-                    '</joint>'.format(name, kind, parent, xyz, rpy, axis, lower, upper))
+        text.append(
+            '<link name="{0}_link"/><joint name="{0}" type="{1}"><parent link="{2}"/><child '
+            'link="{0}_link"/>'
+            '<origin xyz="{3}" rpy="{4}"/><axis xyz="{5}"/><limit lower="{6}" upper="{7}" '
+            'velocity="2"/>'
+            '</joint>'.format(name, kind, parent, xyz, rpy, axis, lower, upper))
         parent = name + '_link'
     return ''.join(text) + '</robot>'
 
 
 @pytest.fixture(name='arm')
-def _arm() -> Chain:
-    return Chain.from_urdf(arm_urdf(), 'base', 'tool_link', fixed={'lift': 0.2})
+def _arm() -> JointChain:
+    return JointChain.from_urdf(arm_urdf(), 'base', 'tool_link', fixed={'lift': 0.2})
 
 
 def test_forward_of_a_straight_arm_adds_up_its_links():
-    arm = Chain.from_urdf(arm_urdf(), 'base', 'wrist_link', fixed={'lift': 0.2})
+    arm = JointChain.from_urdf(arm_urdf(), 'base', 'wrist_link', fixed={'lift': 0.2})
     expected = from_rpy((0.1 + 0.4 + 0.321, -0.19, 0.7 + 0.2 + 0.1), 0.1, 0.2, -0.1)
     assert arm.names == ['pan', 'shoulder', 'roll', 'elbow', 'forearm', 'wrist']
     assert np.allclose(arm.forward(np.zeros(6)), expected)
 
 
 def test_forward_turns_about_the_axes():
-    arm = Chain.from_urdf(arm_urdf(), 'base', 'forearm_link')
+    arm = JointChain.from_urdf(arm_urdf(), 'base', 'forearm_link')
     tip = arm.forward([0.1, np.pi / 2, 0.0, 0.0, 0.0, 0.0])
     assert np.allclose(tip[:3, 3], [0.0, -0.19 + 0.5, 0.9])
     bent = arm.forward([0.0, 0.0, np.pi / 2, 0.0, 0.0, 0.0])
@@ -51,14 +56,15 @@ def test_forward_turns_about_the_axes():
 
 
 def test_jacobian_is_the_derivative_also_of_a_lift():
-    arm = Chain.from_urdf(arm_urdf(), 'base', 'tool_link')
+    arm = JointChain.from_urdf(arm_urdf(), 'base', 'tool_link')
     q = np.concatenate([[0.1], SEED + 0.3])
     step = 1e-6
     jacobian, here = arm.jacobian(q), arm.forward(q)
     for k in range(8):
         there = arm.forward(q + step * np.eye(8)[k])
         assert np.allclose((there[:3, 3] - here[:3, 3]) / step, jacobian[:3, k], atol=1e-5)
-        assert np.allclose(rotation_vector(there @ np.linalg.inv(here)) / step, jacobian[3:, k], atol=1e-5)
+        assert np.allclose(
+            rotation_vector(there @ np.linalg.inv(here)) / step, jacobian[3:, k], atol=1e-5)
 
 
 def test_inverse_reaches_what_can_be_reached_fast_and_within_limits(arm):
@@ -117,13 +123,13 @@ def test_continuous_joints_stay_within_half_a_turn_of_the_seed(arm):
     ('hand_link', 'tool_link', {}, 'no joint moves')])
 def test_chain_that_is_not_there_is_named(root, tip, fixed, text):
     with pytest.raises(ValueError, match=text):
-        Chain.from_urdf(arm_urdf(), root, tip, fixed)
+        JointChain.from_urdf(arm_urdf(), root, tip, fixed)
 
 
 @pytest.mark.parametrize('text', ['', '<robot>', '<robot/>', '<robot><joint name="a"/></robot>'])
 def test_text_that_is_no_urdf_is_refused(text):
     with pytest.raises(ValueError, match='robot description'):
-        Chain.from_urdf(text, 'base', 'tool_link')
+        JointChain.from_urdf(text, 'base', 'tool_link')
 
 
 def test_poses_that_are_not_finite_are_refused(arm):

@@ -30,15 +30,16 @@ def linked(*pairs):
     links = sorted({name for pair in pairs for name in pair})
     return '<robot name="r">{}{}</robot>'.format(
         ''.join('<link name="{}"/>'.format(name) for name in links),
-        ''.join('<joint name="{0}{1}" type="fixed"><parent link="{0}"/><child link="{1}"/></joint>'.format(*pair)
-                for pair in pairs))
+        ''.join('<joint name="{0}{1}" type="fixed"><parent link="{0}"/><child link="{1}"/></joint>'.
+                format(*pair) for pair in pairs))
 
 
 def test_the_looks_of_every_link_and_what_stands_for_a_mesh():
     robot = read_shapes(ARM)
     assert (robot.root, robot.links) == ('base', ['base', 'upper', 'finger', 'thumb'])
     box, mesh, sphere = robot.shapes
-    assert (box.link, box.kind, list(box.size), box.colour) == ('base', 'box', [1, 2, 3], (255, 0, 0))
+    assert (box.link, box.kind, list(box.size), box.colour) == ('base', 'box', [1, 2,
+                                                                                3], (255, 0, 0))
     assert (mesh.mesh, mesh.size[0], mesh.origin[2, 3]) == ('package://arm/upper.stl', 0.001, 0.5)
     assert (sphere.link, sphere.kind, list(sphere.size)) == ('finger', 'sphere', [0.2, 0.2, 0.2])
     assert [(shape.link, shape.kind) for shape in robot.collisions] == [('upper', 'cylinder')]
@@ -51,19 +52,22 @@ def test_links_are_where_the_joints_say_and_mimics_follow():
     np.testing.assert_allclose(read_shapes(ARM).poses({})['thumb'][:3, 3], [0.5, 0, 1])
 
 
-@pytest.mark.parametrize('text, said', [
-    ('', 'not XML'), ('<robot', 'not XML'), ('<html><link/></html>', 'begins with <robot>'),
-    ('<robot name="r"/>', '0 links'), (linked(('a', 'b'), ('b', 'a')), 'in a circle'),
-    (linked(('a', 'b'), ('c', 'd'), ('d', 'c')), 'does not hang on a'), (linked(('a', 'b'), ('c', 'd')), '2 links'),
-    (with_visual(''), 'not \'\''), (with_visual('<geometry><torus/></geometry>'), 'torus'),
-    (with_visual('<geometry><box size="1 2"/></geometry>'), 'size="1 2"; it takes 3'),
-    (with_visual('<geometry><box size="nan 1 1"/></geometry>'), 'finite'),
-    (with_visual('<geometry><sphere/></geometry>'), 'radius'),
-    (with_visual('<geometry><sphere radius="1e99"/></geometry>'), 'finite'),
-    (with_visual('<origin xyz="inf 0 0"/><geometry><box size="1 1 1"/></geometry>'), 'xyz="inf 0 0"'),
-    (ARM.replace('xyz="0 0 1"/><axis', 'xyz="nan 0 1"/><axis'), 'place or an axis'),
-    (ARM.replace('multiplier="-2"', 'multiplier="x"'), 'multiplier="x"'),
-    (ARM.replace('<child link="finger"/>', ''), 'not a URDF')])
+@pytest.mark.parametrize(
+    'text, said',
+    [('', 'not XML'), ('<robot', 'not XML'), ('<html><link/></html>', 'begins with <robot>'),
+     ('<robot name="r"/>', '0 links'), (linked(('a', 'b'), ('b', 'a')), 'in a circle'),
+     (linked(('a', 'b'), ('c', 'd'), ('d', 'c')), 'does not hang on a'),
+     (linked(('a', 'b'), ('c', 'd')), '2 links'), (with_visual(''), 'not \'\''),
+     (with_visual('<geometry><torus/></geometry>'), 'torus'),
+     (with_visual('<geometry><box size="1 2"/></geometry>'), 'size="1 2"; it takes 3'),
+     (with_visual('<geometry><box size="nan 1 1"/></geometry>'), 'finite'),
+     (with_visual('<geometry><sphere/></geometry>'), 'radius'),
+     (with_visual('<geometry><sphere radius="1e99"/></geometry>'), 'finite'),
+     (with_visual('<origin xyz="inf 0 0"/><geometry><box size="1 1 1"/></geometry>'),
+      'xyz="inf 0 0"'),
+     (ARM.replace('xyz="0 0 1"/><axis', 'xyz="nan 0 1"/><axis'), 'place or an axis'),
+     (ARM.replace('multiplier="-2"', 'multiplier="x"'), 'multiplier="x"'),
+     (ARM.replace('<child link="finger"/>', ''), 'not a URDF')])
 def test_what_is_wrong_is_said(text, said):
     with pytest.raises(ValueError, match='robot description') as error:
         read_shapes(text)
@@ -72,7 +76,9 @@ def test_what_is_wrong_is_said(text, said):
 
 @pytest.mark.parametrize('declared', [
     '<!DOCTYPE robot [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>',
-    '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file:///etc/passwd">]>', '<!doctype robot SYSTEM "http://evil/x.dtd">'])
+    '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file:///etc/passwd">]>',
+    '<!doctype robot SYSTEM "http://evil/x.dtd">'
+])
 def test_document_types_and_entities_are_refused(declared):
     with pytest.raises(ValueError, match='not allowed'):
         read_shapes(declared + ARM.replace('name="arm"', 'name="&secret;&b;"'))

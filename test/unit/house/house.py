@@ -1,5 +1,6 @@
 """The source tree, for the tests that hold the house rules."""
 import ast
+import functools
 from pathlib import Path
 from typing import Iterator, List, Tuple
 
@@ -11,12 +12,16 @@ def is_python(path: Path) -> bool:
     """Whether `path` is Python by its suffix or, in scripts/, by its first line."""
     if path.suffix == '.py':
         return True
-    return not path.suffix and path.is_file() and b'python' in path.read_bytes()[:40].split(b'\n')[0]
+    return not path.suffix and path.is_file() and b'python' in path.read_bytes()[:40].split(
+        b'\n')[0]
 
 
 def python_files(*folders: str) -> List[Path]:
     """Every Python file of the checkout, or of the folders given."""
-    found = [path for folder in folders or SOURCES for path in sorted((ROOT / folder).rglob('*')) if is_python(path)]
+    found = [
+        path for folder in folders or SOURCES for path in sorted((ROOT / folder).rglob('*'))
+        if is_python(path)
+    ]
     assert found, 'no Python files in {}'.format(folders)
     return found
 
@@ -26,15 +31,18 @@ def shown(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+@functools.lru_cache(maxsize=None)
 def parse(path: Path) -> ast.Module:
-    """The syntax tree of `path`, as Python 3.8 reads it."""
+    """The syntax tree of `path`, as Python 3.8 reads it; read once, so not to be changed."""
     return ast.parse(path.read_text(encoding='utf-8'), shown(path), feature_version=(3, 8))
 
 
 def imports(path: Path) -> Iterator[Tuple[int, str]]:
-    """Every module that `path` imports, anywhere in it, as (line, dotted name); relative names are made absolute.
+    """Every module that `path` imports, anywhere in it, as (line, dotted name); relative names are
+    made absolute.
 
-    ``from a import b`` gives ``a.b``: only that tells ``from smach_oracle import ros`` from an import of the top.
+    ``from a import b`` gives ``a.b``: only that tells ``from smach_oracle import ros`` from an
+    import of the top.
     """
     parts = path.relative_to(ROOT).with_suffix('').parts[1:]
     for node in ast.walk(parse(path)):
@@ -46,5 +54,3 @@ def imports(path: Path) -> Iterator[Tuple[int, str]]:
             module = '.'.join(filter(None, [base, node.module]))
             for alias in node.names:
                 yield node.lineno, '{}.{}'.format(module, alias.name)
-
-

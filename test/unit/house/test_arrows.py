@@ -1,33 +1,65 @@
-"""Who may import whom: the executive is free of ROS, the use cases are free of us, the analysis runs anywhere."""
+"""Who may import whom: the executive is free of ROS, the use cases are free of us, the analysis
+runs anywhere.
+"""
+import ast
+import collections
 import re
 import subprocess
 import sys
-from typing import Set
+from pathlib import Path
+from typing import Dict, List, Set
 
 import pytest
-from house import ROOT, imports, python_files, shown
+from house import ROOT, imports, parse, python_files, shown
 
-ROOMS = ('oracle', 'ros', 'expert', 'simulation', 'tasks', 'analysis', 'geometry')
 INTERFACES = {'msg', 'srv'}
+# modules of the top: how commands start, and the packages that they need
+TOP = {'commands', 'packages'}
 # room: the other rooms that it may import
 ARROWS = {
     'oracle': set(),
     'ros': {'oracle'},
-    'expert': {'oracle', 'ros', 'geometry', 'analysis'},
-    'simulation': {'oracle', 'ros', 'analysis', 'geometry', 'expert'},
     'geometry': set(),
-    'tasks': set(),
     'analysis': {'oracle'},
+    'interfaces': {'oracle', 'ros', 'geometry'},
+    'expert': {'oracle', 'ros', 'geometry', 'analysis', 'interfaces'},
+    'pr2': {'oracle', 'ros', 'geometry'},
+    'simulation': {'oracle', 'ros', 'geometry', 'pr2'},
+    'scripted_operator': {'oracle', 'ros', 'geometry', 'expert'},
+    'experiment': {'oracle', 'analysis'},
+    'tasks': set(),
 }
-ROS = {'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros', 'smach_msgs'}
-ROS_PACKAGES = ROS - {'rospkg'} | {'smach', 'actionlib_msgs', 'control_msgs', 'geometry_msgs', 'move_base_msgs',
-                                   'rosgraph_msgs', 'roslaunch', 'rosservice', 'rostest', 'sensor_msgs', 'std_msgs',
-                                   'std_srvs', 'tf2_msgs', 'tf2_ros', 'trajectory_msgs', 'visualization_msgs'}
+ROOMS = sorted(ARROWS)
+# the packages of a room that has several, from the top down: each may import those below it alone
+LAYERS = {
+    'oracle': ['execution', 'recovery', 'machine', 'asking', 'records', 'settings', 'decision'],
+    'ros': ['oracle_run', 'expert', 'interfaces', 'recording'],
+    'expert': ['console', 'terminal'],
+    'expert/console': [
+        'answering', 'robots', 'trials', 'sensors', 'graphs', 'feeds', 'commands', 'web'
+    ],
+    'interfaces': ['perception', 'manipulation'],
+    'pr2': ['nodes', 'skills', 'planning', 'perception', 'model'],
+    'simulation': ['rehearsal', 'node', 'physics', 'scenes'],
+}
+MAX_MODULES = 20  # in a package, its __init__ not counted
+ROS = {
+    'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros',
+    'smach_msgs'
+}
+ROS_PACKAGES = ROS - {'rospkg'} | {
+    'smach', 'actionlib_msgs', 'control_msgs', 'geometry_msgs', 'move_base_msgs', 'rosgraph_msgs',
+    'roslaunch', 'rosservice', 'rostest', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
+    'tf2_ros', 'trajectory_msgs', 'visualization_msgs'
+}
 STAND_INS = {'smach', 'smach_ros', 'smach_msgs', 'control_msgs'}
-PINNED = {'cv2': 'opencv-python-headless', 'ompl': 'ompl', 'pybullet': 'pybullet', 'rosbags': 'rosbags'}
+PINNED = {
+    'cv2': 'opencv-python-headless', 'ompl': 'ompl', 'pybullet': 'pybullet', 'rosbags': 'rosbags'
+}
 STDLIB = getattr(sys, 'stdlib_module_names', frozenset())
 
-without_stdlib_names = pytest.mark.skipif(not STDLIB, reason='Python before 3.10 cannot list its own modules')
+without_stdlib_names = pytest.mark.skipif(not STDLIB,
+                                          reason='Python before 3.10 cannot list its own modules')
 
 
 def imported_by(room: str) -> Set[str]:
@@ -40,23 +72,43 @@ def test_a_room_imports_only_the_rooms_that_it_may(room):
     for path in python_files('src/smach_oracle/' + room):
         for line, name in imports(path):
             parts = name.split('.')
-            if parts[0] == 'smach_oracle' and parts[1] not in ARROWS[room] | INTERFACES | {room}:
+            if parts[0] == 'smach_oracle' and parts[1] not in ARROWS[room] | INTERFACES | TOP | {
+                    room
+            }:
                 wrong.append('{}:{} imports {}'.format(shown(path), line, name))
     assert not wrong
 
 
-def test_no_subsystem_of_the_robot_can_read_the_truth_of_the_world():
-    for path in python_files('src/smach_oracle/simulation/robot'):
-        wrong = [name for _, name in imports(path)
-                 if name.startswith('smach_oracle.simulation.') and name.split('.')[2] != 'robot']
-        assert not wrong, '{} imports {}'.format(shown(path), wrong)
+@pytest.mark.parametrize('room', sorted(LAYERS))
+def test_the_packages_of_a_room_import_downwards_alone(room):
+    layers = LAYERS[room]
+    base = 'smach_oracle.{}.'.format(room.replace('/', '.'))
+    assert {path.parent.name
+            for path in (ROOT / 'src/smach_oracle' / room).glob('*/__init__.py')} == set(layers)
+    wrong = []
+    for height, layer in enumerate(layers):
+        above = tuple(base + other + '.' for other in layers[:height])
+        for path in python_files('src/smach_oracle/{}/{}'.format(room, layer)):
+            wrong += [
+                '{}:{} imports {}'.format(shown(path), line, name) for line, name in imports(path)
+                if name.startswith(above)
+            ]
+    assert not wrong
 
 
-@pytest.mark.parametrize('room', ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'simulation/robot'])
+def test_no_package_has_too_many_modules():
+    counts = collections.Counter(path.parent for path in python_files('src')
+                                 if path.name != '__init__.py')
+    assert not {str(folder): count for folder, count in counts.items() if count > MAX_MODULES}
+
+
+@pytest.mark.parametrize('room',
+                         ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'interfaces', 'pr2'])
 def test_neither_executive_nor_task_nor_subsystem_asks_for_the_truth_or_its_causes(room):
     for path in python_files('src/smach_oracle/' + room):
-        found = re.findall(r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',
-                           path.read_text(encoding='utf-8'))
+        found = re.findall(
+            r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',
+            path.read_text(encoding='utf-8'))
         assert not found, '{} speaks of {}'.format(shown(path), found)
 
 
@@ -65,22 +117,93 @@ def test_every_room_is_known_here():
     assert folders == set(ROOMS)
 
 
+def modules_of(room: str) -> Dict[str, Path]:
+    """The modules of a room by dotted name; a package goes by its own."""
+    named = {path.relative_to(ROOT / 'src').with_suffix('').parts: path
+             for path in python_files('src/smach_oracle/' + room)}
+    return {
+        '.'.join(parts[:-1] if parts[-1] == '__init__' else parts): path
+        for parts, path in named.items()
+    }
+
+
+def module_of(name: str, modules: Dict[str, Path]) -> str:
+    """The longest part of a dotted name that is a module, '' where none is."""
+    while name and name not in modules:
+        name = name.rpartition('.')[0]
+    return name
+
+
+def for_types_alone(path: Path) -> Set[int]:
+    """The lines under `if TYPE_CHECKING`, which are not run."""
+    return {
+        inner.lineno
+        for node in ast.walk(parse(path)) if isinstance(node, ast.If)
+        and isinstance(node.test, ast.Name) and node.test.id == 'TYPE_CHECKING'
+        for inner in node.body
+    }
+
+
+def circle_in(graph: Dict[str, Set[str]]) -> List[str]:
+    """The nodes of a graph that lie on a circle or lead to one, sorted."""
+    left = {node: set(targets) for node, targets in graph.items()}
+    while True:
+        leaves = {node for node, targets in left.items() if not targets & set(left)}
+        if not leaves:
+            return sorted(left)
+        left = {node: targets for node, targets in left.items() if node not in leaves}
+
+
+@pytest.mark.parametrize('room', ROOMS)
+def test_no_modules_of_a_room_import_each_other_in_a_circle(room):
+    modules = modules_of(room)
+    graph = {
+        name: {
+            module_of(target, modules)
+            for line, target in imports(path) if line not in for_types_alone(path)
+        } - {'', name}
+        for name, path in modules.items()
+    }
+    assert not circle_in(graph)
+
+
+def test_a_circle_of_imports_is_noticed():
+    assert circle_in({'a': {'b'}, 'b': {'c'}, 'c': {'b'}, 'd': set()}) == ['a', 'b', 'c']
+
+
+def test_the_executive_imports_at_the_top_of_its_files_alone():
+    late = [
+        '{}:{}'.format(shown(path), node.lineno) for path in python_files('src/smach_oracle/oracle')
+        for function in ast.walk(parse(path)) if isinstance(function, (ast.FunctionDef, ast.Lambda))
+        for node in ast.walk(function) if isinstance(node, (ast.Import, ast.ImportFrom))
+    ]
+    # the lazy names of the package itself keep its pure parts free of smach
+    assert [place.split(':')[0] for place in late] == ['src/smach_oracle/oracle/__init__.py']
+
+
 @without_stdlib_names
 def test_the_executive_needs_smach_and_python_alone():
     outside = {name.split('.')[0] for name in imported_by('oracle')} - STDLIB
     assert outside <= {'smach', 'smach_oracle'}
-    assert not {name for name in imported_by('oracle') if name.startswith(('smach_oracle.msg', 'smach_oracle.srv'))}
+    assert not {
+        name
+        for name in imported_by('oracle')
+        if name.startswith(('smach_oracle.msg', 'smach_oracle.srv'))
+    }
 
 
 @without_stdlib_names
 def test_the_engine_needs_python_alone():
-    assert {name.split('.')[0] for path in python_files('src/smach') for _, name in imports(path)} - STDLIB <= {'smach'}
+    assert {name.split('.')[0]
+            for path in python_files('src/smach')
+            for _, name in imports(path)} - STDLIB <= {'smach'}
 
 
 def test_the_engine_knows_nothing_of_the_oracle():
     for package in ('smach', 'smach_ros'):
         for path in python_files('src/' + package):
-            assert not [name for _, name in imports(path) if name.startswith('smach_oracle')], shown(path)
+            assert not [name for _, name in imports(path) if name.startswith('smach_oracle')
+                        ], shown(path)
 
 
 def test_the_analysis_names_neither_ros_nor_smach():
@@ -93,18 +216,25 @@ def test_the_use_cases_are_scripts_as_any_smach_user_writes_them():
 
 
 def test_the_analysis_runs_where_neither_ros_nor_smach_is_installed():
-    modules = ['.'.join(path.relative_to(ROOT / 'src').with_suffix('').parts).replace('.__init__', '')
-               for path in python_files('src/smach_oracle/analysis')]
-    program = 'import sys\nsys.path.insert(0, {!r})\nfor name in {!r}: sys.modules[name] = None\nimport {}\n'.format(
+    modules = [
+        '.'.join(path.relative_to(ROOT / 'src').with_suffix('').parts).replace('.__init__', '')
+        for path in python_files('src/smach_oracle/analysis')
+    ]
+    program = ('import sys\nsys.path.insert(0, {!r})\n'
+               'for name in {!r}: sys.modules[name] = None\nimport {}\n').format(
         str(ROOT / 'src'), sorted(ROS | {'smach'}), ', '.join(modules))
-    result = subprocess.run([sys.executable, '-c', program], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            timeout=60, check=False)
+    result = subprocess.run([sys.executable, '-c', program], stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, timeout=60, check=False)
     assert result.returncode == 0, result.stdout.decode()
 
 
 def test_every_ros_package_that_is_imported_is_a_declared_dependency():
     manifest = (ROOT / 'package.xml').read_text(encoding='utf-8')
-    used = {name.split('.')[0] for path in python_files('src', 'scripts', 'test') for _, name in imports(path)}
+    used = {
+        name.split('.')[0]
+        for path in python_files('src', 'scripts', 'test')
+        for _, name in imports(path)
+    }
     # rospkg comes with roslib, and is no ROS package itself
     declared = {name for name in used & ROS_PACKAGES if 'depend>{}<'.format(name) in manifest}
     assert used & ROS_PACKAGES == declared
@@ -113,8 +243,13 @@ def test_every_ros_package_that_is_imported_is_a_declared_dependency():
 @without_stdlib_names
 def test_everything_that_is_imported_is_set_up_on_debian():
     lists = [ROOT / name for name in ('debian-packages.txt', 'requirements.txt')]
-    there = {re.split('[=<]', line.split()[0])[0] for path in lists
-             for line in path.read_text(encoding='utf-8').splitlines() if line and not line.startswith('#')}
+    there = {
+        re.split('[=<]',
+                 line.split()[0])[0]
+        for path in lists
+        for line in path.read_text(encoding='utf-8').splitlines()
+        if line and not line.startswith('#')
+    }
     used = {name.split('.')[0] for path in python_files('src') for _, name in imports(path)}
     missing = {name for name in used - STDLIB - STAND_INS - {'smach_oracle'}
                if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there}

@@ -1,4 +1,6 @@
-"""The commands in the documentation: each is there, knows its options, and takes its launch arguments."""
+"""The commands in the documentation: each is there, knows its options, and takes its launch
+arguments.
+"""
 import re
 import shlex
 import subprocess
@@ -11,8 +13,9 @@ from house import ROOT
 
 PAGES = sorted((ROOT / 'doc').glob('*.md'))
 # on lines of their own, also continued ones, or within a line of text
-COMMAND = re.compile(r'^ *(ros(?:run|launch) smach_oracle (?:.*\\\n)*.*)$|`(ros(?:run|launch) smach_oracle [^`]+)`',
-                     re.MULTILINE)
+COMMAND = re.compile(
+    r'^ *(ros(?:run|launch) smach_oracle (?:.*\\\n)*.*)$|`(ros(?:run|launch) smach_oracle [^`]+)`',
+    re.MULTILINE)
 SCRIPT = re.compile(r'SCRIPT|.*\.py')
 
 
@@ -32,8 +35,9 @@ LAUNCHED = [words for words in COMMANDS if words[0] == 'roslaunch']
 @lru_cache(maxsize=None)
 def options_of(command):
     """What a command says of its options."""
-    told = subprocess.run([sys.executable, str(ROOT / 'scripts' / command), '--help'], timeout=60, check=True,
-                          stdout=subprocess.PIPE).stdout.decode()
+    told = subprocess.run(
+        [sys.executable, str(ROOT / 'scripts' / command), '--help'], timeout=60, check=True,
+        stdout=subprocess.PIPE).stdout.decode()
     return set(re.findall(r'--[a-z][a-z-]*', told))
 
 
@@ -45,16 +49,23 @@ def test_there_are_commands_of_both_kinds():
 def test_what_is_run_is_there_and_knows_the_options(words):
     command, rest = words[2], words[3:]
     assert (ROOT / 'scripts' / command).is_file()
-    scripts = [place for place, word in enumerate(rest) if command == 'oracle_run' and SCRIPT.fullmatch(word)]
+    scripts = [
+        place for place, word in enumerate(rest)
+        if command == 'oracle_run' and SCRIPT.fullmatch(word)
+    ]
     own = rest[:scripts[0]] if scripts else rest
     given = {word for word in own if word.startswith('--')}
     assert not given or given <= options_of(command)
     behind = {word for word in rest[len(own):] if word.startswith('--')}
-    assert not behind or not behind & options_of(command), 'options behind the script are the script\'s own'
+    assert not behind or not behind & options_of(
+        command), 'options behind the script are the script\'s own'
 
 
 @pytest.mark.parametrize('words', LAUNCHED, ids=' '.join)
 def test_what_is_launched_is_there_and_takes_the_arguments(words):
     arguments = ElementTree.parse(str(ROOT / 'launch' / words[2])).getroot().findall('arg')
     given = {word.split(':=')[0] for word in words[3:] if ':=' in word}
-    assert given <= {argument.get('name') for argument in arguments if argument.get('value') is None}
+    assert given <= {
+        argument.get('name')
+        for argument in arguments if argument.get('value') is None
+    }

@@ -1,12 +1,14 @@
-"""launch/oracle.yaml, from which settings are copied, has them all with their defaults; doc/executive.md names them."""
+"""launch/oracle.yaml, from which settings are copied, has them all with their defaults;
+doc/executive.md names them.
+"""
 import re
 
 import pytest
 import yaml
 from house import ROOT
 
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.settings import Settings
 
 TEXT = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8')
 
@@ -19,7 +21,7 @@ def uncommented():
 
 def allowed(given):
     """The keys that the error for an unknown one names."""
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(SettingsError) as told:
         Settings.from_dict(given)
     return set(str(told.value).rsplit('one of the keys ', 1)[1].split(', '))
 

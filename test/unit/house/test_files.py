@@ -1,4 +1,6 @@
-"""What holds for every file: Python 3.8, a few hundred lines, no shortcut that hides an error or runs foreign code."""
+"""What holds for every file: Python 3.8, a few hundred lines, no shortcut that hides an error or
+runs foreign code.
+"""
 import ast
 import collections
 import re
@@ -14,17 +16,23 @@ LOADERS = {'pickle', 'cPickle', 'dill', 'marshal', 'shelve', 'joblib'}
 
 def found(paths, is_wrong):
     """Every node of `paths` that `is_wrong` says yes to, as FILE:LINE."""
-    return ['{}:{}'.format(shown(path), node.lineno) for path in paths for node in ast.walk(parse(path))
-            if hasattr(node, 'lineno') and is_wrong(node)]
+    return [
+        '{}:{}'.format(shown(path), node.lineno) for path in paths for node in ast.walk(parse(path))
+        if hasattr(node, 'lineno') and is_wrong(node)
+    ]
 
 
 def test_every_file_is_short():
-    lengths = {shown(path): len(path.read_text(encoding='utf-8').splitlines()) for path in EVERYTHING}
+    lengths = {
+        shown(path): len(path.read_text(encoding='utf-8').splitlines())
+        for path in EVERYTHING
+    }
     assert not {name: length for name, length in lengths.items() if length > MAX_LINES}
 
 
 def test_no_except_catches_everything_unnamed():
-    assert not found(EVERYTHING, lambda node: isinstance(node, ast.ExceptHandler) and node.type is None)
+    assert not found(EVERYTHING,
+                     lambda node: isinstance(node, ast.ExceptHandler) and node.type is None)
 
 
 def test_nothing_is_unpickled():
@@ -36,17 +44,24 @@ def test_nothing_is_unpickled():
 
 
 def test_there_is_one_restricted_unpickler_and_it_decides_what_it_admits():
-    classes = [(path, node) for path in PRODUCT for node in ast.walk(parse(path)) if isinstance(node, ast.ClassDef)
-               and any('Unpickler' in ast.dump(base) for base in node.bases)]
+    classes = [(path, node) for path in PRODUCT for node in ast.walk(parse(path))
+               if isinstance(node, ast.ClassDef) and any('Unpickler' in ast.dump(base)
+                                                         for base in node.bases)]
     assert [shown(path).split('/')[1] for path, _ in classes] == ['smach_ros']
-    assert 'find_class' in {node.name for node in classes[0][1].body if isinstance(node, ast.FunctionDef)}
+    assert 'find_class' in {
+        node.name
+        for node in classes[0][1].body if isinstance(node, ast.FunctionDef)
+    }
 
 
 def test_no_library_prints():
-    libraries = [path for path in python_files('src')
-                 if not any(isinstance(node, ast.FunctionDef) and node.name == 'main' for node in parse(path).body)]
-    assert not found(libraries, lambda node: isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-                     and node.func.id == 'print')
+    libraries = [
+        path for path in python_files('src') if not any(
+            isinstance(node, ast.FunctionDef) and node.name == 'main' for node in parse(path).body)
+    ]
+    assert not found(
+        libraries, lambda node: isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and
+        node.func.id == 'print')
 
 
 def test_no_argument_has_a_mutable_default():
@@ -76,16 +91,24 @@ def test_commands_are_executable_and_short():
 
 
 def tracked_text():
-    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE, check=False).stdout
+    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE,
+                            check=False).stdout
     names = [name for name in listed.decode().split('\0') if name]
     # an unpacked archive has no git; its sources have the same rule
-    paths = [ROOT / name for name in names] or [path for folder in SOURCES for path in (ROOT / folder).rglob('*')]
-    return [path for path in paths if path.is_file() and path.suffix not in ('.png', '.svg', '.bag', '.pyc')]
+    paths = [ROOT / name for name in names
+             ] or [path for folder in SOURCES for path in (ROOT / folder).rglob('*')]
+    return [
+        path for path in paths
+        if path.is_file() and path.suffix not in ('.png', '.svg', '.bag', '.pyc')
+    ]
 
 
 def test_no_file_names_a_place_on_somebodys_machine():
     somewhere = re.compile(r'(?<![\w.$}/-])/(home|root|work|Users|tmp/w)/')
-    wrong = ['{}:{}'.format(shown(path), number) for path in tracked_text()
-             for number, line in enumerate(path.read_text(encoding='utf-8', errors='replace').splitlines(), 1)
-             if somewhere.search(line) and path.name != 'test_files.py']
+    wrong = [
+        '{}:{}'.format(shown(path), number) for path in tracked_text()
+        for number, line in enumerate(
+            path.read_text(encoding='utf-8', errors='replace').splitlines(), 1)
+        if somewhere.search(line) and path.name != 'test_files.py'
+    ]
     assert not wrong

@@ -3,26 +3,28 @@ import os
 import subprocess
 import sys
 import threading
-import time
 import xml.etree.ElementTree as ElementTree
 
 import pytest
 from house import ROOT
+from waiting import wait_for
 
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
 import checks  # noqa: E402
 from checks import Bench, benchmark_checks, rostest_checks  # noqa: E402
 from processes import Runner, kill_marked  # noqa: E402
-from report import Outcome, read_junit, show, write_junit  # noqa: E402
+from report import Outcome, read_junit, second_attempts, show, write_junit  # noqa: E402
 
 JUNIT = '''<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
 <testcase classname="a" name="bad"><failure>1 is not 2</failure></testcase>
 <testcase classname="a" name="worse"><error message="it fell"/></testcase>
 <testcase classname="a" name="not_here"><skipped/></testcase></testsuite>'''
 # a grandchild in a session of its own, as roslaunch starts its nodes
-UNIQUE = '{:07d}'.format(os.getpid())  # whoever else runs these tests on this machine at the same time has another
-DETACHED = 'import subprocess, sys, time; subprocess.Popen(["sleep", "{}"], start_new_session=True); {}'
+# whoever else runs these tests on this machine at the same time has another
+UNIQUE = '{:07d}'.format(os.getpid())
+DETACHED = ('import subprocess, sys, time; '
+            'subprocess.Popen(["sleep", "{}"], start_new_session=True); {}')
 
 
 @pytest.fixture
@@ -31,7 +33,8 @@ def bench(tmp_path):
 
 
 def sleeping(seconds):
-    listed = subprocess.run(['pgrep', '-fx', 'sleep {}'.format(seconds)], stdout=subprocess.PIPE, check=False)
+    listed = subprocess.run(['pgrep', '-fx', 'sleep {}'.format(seconds)], stdout=subprocess.PIPE,
+                            check=False)
     return listed.stdout.decode().split()
 
 
@@ -57,15 +60,18 @@ def test_a_check_without_any_case_has_not_passed(capsys):
 
 def test_all_results_are_in_one_file(tmp_path):
     (tmp_path / 'one.xml').write_text(JUNIT)
-    write_junit([Outcome('ruff', failed=1, detail='long line'), Outcome('unit', junit=[tmp_path / 'one.xml'])],
-                tmp_path / 'all.xml')
+    write_junit([
+        Outcome('ruff', failed=1, detail='long line'),
+        Outcome('unit', junit=[tmp_path / 'one.xml'])
+    ], tmp_path / 'all.xml')
     everything = Outcome('all')
     read_junit([tmp_path / 'all.xml'], everything)
     assert (everything.passed, everything.failed, everything.skipped) == (1, 3, 1)
 
 
 def test_a_failing_command_shows_its_last_words(bench):
-    outcome = bench.run('words', [sys.executable, '-c', 'print("last words"); raise SystemExit(3)'], 20.0)
+    outcome = bench.run('words', [sys.executable, '-c', 'print("last words"); raise SystemExit(3)'],
+                        20.0)
     assert not outcome.ok and 'last words' in outcome.detail and 'exit status 3' in outcome.detail
 
 
@@ -85,9 +91,7 @@ def test_an_interrupt_ends_what_runs_and_starts_nothing_more(bench):
     outcomes = []
     thread = threading.Thread(target=lambda: outcomes.append(bench.run('long', command, 60.0)))
     thread.start()
-    deadline = time.monotonic() + 20.0
-    while not sleeping('62.' + UNIQUE) and time.monotonic() < deadline:
-        time.sleep(0.05)
+    assert wait_for(lambda: sleeping('62.' + UNIQUE))
     bench.runner.stop()
     thread.join(20.0)
     assert not thread.is_alive() and not sleeping('62.' + UNIQUE)
@@ -103,35 +107,82 @@ def test_every_rostest_is_run():
     assert len(rostest_checks(ROOT)) == len(list((ROOT / 'test/rostest').glob('*.test'))) > 0
 
 
-@pytest.mark.parametrize('path', sorted((ROOT / 'test/rostest').glob('*.test')), ids=lambda path: path.stem)
+@pytest.mark.parametrize('path', sorted((ROOT / 'test/rostest').glob('*.test')),
+                         ids=lambda path: path.stem)
 def test_a_rostest_that_hangs_is_ended_by_rostest_which_tells_the_case(path):
     tests = list(ElementTree.parse(str(path)).getroot().iter('test'))
     limits_s = [float(test.get('time-limit', 60.0)) for test in tests]
-    assert sum(limits_s) + 60.0 <= checks.MAX_ROSTEST_S, 'no time is left for roslaunch to start and end its nodes'
+    assert sum(
+        limits_s
+    ) + 60.0 <= checks.MAX_ROSTEST_S, 'no time is left for roslaunch to start and end its nodes'
 
 
-@pytest.mark.parametrize('results, ok, told', [
-    ([True], True, False), ([False, True], True, True), ([False, False], False, False)])
-def test_a_rostest_has_a_second_attempt_that_everybody_sees(bench, monkeypatch, capsys, results, ok, told):
-    left = list(results)
+# a benchmark that passes or not as the file `left` says, one letter a run
+HELD = '''
+import sys
+assert sys.argv[1:] == ['--check']
+left = open('left').read()
+open('left', 'w').write(left[1:])
+sys.exit('too slow' if left[0] == 'n' else 0)
+'''
+ATTEMPTS = pytest.mark.parametrize('left, ok, attempts', [
+    ('y', True, 1), ('ny', True, 2), ('nn', False, 2)])
+
+
+def assert_told(outcome, capsys, attempts):
+    """Check how the attempts of a check are shown and counted; returns what is shown."""
+    show(outcome)
+    shown = capsys.readouterr().out
+    word = 'passed' if outcome.ok else 'failed'
+    assert ('{} at the second attempt'.format(word) in shown) is (attempts == 2)
+    how = '{} ({})'.format(outcome.name, 'passed then' if outcome.ok else 'failed again')
+    counted = second_attempts([Outcome('other', passed=1), outcome])
+    assert counted == 'second attempts: ' + ('0' if attempts == 1 else '1: ' + how)
+    return shown
+
+
+@ATTEMPTS
+def test_a_rostest_has_a_second_attempt_that_everybody_sees(
+        bench, monkeypatch, capsys, left, ok, attempts):
+    runs = list(left)
 
     def run(path, bench):
-        passed = left.pop(0)
-        return Outcome(path.stem, passed=int(passed), failed=int(not passed), detail='' if passed else '1 is not 2')
+        passed = runs.pop(0) == 'y'
+        return Outcome(path.stem, passed=int(passed), failed=int(not passed),
+                       detail='' if passed else '1 is not 2')
     monkeypatch.setattr(checks, '_run_rostest', run)
     (bench.root / 'test/rostest').mkdir(parents=True)
     (bench.root / 'test/rostest/one.test').touch()
     outcome = rostest_checks(bench.root)['rostest/one'](bench)
-    show(outcome)
-    out = capsys.readouterr().out
-    assert outcome.ok is ok and not left
-    assert ('passed at the second attempt' in out) is told and ('1 is not 2' in out) is (False in results)
+    assert outcome.ok is ok and not runs
+    assert ('1 is not 2' in assert_told(outcome, capsys, attempts)) is ('n' in left)
+
+
+@ATTEMPTS
+def test_a_benchmark_has_a_second_attempt_that_everybody_sees(bench, capsys, left, ok, attempts):
+    (bench.root / 'benchmarks').mkdir()
+    (bench.root / 'benchmarks/held.py').write_text(HELD)
+    (bench.root / 'left').write_text(left)
+    outcome = benchmark_checks(bench.root)['benchmarks/held'](bench)
+    assert outcome.ok is ok and (bench.root / 'left').read_text() == ''
+    assert ('too slow' in assert_told(outcome, capsys, attempts)) is ('n' in left)
+    logs = sorted(path.name for path in (bench.results / 'log').iterdir())
+    assert logs == ['benchmarks_held.first.log', 'benchmarks_held.log'][-attempts:]
+
+
+def test_that_no_second_attempt_was_needed_is_said_too():
+    assert second_attempts([Outcome('one', passed=1)]) == 'second attempts: 0'
 
 
 def test_an_interrupt_is_no_reason_for_a_second_attempt(bench, monkeypatch):
-    monkeypatch.setattr(checks, '_run_rostest', lambda path, bench: Outcome(path.stem, failed=1, detail='interrupted'))
+    runs = []
+    monkeypatch.setattr(checks, '_run_rostest', lambda path, bench: runs.append(path) or Outcome(
+        path.stem, failed=1, detail='interrupted'))
+    (bench.root / 'test/rostest').mkdir(parents=True)
+    (bench.root / 'test/rostest/one.test').touch()
     bench.runner.stop()
-    assert checks._rostest(bench.root / 'one.test', bench).failed == 1
+    assert rostest_checks(bench.root)['rostest/one'](bench).failed == 1
+    assert len(runs) == 1
 
 
 def test_benchmarks_without_limits_are_not_run(tmp_path):
@@ -141,8 +192,9 @@ def test_benchmarks_without_limits_are_not_run(tmp_path):
     assert list(benchmark_checks(tmp_path)) == ['benchmarks/held']
 
 
-def test_the_last_line_is_the_sum(tmp_path):
-    result = subprocess.run([sys.executable, str(ROOT / 'test/harness'), 'bench', 'no such benchmark'],
-                            stdout=subprocess.PIPE, timeout=60, check=False)
+def test_the_last_line_is_the_sum_and_the_one_above_it_counts_second_attempts(tmp_path):
+    result = subprocess.run(
+        [sys.executable, str(ROOT / 'test/harness'), 'bench', 'no such benchmark'],
+        stdout=subprocess.PIPE, timeout=60, check=False)
     assert result.returncode == 1
-    assert result.stdout.decode().splitlines()[-1] == '0 passed, 1 failed'
+    assert result.stdout.decode().splitlines()[-2:] == ['second attempts: 0', '0 passed, 1 failed']

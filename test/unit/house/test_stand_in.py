@@ -1,4 +1,6 @@
-"""Upstream's smach is used where it is, ours where it is not: what CMake's search takes for upstream's."""
+"""Upstream's smach is used where it is, ours where it is not: what CMake's search takes for
+upstream's.
+"""
 import os
 import subprocess
 import sys
@@ -12,8 +14,10 @@ MARKER = '.smach_oracle_stand_in'
 def find(*folders, python_path=(), name='smach'):
     env = dict(os.environ, PYTHONPATH=os.pathsep.join(map(str, python_path)))
     # -S: whatever this system has installed must not matter here
-    command = [sys.executable, '-S', str(ROOT / 'cmake/find_upstream.py'), name] + [str(folder) for folder in folders]
-    return subprocess.run(command, env=env, stdout=subprocess.PIPE, check=True, timeout=30).stdout.decode().strip()
+    command = [sys.executable, '-S',
+               str(ROOT / 'cmake/find_upstream.py'), name] + [str(folder) for folder in folders]
+    return subprocess.run(command, env=env, stdout=subprocess.PIPE, check=True,
+                          timeout=30).stdout.decode().strip()
 
 
 @pytest.fixture

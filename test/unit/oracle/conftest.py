@@ -1,6 +1,8 @@
 """Fixtures for tests of the executive; the states and fakes they use are in machines.py."""
 import os
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -19,3 +21,16 @@ def log(monkeypatch):
         monkeypatch.setattr(smach, 'log' + level, logger)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     return lines
+
+
+@pytest.fixture
+def tmp_path():
+    """In memory where the system has room there.
+
+    Learned rates are synced at every failure: on a slow disk these tests did little but wait for
+    it. No test here cuts the power.
+    """
+    in_memory = '/dev/shm'
+    folder = in_memory if os.access(in_memory, os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix='smach_oracle-', dir=folder) as path:
+        yield Path(path)

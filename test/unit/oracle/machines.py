@@ -1,18 +1,19 @@
 """States that do as they are told, a fake expert, and machines made of them."""
 import threading
-from typing import Any, Callable, List, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 import smach
-
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.events import Event, EventKind
-from smach_oracle.oracle.question import Answer, AnswerKind, Expert, Question
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Question
+from smach_oracle.oracle.records.events import Event, EventKind
 
 OUTCOMES = ('ok', 'aborted', 'preempted')
 
 
 class Scripted(smach.State):
-    """Ends as told, one entry per visit, then with 'ok'. An exception is raised, a callable called with (self, ud)."""
+    """Ends as told, one entry per visit, then with 'ok'. An exception is raised, a callable called
+    with (self, ud).
+    """
 
     def __init__(self, *script: Any, outcomes=OUTCOMES, **keys: Any) -> None:
         smach.State.__init__(self, outcomes=list(outcomes), **keys)
@@ -29,9 +30,12 @@ class Scripted(smach.State):
 
 
 class FakeExpert(Expert):
-    """Answers from a list (an Answer, a callable of the question, or an exception), then not at all."""
+    """Answers from a list (an Answer, a callable of the question, or an exception), then not at
+    all.
+    """
 
-    def __init__(self, *answers: Any, interface: Optional[Callable[..., Optional[Answer]]] = None) -> None:
+    def __init__(self, *answers: Any,
+                 interface: Optional[Callable[..., Optional[Answer]]] = None) -> None:
         self.answers = list(answers)
         self.questions: List[Question] = []
         self._interface = interface
@@ -47,6 +51,11 @@ class FakeExpert(Expert):
 
     def run_interface(self, offer, question, cancelled, progress):
         return self._interface(offer, question, cancelled, progress) if self._interface else None
+
+
+def contents(userdata: Any) -> Dict[str, Any]:
+    """What is in a machine's userdata."""
+    return {key: userdata[key] for key in userdata.keys()}
 
 
 def waits(question, cancelled: threading.Event, progress) -> None:
@@ -70,14 +79,18 @@ def interface(name: str) -> Answer:
     return Answer(AnswerKind.INTERFACE, interface=name, by='eva')
 
 
-def chain_of(*states: Any, outcomes=('done', 'aborted', 'preempted'), machine_class=smach.StateMachine, **keys: Any):
-    """A machine of states A, B, C, ...: 'ok' leads to the next, from the last to 'done'; all else falls through."""
+def chain_of(*states: Any, outcomes=('done', 'aborted', 'preempted'),
+             machine_class=smach.StateMachine, **keys: Any):
+    """A machine of states A, B, C, ...: 'ok' leads to the next, from the last to 'done'; all else
+    falls through.
+    """
     machine = machine_class(outcomes=list(outcomes), **keys)
     labels = [chr(ord('A') + index) for index in range(len(states))]
     with machine:
         for index, (label, state) in enumerate(zip(labels, states)):
             target = labels[index + 1] if index + 1 < len(labels) else 'done'
-            first = 'ok' if 'ok' in state.get_registered_outcomes() else sorted(state.get_registered_outcomes())[0]
+            first = 'ok' if 'ok' in state.get_registered_outcomes() else sorted(
+                state.get_registered_outcomes())[0]
             smach.StateMachine.add(label, state, {first: target})
     return machine
 

@@ -1,10 +1,11 @@
 """What counts as a failure, and what ends as it did without an oracle."""
 import pytest
-import smach
 from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
 
-from smach_oracle.oracle.events import EventKind, FailureKind
-from smach_oracle.oracle.naming import FailingNames
+import smach
+from smach_oracle.oracle import oracle_of
+from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 
 
 def kinds_of(machine):
@@ -48,15 +49,18 @@ def test_an_outcome_registered_too_late_to_lead_anywhere_is_recovered_from():
 
 
 def test_a_listed_outcome_is_a_failure_though_it_would_end_the_machine_well():
-    machine = Watched(chain_of(Scripted('empty', outcomes=('ok', 'empty')), outcomes=('done', 'empty')),
-                      settings={'states': {'A': {'failure_outcomes': ['empty']}}})
+    machine = Watched(
+        chain_of(Scripted('empty', outcomes=('ok', 'empty')), outcomes=('done', 'empty')),
+        settings={'states': {'A': {'failure_outcomes': ['empty']}}})
     assert machine.run() == 'done'
     assert kinds_of(machine) == [FailureKind.FAILING_OUTCOME]
 
 
 def test_an_outcome_listed_for_the_whole_machine_is_a_failure_of_every_state():
-    machine = Watched(chain_of(Scripted('empty', outcomes=('ok', 'empty')), Scripted('empty', outcomes=('ok', 'empty')),
-                               outcomes=('done', 'empty')), settings={'failure_outcomes': ['empty']})
+    machine = Watched(
+        chain_of(Scripted('empty', outcomes=('ok', 'empty')),
+                 Scripted('empty', outcomes=('ok', 'empty')), outcomes=('done', 'empty')),
+        settings={'failure_outcomes': ['empty']})
     assert machine.run() == 'done'
     assert [event.state for event in machine.of(EventKind.FAILURE)] == ['A', 'B']
 
@@ -71,7 +75,8 @@ def test_preempted_is_never_a_failure():
 def author_recovers(settings=None):
     machine = smach.StateMachine(outcomes=['done', 'aborted'])
     with machine:
-        smach.StateMachine.add('PICK', Scripted('aborted'), {'ok': 'done', 'aborted': 'RESET', 'preempted': 'aborted'})
+        smach.StateMachine.add('PICK', Scripted('aborted'),
+                               {'ok': 'done', 'aborted': 'RESET', 'preempted': 'aborted'})
         smach.StateMachine.add('RESET', Scripted(outcomes=('ok',)), {'ok': 'PICK'})
     return Watched(machine, settings=settings)
 
@@ -107,14 +112,17 @@ def test_a_listed_failure_with_a_transition_to_another_state_stays_with_its_auth
     assert machine.visits() == ['PICK', 'RESET', 'PICK']
 
 
-@pytest.mark.parametrize('name', ['aborted', 'ABORTED', 'Failed', 'grasp_failed', 'grasp-failure', 'graspFailed',
-                                  'IOError', 'pick_ERROR', 'place2Failed'])
+@pytest.mark.parametrize('name', [
+    'aborted', 'ABORTED', 'Failed', 'grasp_failed', 'grasp-failure', 'graspFailed', 'IOError',
+    'pick_ERROR', 'place2Failed'
+])
 def test_names_that_sound_like_a_failure(name):
     assert name in FailingNames()
 
 
-@pytest.mark.parametrize('name', ['preempted', 'Preempted', 'done', 'unfailed', 'terror', 'failed_over', '',
-                                  'aborted2', 'TERROR'])
+@pytest.mark.parametrize('name', [
+    'preempted', 'Preempted', 'done', 'unfailed', 'terror', 'failed_over', '', 'aborted2', 'TERROR'
+])
 def test_names_that_do_not_sound_like_a_failure(name):
     assert name not in FailingNames()
 
@@ -126,8 +134,9 @@ def test_preempted_is_no_failure_even_where_it_is_named():
 
 
 def test_other_failing_outcomes_of_the_machine_can_be_named():
-    machine = Watched(chain_of(Scripted('lost', outcomes=('ok', 'lost')), outcomes=('done', 'lost')),
-                      settings={'failing_outcomes': ['lost']})
+    machine = Watched(
+        chain_of(Scripted('lost', outcomes=('ok', 'lost')), outcomes=('done', 'lost')),
+        settings={'failing_outcomes': ['lost']})
     assert machine.run() == 'done'
     assert kinds_of(machine) == [FailureKind.FELL_THROUGH]
 
@@ -143,7 +152,8 @@ def test_without_recovery_a_failure_is_counted_and_ends_the_machine_as_ever():
 
 def test_when_the_oracle_gives_up_on_an_exception_the_machine_raises_as_ever():
     machine = watched(Scripted(ValueError('no grasp')), settings={'max_recoveries': 0})
-    with pytest.raises(smach.InvalidUserCodeError, match=r"(?s)Could not execute state 'A'.*Traceback.*no grasp"):
+    with pytest.raises(smach.InvalidUserCodeError,
+                       match=r"(?s)Could not execute state 'A'.*Traceback.*no grasp"):
         machine.run()
     assert machine.machine.is_running() is False
     assert [event.kind for event in machine.events[-3:]] == [
@@ -199,7 +209,7 @@ def test_a_superseding_expert_sees_the_kind_and_the_text():
 def test_what_a_state_says_of_its_failing_outcome_is_told(log):
     expert = FakeExpert(supersede('ok'))
     machine = watched(Scripted('aborted'), expert=expert, settings={'max_recoveries': 0})
-    machine.machine._oracle.tree.describe_failure = lambda state: 'no valid grasp'
+    oracle_of(machine.machine).describe_failure = lambda state: 'no valid grasp'
     assert machine.run() == 'done'
     assert machine.of(EventKind.FAILURE)[0].text == 'no valid grasp'
     assert expert.questions[0].text == 'no valid grasp'
@@ -210,7 +220,7 @@ def test_a_description_that_breaks_costs_only_itself(log):
     def broken(state):
         raise AttributeError('no status')
     machine = watched(Scripted('aborted'), Scripted())
-    machine.machine._oracle.tree.describe_failure = broken
+    oracle_of(machine.machine).describe_failure = broken
     assert machine.run() == 'done'
     assert any('no status' in text for level, text in log if level == 'warn')
 
@@ -227,7 +237,8 @@ def test_outcomes_need_not_be_strings():
 
 def test_an_outcome_registered_after_its_state_was_added_has_no_way_to_go():
     late = Scripted('late')
-    machine = Watched(chain_of(late, outcomes=('done', 'aborted', 'preempted', 'late')), recover=False)
+    machine = Watched(chain_of(late, outcomes=('done', 'aborted', 'preempted', 'late')),
+                      recover=False)
     late.register_outcomes(['late'])
     with pytest.raises(smach.InvalidTransitionError, match="'late' of state 'A'"):
         machine.run()

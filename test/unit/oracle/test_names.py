@@ -1,12 +1,14 @@
-"""A script's own classes and objects may use any name for their own ends, those of an OracleContainer among them."""
-import smach
+"""A script's own classes and objects may use any name for their own ends, those of an
+OracleContainer among them.
+"""
 from machines import FakeExpert, Scripted, chain_of, supersede
 
-from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.events import EventKind
+import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.records.events import EventKind
 
-NAMES = ('name', 'path', 'settings', 'events', 'trial_id', 'is_top', 'recovers', 'rates', 'transition_counts',
-         'save_rates', 'load_rates')
+NAMES = ('name', 'path', 'settings', 'events', 'trial_id', 'is_top', 'recovers', 'rates',
+         'transition_counts', 'save_rates', 'load_rates')
 
 
 class SetsThem(smach.StateMachine):
@@ -40,7 +42,7 @@ def recovered(machine, **settings):
     """Run it under an oracle; the kinds of its events."""
     wrapped = OracleContainer.wrap(machine, expert=FakeExpert(supersede('ok')), settings=settings)
     events = []
-    wrapped._oracle.face.events.observers.append(events.append)
+    oracle_of(wrapped).events.observers.append(events.append)
     assert wrapped.execute() == 'done'
     return [event.kind for event in events]
 
@@ -57,13 +59,14 @@ def test_what_a_script_keeps_on_its_machine_stays_its_own(tmp_path):
 def test_what_a_scripts_class_defines_stays_its_own():
     machine = chain_of(Scripted('aborted'), machine_class=DefinesThem)
     assert EventKind.JUMP in recovered(machine)
-    assert (machine.name, machine.events(), machine.rates('euros')) == ('own name', 'own events', 'own rates in euros')
+    assert (machine.name, machine.events(), machine.rates('euros')) == ('own name', 'own events',
+                                                                        'own rates in euros')
 
 
 def test_adapters_read_the_containers_face_whatever_the_class_is_like():
     machine = chain_of(Scripted('aborted'), machine_class=SetsThem)
     recovered(machine)
-    face = machine._oracle.face
+    face = oracle_of(machine)
     assert (face.name, face.path, face.is_top, face.recovers) == ('SM_ROOT', 'SM_ROOT', True, True)
     assert face.trial_id and face.settings.policy == 'prose'
     assert [(row.state, row.failures) for row in face.rates()] == [('A', 1)]

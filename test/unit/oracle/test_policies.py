@@ -1,16 +1,24 @@
-"""The policies against the tables of doc/policies.md, and what continuous and stepping back mean in a machine."""
+"""The policies against the tables of doc/policies.md, and what continuous and stepping back mean in
+a machine.
+"""
 import itertools
 import os
 import subprocess
 import sys
 
 import pytest
-from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
+from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, watched
 
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.events import EventKind
-from smach_oracle.oracle.failure_rate import FailureClass
-from smach_oracle.oracle.policy import POLICIES, Chain, Preconditions, Situation, policy_named
+from smach_oracle.oracle.decision.failure_rate import FailureClass
+from smach_oracle.oracle.decision.policy import (
+    POLICIES,
+    FailureContext,
+    Preconditions,
+    Situation,
+    policy_named,
+)
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import EventKind
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
@@ -19,8 +27,10 @@ CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
 def table_of_the_page():
     """{(policy, class, preconditions, continuous): action} as doc/policies.md has it."""
     with open(os.path.join(ROOT, 'doc', 'policies.md'), encoding='utf-8') as page:
-        rows = [[cell.strip() for cell in line.strip().strip('|').split('|')] for line in page if line.startswith('|')]
-    begin = next(index for index, row in enumerate(rows) if row[:3] == ['class', 'preconditions', 'continuous'])
+        rows = [[cell.strip() for cell in line.strip().strip('|').split('|')] for line in page
+                if line.startswith('|')]
+    begin = next(index for index, row in enumerate(rows)
+                 if row[:3] == ['class', 'preconditions', 'continuous'])
     names = rows[begin][3:]
     table = {}
     for row in itertools.takewhile(lambda row: len(row) == len(rows[begin]), rows[begin + 2:]):
@@ -33,45 +43,54 @@ TABLE = table_of_the_page()
 
 
 def test_the_page_covers_every_cell_of_every_policy():
-    cells = set(itertools.product(POLICIES, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'), ('no', 'yes')))
+    cells = set(
+        itertools.product(POLICIES, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'),
+                          ('no', 'yes')))
     assert set(TABLE) == cells
 
 
 @pytest.mark.parametrize('cell', sorted(TABLE), ids=' '.join)
 def test_the_policy_decides_as_the_page_says(cell):
     name, failure_class, preconditions, continuous = cell
-    situation = Situation(FailureClass[failure_class], Preconditions(preconditions), continuous == 'yes')
+    situation = Situation(FailureClass[failure_class], Preconditions(preconditions),
+                          continuous == 'yes')
     assert POLICIES[name].decide(situation).value.replace('_', ' ') == TABLE[cell]
 
 
 def machine_in(cell):
-    """A machine whose state B has just failed in the situation of a cell; the expert supersedes whatever is asked."""
+    """A machine whose state B fails in the situation of a cell, as the last of its failures.
+
+    Where that is to be a continuous one B fails before, too, and whatever the policy decides then
+    leads to B again. The expert supersedes what is asked about the last failure.
+    """
     name, failure_class, preconditions, continuous = cell
+    again = continuous == 'yes'
     prior = {'LOW': 0.1, 'MODERATE': 0.5, 'HIGH': 0.95}[failure_class]
     lists = {'none': [], 'met': [lambda ud: True], 'not met': [lambda ud: False]}
-    state = Scripted('aborted')
-    machine = watched(Scripted(), state, Scripted(), expert=FakeExpert(supersede('ok'), supersede('ok')), settings={
-        'policy': name, 'memory': 100, 'states': {'B': {'prior': prior, 'preconditions': lists[preconditions]}}})
-    if continuous == 'yes':  # a failure of B before, in the same trial
-        ledger = machine.machine._oracle
-        real = ledger.chain
-
-        def chain(record):
-            ledger.history.failed(record.label, record.totals[0])
-            return real(record)
-        ledger.chain = chain
-    return machine
+    answers = [supersede('ok'), supersede('ok')]
+    if again and TABLE[name, failure_class, preconditions, 'no'] == 'ask':
+        answers.insert(0, goto('B'))
+    failing_state = Scripted(*['aborted'] * (1 + again))
+    return watched(
+        Scripted(), failing_state, Scripted(), expert=FakeExpert(*answers), settings={
+            'policy': name, 'memory': 100,
+            'states': {'B': {'prior': prior, 'preconditions': lists[preconditions]}}
+        })
 
 
-@pytest.mark.parametrize('cell', sorted(cell for cell in TABLE if cell[1] != 'HIGH' or cell[2] == 'none'), ids=' '.join)
+@pytest.mark.parametrize('cell',
+                         sorted(cell for cell in TABLE if cell[1] != 'HIGH' or cell[2] == 'none'),
+                         ids=' '.join)
 def test_a_machine_does_what_the_page_says(cell):
     machine = machine_in(cell)
     machine.run()
     action = TABLE[cell].replace(' ', '_')
     target = {'revisit': 'B', 'step_back': 'A', 'ask': ''}[action]
-    assert machine.decisions()[0] == (action, target)
-    assert machine.of(EventKind.DECISION)[0].continuous is (cell[3] == 'yes')
-    assert [event.target for event in machine.of(EventKind.JUMP)][0] == (target or 'C')
+    last = 1 if cell[3] == 'yes' else 0
+    assert len(machine.decisions()) == last + 1
+    assert machine.decisions()[last] == (action, target)
+    assert machine.of(EventKind.DECISION)[last].continuous is (cell[3] == 'yes')
+    assert [event.target for event in machine.of(EventKind.JUMP)][last] == (target or 'C')
 
 
 @pytest.mark.parametrize('name', sorted(POLICIES))
@@ -103,8 +122,11 @@ def test_algorithm1_counts_earlier_visits_of_the_failed_state_itself():
 
 
 def test_algorithm1_steps_back_to_the_initial_state_where_no_visit_was_without_preconditions():
-    machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings={
-        'policy': 'algorithm1', 'states': {'A': {'preconditions': [bool]}, 'B': {'preconditions': [lambda ud: True]}}})
+    machine = Watched(
+        chain_of(Scripted(), Scripted('aborted')), settings={
+            'policy': 'algorithm1',
+            'states': {'A': {'preconditions': [bool]}, 'B': {'preconditions': [lambda ud: True]}}
+        })
     machine.run()
     assert machine.decisions() == [('step_back', 'A')]
 
@@ -112,7 +134,8 @@ def test_algorithm1_steps_back_to_the_initial_state_where_no_visit_was_without_p
 def test_algorithm1_calls_a_failure_continuous_though_the_state_succeeded_in_between():
     def run(policy):
         a, b = Scripted('aborted', 'ok', 'aborted'), Scripted('back', outcomes=('ok', 'back'))
-        machine = Watched(loop_of(a, b), settings={'policy': policy, 'states': {'A': {'prior': 0.1}}})
+        machine = Watched(loop_of(a, b),
+                          settings={'policy': policy, 'states': {'A': {'prior': 0.1}}})
         machine.run()
         return [event.continuous for event in machine.of(EventKind.FAILURE)]
     assert run('algorithm1') == [False, True]
@@ -129,7 +152,8 @@ def loop_of(a, b):
 
 
 def test_a_failure_of_another_state_in_between_ends_continuity():
-    machine = failing('prose', Scripted(), Scripted('aborted', 'ok', 'aborted'), Scripted('aborted', 'ok', 'ok'))
+    machine = failing('prose', Scripted(), Scripted('aborted', 'ok', 'aborted'),
+                      Scripted('aborted', 'ok', 'ok'))
     machine.run()
     assert [event.continuous for event in machine.of(EventKind.FAILURE)][:2] == [False, False]
 
@@ -146,7 +170,8 @@ def test_prose_keeps_its_goal_while_the_state_keeps_failing():
     import smach
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')), {'ok': 'S', 'way': 'X'})
+        smach.StateMachine.add('A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')),
+                               {'ok': 'S', 'way': 'X'})
         smach.StateMachine.add('X', Scripted(outcomes=('ok',)), {'ok': 'S'})
         smach.StateMachine.add('S', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'})
     machine = Watched(machine, settings={'policy': 'prose', 'memory': 1000})
@@ -161,9 +186,9 @@ def test_prose_steps_back_to_the_initial_state_where_nothing_succeeded_before():
 
 
 def test_a_preempted_or_failed_visit_is_no_goal_of_a_step_back():
-    chain = Chain('S', 'INIT', True, True, None, None)
-    assert POLICIES['prose'].step_back_target(chain) == 'INIT'
-    assert POLICIES['algorithm1'].step_back_target(chain) == 'INIT'
+    context = FailureContext('S', 'INIT', True, True, None, None)
+    assert POLICIES['prose'].step_back_target(context) == 'INIT'
+    assert POLICIES['algorithm1'].step_back_target(context) == 'INIT'
 
 
 def test_continuity_ends_with_the_trial():
@@ -174,7 +199,8 @@ def test_continuity_ends_with_the_trial():
 
 
 def test_the_class_is_that_after_the_failure_and_the_failure_event_tells_that_before():
-    machine = watched(Scripted('aborted'), settings={'memory': 1, 'prior': 0.0, 'on_no_answer': 'give_up:done'})
+    machine = watched(Scripted('aborted'),
+                      settings={'memory': 1, 'prior': 0.0, 'on_no_answer': 'give_up:done'})
     machine.run()
     failure, decision = machine.of(EventKind.FAILURE, EventKind.DECISION)
     assert (failure.failure_class, failure.rate) == (FailureClass.LOW, 0.0)
@@ -182,12 +208,15 @@ def test_the_class_is_that_after_the_failure_and_the_failure_event_tells_that_be
 
 
 def test_an_unknown_policy_is_refused_by_name():
-    with pytest.raises(ConfigError, match='policy.*guess.*algorithm1, prose'):
+    with pytest.raises(SettingsError, match='policy.*guess.*algorithm1, prose'):
         policy_named('guess')
 
 
-@pytest.mark.parametrize('module', ['policy', 'failure_rate', 'history', 'events', 'question', 'config', 'errors',
-                                    'naming', 'precondition_spec', 'state_record'])
+@pytest.mark.parametrize('module', [
+    'errors', 'decision.policy', 'decision.failure_rate', 'settings.settings',
+    'settings.failing_outcomes', 'settings.preconditions', 'records.history', 'records.events',
+    'records.visits', 'records.state_record', 'asking.question'
+])
 def test_the_pure_parts_need_no_smach(module):
     code = 'import sys, smach_oracle.oracle.{}; sys.exit("smach" in sys.modules)'.format(module)
     environment = dict(os.environ, PYTHONPATH=os.path.join(ROOT, 'src'))

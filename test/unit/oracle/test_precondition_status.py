@@ -1,17 +1,22 @@
-"""How the preconditions of a question's choices stand while it is open: looked at, never brought about."""
+"""How the preconditions of a question's choices stand while it is open: looked at, never brought
+about.
+"""
 from machines import FakeExpert, Scripted, goto, watched
 
-from smach_oracle.oracle.events import EventKind
+from smach_oracle.oracle.records.events import EventKind
 
 
 def asked(preconditions, **settings):
-    """The machine after a question about B, and the question; what its preconditions say is asked while it is open."""
+    """The machine after a question about B, and the question; what its preconditions say is asked
+    while it is open.
+    """
     found = []
 
     class Looking(FakeExpert):
         def ask(self, question, cancelled, progress):
             look = question.preconditions
-            found.extend((look.names[number],) + tuple(look.look(number)) for number in range(len(look.names)))
+            found.extend((look.names[number],) + tuple(look.status(number))
+                         for number in range(len(look.names)))
             return super().ask(question, cancelled, progress)
 
     machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=Looking(goto('C')),
@@ -29,8 +34,9 @@ def test_a_function_tells_and_a_state_is_not_run():
         return []
 
     machine, found = asked({'B': [has_cup, is_dark, 'A'], 'C': ['B', Scripted()]})
-    assert [each[:2] for each in found] == [(('B', 'has_cup'), True), (('B', 'is_dark'), False), (('B', 'A'), None),
-                                            (('C', 'B'), None), (('C', 'Scripted'), None)]
+    assert [each[:2] for each in found] == [(('B', 'has_cup'), True), (('B', 'is_dark'), False),
+                                            (('B', 'A'), None), (('C', 'B'), None),
+                                            (('C', 'Scripted'), None)]
     assert found[2][2] == 'only running A would tell; its last visit succeeded'
     assert found[3][2] == 'only running B would tell; its last visit failed'
     assert machine.visits() == ['A', 'B', 'C']

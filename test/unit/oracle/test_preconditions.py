@@ -1,19 +1,22 @@
 """The four kinds of precondition, and that they run on failure alone."""
 import pytest
-import smach
 from machines import Gate, Scripted, Watched, chain_of, in_thread
 
+import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.events import EventKind
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import EventKind
 
 
 def machine_with(*preconditions, b=None, extra=(), **settings):
-    """A, B, C, where B fails once (unless given) and has the preconditions; `extra`: (label, state) never visited."""
+    """A, B, C, where B fails once (unless given) and has the preconditions; `extra`: (label, state)
+    never visited.
+    """
     machine = chain_of(Scripted(), b or Scripted('aborted'), Scripted())
     with machine:
         for label, state in extra:
-            smach.StateMachine.add(label, state, {'ok': 'A'} if 'ok' in state.get_registered_outcomes() else {})
+            smach.StateMachine.add(label, state,
+                                   {'ok': 'A'} if 'ok' in state.get_registered_outcomes() else {})
     return Watched(machine, preconditions={'B': list(preconditions)}, settings=settings)
 
 
@@ -100,9 +103,11 @@ def test_a_callable_that_raises_is_not_met_and_the_machine_goes_on():
     assert 'no camera' in end.text
 
 
-@pytest.mark.parametrize('holds, achieved, met, runs', [(True, 'ok', 'met', 0), (False, 'ok', 'met', 1),
+@pytest.mark.parametrize('holds, achieved, met, runs', [(True, 'ok', 'met', 0),
+                                                        (False, 'ok', 'met', 1),
                                                         (False, 'aborted', 'not met', 1)])
-def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(holds, achieved, met, runs):
+def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(
+        holds, achieved, met, runs):
     achieve, checks = Scripted(achieved), []
     machine = machine_with((lambda ud: checks.append(1) or holds, achieve))
     machine.run()
@@ -155,51 +160,55 @@ def test_a_state_added_with_preconditions_has_them():
     ran = []
     machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        OracleContainer.add('A', Scripted('aborted'), {'ok': 'done'}, preconditions=[lambda ud: ran.append(1) or True])
+        OracleContainer.add('A', Scripted('aborted'), {'ok': 'done'},
+                            preconditions=[lambda ud: ran.append(1) or True])
     assert machine.execute() == 'done'
     assert ran == [1]
     assert machine.rates()[0].has_preconditions
 
 
 def test_a_precondition_naming_no_state_is_refused_with_the_labels_there_are():
-    with pytest.raises(ConfigError, match=r"states.B.preconditions: 'NOWHERE' is not allowed.*A, C"):
+    with pytest.raises(SettingsError,
+                       match=r"states.B.preconditions: 'NOWHERE' is not allowed.*A, C"):
         machine_with('NOWHERE')
 
 
 def test_a_state_cannot_be_its_own_precondition():
-    with pytest.raises(ConfigError, match='states.B.preconditions'):
+    with pytest.raises(SettingsError, match='states.B.preconditions'):
         machine_with('B')
 
 
 def test_where_not_strict_an_unknown_label_is_warned_of_and_never_met(log):
-    machine = Watched(chain_of(Scripted(), Scripted('aborted')), preconditions={'B': ['NOWHERE'], 'GHOST': [bool]},
-                      strict=False)
+    machine = Watched(chain_of(Scripted(), Scripted('aborted')),
+                      preconditions={'B': ['NOWHERE'], 'GHOST': [bool]}, strict=False)
     machine.run()
     assert ends(machine) == [('NOWHERE', 'not met')]
     warnings = [text for level, text in log if level == 'warn']
     assert any('NOWHERE' in text for text in warnings) and any('GHOST' in text for text in warnings)
 
 
-@pytest.mark.parametrize('wrong, position', [(5, '[0]'), ({'check': 'A'}, '[0]'), ('', '[0]'), (('A',), '[0]'),
-                                             ('python:a:b', '[0]'), (Scripted, '[0]'), ((('A', 'C'), 'C'), '[0]')])
+@pytest.mark.parametrize('wrong, position', [(5, '[0]'), ({'check': 'A'}, '[0]'), ('', '[0]'),
+                                             (('A',), '[0]'), ('python:a:b', '[0]'),
+                                             (Scripted, '[0]'), ((('A', 'C'), 'C'), '[0]')])
 def test_what_is_no_precondition_is_refused_with_its_place(wrong, position):
-    with pytest.raises(ConfigError) as raised:
+    with pytest.raises(SettingsError) as raised:
         Watched(chain_of(Scripted(), Scripted(), Scripted()), preconditions={'B': [wrong]})
     assert raised.value.key.startswith('states.B.preconditions' + position)
 
 
 def test_a_list_is_asked_for():
-    with pytest.raises(ConfigError, match='a list of preconditions'):
+    with pytest.raises(SettingsError, match='a list of preconditions'):
         Watched(chain_of(Scripted(), Scripted()), preconditions={'B': 'A'})
 
 
 def test_python_names_are_resolved_by_what_is_handed_in():
-    from smach_oracle.oracle.config import Settings
+    from smach_oracle.oracle.settings.settings import Settings
     found = {'python:robot:is_clear': lambda ud: True}
     settings = Settings.from_dict({'states': {'B': {'preconditions': [
         {'check': 'python:robot:is_clear', 'achieve': 'A'}]}}}, resolver=found.__getitem__)
     machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings=settings)
     assert machine.run() == 'done'
     assert ends(machine) == [('is_clear or A', 'met')]
-    with pytest.raises(ConfigError, match='python:robot:lost'):
-        Settings.from_dict({'states': {'B': {'preconditions': ['python:robot:lost']}}}, resolver=found.__getitem__)
+    with pytest.raises(SettingsError, match='python:robot:lost'):
+        Settings.from_dict({'states': {'B': {'preconditions': ['python:robot:lost']}}},
+                           resolver=found.__getitem__)

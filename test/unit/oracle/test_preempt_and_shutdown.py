@@ -2,10 +2,20 @@
 import threading
 
 import pytest
-import smach
-from machines import FakeExpert, Gate, Scripted, Watched, chain_of, in_thread, supersede, waits, watched
+from machines import (
+    FakeExpert,
+    Gate,
+    Scripted,
+    Watched,
+    chain_of,
+    in_thread,
+    supersede,
+    waits,
+    watched,
+)
 
-from smach_oracle.oracle.events import EventKind
+import smach
+from smach_oracle.oracle.records.events import EventKind
 
 
 def test_in_a_state():
@@ -23,8 +33,9 @@ def test_in_a_state():
 
 def test_before_the_start():
     seen = []
-    machine = watched(Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt()
-                               or 'preempted'))
+    machine = watched(
+        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt() or
+                 'preempted'))
     machine.machine.request_preempt()
     assert machine.run() == 'preempted'
     assert seen == [True]
@@ -62,9 +73,10 @@ def test_a_failure_at_shutdown_is_not_recovered(monkeypatch):
 
 def test_an_unserviced_preempt_goes_on_to_the_next_state():
     seen = []
-    machine = watched(Scripted(lambda self, ud: holder[0].request_preempt() or 'ok'),
-                      Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt()
-                               or 'preempted'))
+    machine = watched(
+        Scripted(lambda self, ud: holder[0].request_preempt() or 'ok'),
+        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt() or
+                 'preempted'))
     holder = [machine.machine]
     assert machine.run() == 'preempted'
     assert seen == [True]
@@ -73,16 +85,19 @@ def test_an_unserviced_preempt_goes_on_to_the_next_state():
 
 def test_a_state_that_services_its_preempt_and_goes_on_clears_it_for_the_machine():
     seen = []
-    machine = watched(Scripted(lambda self, ud: holder[0].request_preempt() or self.service_preempt() or 'ok'),
-                      Scripted(lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
+    machine = watched(
+        Scripted(lambda self, ud: holder[0].request_preempt() or self.service_preempt() or 'ok'),
+        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
     holder = [machine.machine]
     assert machine.run() == 'done'
     assert seen == [False]
 
 
 def test_a_machine_without_a_preempted_outcome_ends_as_the_failure_would_have():
-    machine = chain_of(Scripted('aborted', outcomes=('ok', 'aborted')), outcomes=('done', 'aborted'))
-    machine = Watched(machine, expert=FakeExpert(waits), settings={'max_recoveries': 0, 'deadline_s': 0})
+    machine = chain_of(Scripted('aborted', outcomes=('ok', 'aborted')),
+                       outcomes=('done', 'aborted'))
+    machine = Watched(machine, expert=FakeExpert(waits),
+                      settings={'max_recoveries': 0, 'deadline_s': 0})
     asked = threading.Event()
     machine.machine.events.observers.append(
         lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
@@ -94,8 +109,9 @@ def test_a_machine_without_a_preempted_outcome_ends_as_the_failure_would_have():
 
 
 def test_a_preempted_recovery_from_an_exception_raises_where_there_is_no_outcome_for_it():
-    machine = Watched(chain_of(Scripted(ValueError('no grasp'), outcomes=('ok',)), outcomes=('done',)),
-                      preconditions={'A': [lambda ud: holder[0].request_preempt() or True]})
+    machine = Watched(
+        chain_of(Scripted(ValueError('no grasp'), outcomes=('ok',)), outcomes=('done',)),
+        preconditions={'A': [lambda ud: holder[0].request_preempt() or True]})
     holder = [machine.machine]
     with pytest.raises(smach.InvalidUserCodeError, match='no grasp'):
         machine.run()
@@ -103,13 +119,19 @@ def test_a_preempted_recovery_from_an_exception_raises_where_there_is_no_outcome
     assert machine.machine.is_running() is False
 
 
-@pytest.mark.parametrize('kind', [EventKind.DECISION, EventKind.FAILURE, EventKind.TRANSITION,
-                                  EventKind.QUERY_OPENED, EventKind.JUMP, EventKind.PRECONDITION_START])
+@pytest.mark.parametrize('kind', [
+    EventKind.DECISION, EventKind.FAILURE, EventKind.TRANSITION, EventKind.QUERY_OPENED,
+    EventKind.JUMP, EventKind.PRECONDITION_START
+])
 def test_at_every_step_of_a_recovery(kind):
-    """Preempted from another thread at the moment of each kind of step, the machine ends soon, and once only."""
-    machine = watched(Scripted('aborted'), Scripted(Gate(), outcomes=('ok', 'preempted')), Scripted(Gate()),
-                      expert=FakeExpert(waits), settings={'deadline_s': 0, 'max_recoveries': int(
-                          kind is not EventKind.QUERY_OPENED)}, preconditions={'A': [lambda ud: True]})
+    """Preempted from another thread at the moment of each kind of step, the machine ends soon, and
+    once only.
+    """
+    machine = watched(
+        Scripted('aborted'), Scripted(Gate(), outcomes=('ok', 'preempted')), Scripted(Gate()),
+        expert=FakeExpert(waits),
+        settings={'deadline_s': 0, 'max_recoveries': int(kind is not EventKind.QUERY_OPENED)},
+        preconditions={'A': [lambda ud: True]})
     calls = []
 
     def preempt(event):

@@ -1,17 +1,18 @@
 """Settings: what is allowed, and errors that name the key, the value and what is allowed."""
 import pytest
 
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.errors import ConfigError, OracleError
-from smach_oracle.oracle.question import InterfaceOffer, InterfaceStart
+from smach_oracle.oracle.errors import OracleError, SettingsError
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
+from smach_oracle.oracle.settings.settings import Settings
 
 
 def test_the_defaults_are_those_of_the_design():
     settings = Settings.from_dict({})
     state = settings.for_state('', 'ANY')
-    assert (state.memory, state.prior, state.moderate_from, state.high_from, state.max_recoveries) == (
-        10, 0.1, 0.4, 0.75, 5)
-    assert (settings.policy, settings.userdata, settings.on_no_answer) == ('prose', 'restore', ('stop', ''))
+    assert (state.memory, state.prior, state.moderate_from, state.high_from,
+            state.max_recoveries) == (10, 0.1, 0.4, 0.75, 5)
+    assert (settings.policy, settings.userdata, settings.on_no_answer) == ('prose', 'restore',
+                                                                           ('stop', ''))
     assert settings.failing_outcomes == ('aborted', 'failed', 'failure', 'error')
     assert settings.deadline_s > 0, 'never an endless wait unless asked for'
     assert Settings.from_dict(None) == settings
@@ -20,10 +21,8 @@ def test_the_defaults_are_those_of_the_design():
 @pytest.mark.parametrize('given, key, value, allowed', [
     ({'polisy': 'prose'}, 'polisy', 'prose', 'policy'),
     ({'policy': 'guess'}, 'policy', 'guess', 'algorithm1, prose'),
-    ({'memory': 0}, 'memory', 0, 'whole number'),
-    ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
-    ({'memory': True}, 'memory', True, 'whole number'),
-    ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
+    ({'memory': 0}, 'memory', 0, 'whole number'), ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
+    ({'memory': True}, 'memory', True, 'whole number'), ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
     ({'prior': float('nan')}, 'prior', None, '0 to 1'),
     ({'moderate_from': 0.9}, 'moderate_from', 0.9, 'high_from'),
     ({'estimator': 'mean'}, 'estimator', 'mean', 'exponential, window'),
@@ -41,37 +40,42 @@ def test_the_defaults_are_those_of_the_design():
     ({'escalate': 'yes'}, 'escalate', 'yes', 'true or false'),
     ({'history_length': 0}, 'history_length', 0, 'from 1'),
     ({'oracle_label': ''}, 'oracle_label', '', 'not empty'),
-    ({'rates_file': 5}, 'rates_file', 5, 'string'),
-    ({'states': ['A']}, 'states', ['A'], 'mapping'),
+    ({'rates_file': 5}, 'rates_file', 5, 'string'), ({'states': ['A']}, 'states', ['A'], 'mapping'),
     ({'states': {5: {}}}, 'states', 5, 'strings'),
     ({'states': {'PICK': {'memory': 'ten'}}}, 'states.PICK.memory', 'ten', 'whole number'),
     ({'states': {'PICK': {'memroy': 1}}}, 'states.PICK.memroy', 1, 'memory'),
     ({'states': {'PICK': {'policy': 'prose'}}}, 'states.PICK.policy', 'prose', 'prior'),
-    ({'states': {'PICK': {'high_from': 0.2}}}, 'states.PICK.high_from', 0.2, 'moderate_from, which is 0.4'),
-    ({'states': {'PICK': {'moderate_from': 0.8}}}, 'states.PICK.moderate_from', 0.8, 'high_from, which is 0.75'),
-    ({'deadline_s': 10 ** 400}, 'deadline_s', 10 ** 400, 'seconds'),
+    ({'states': {'PICK': {'high_from': 0.2}}
+      }, 'states.PICK.high_from', 0.2, 'moderate_from, which is 0.4'),
+    ({'states': {'PICK': {'moderate_from': 0.8}}
+      }, 'states.PICK.moderate_from', 0.8, 'high_from, which is 0.75'),
+    ({'deadline_s': 10**400}, 'deadline_s', 10**400, 'seconds'),
     ({'grace_period_s': float('inf')}, 'grace_period_s', float('inf'), 'seconds'),
-    ({'history_length': 10 ** 30}, 'history_length', 10 ** 30, 'to 1000000'),
+    ({'history_length': 10**30}, 'history_length', 10**30, 'to 1000000'),
     ({'states': {'PICK': {'preconditions': 'A'}}}, 'states.PICK.preconditions', 'A', 'list'),
     ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
     ({'interfaces': {'hand': {'action': 'a', 'state': []}}}, 'interfaces.hand.state', [], 'states'),
-    ({'interfaces': {'hand': {'action': 'a', 'states': 'A'}}}, 'interfaces.hand.states', 'A', 'list'),
-    ({'interfaces': {'hand': {'action': 'a', 'args': []}}}, 'interfaces.hand.args', [], 'launch or node'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'launch': 'p/f.launch'}}}, 'interfaces.hand.node', 'p t',
-     'not both'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': '/tmp/f.launch'}}}, 'interfaces.hand.launch', '/tmp/f.launch',
-     'PACKAGE/FILE.launch'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}}, 'interfaces.hand.launch', 'p/../f.launch',
-     'PACKAGE/FILE.launch'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t; rm'}}}, 'interfaces.hand.node', 'p t; rm', 'PACKAGE TYPE'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'args': 'x'}}}, 'interfaces.hand.args', 'x', 'list'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x': [1]}}}},
-     'interfaces.hand.args.x', [1], 'launch argument'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}}, 'interfaces.hand.start_limit_s', 0,
-     'seconds'),
-    ('prose', 'settings', 'prose', 'mapping')])
+    ({'interfaces': {'hand': {'action': 'a', 'states': 'A'}}
+      }, 'interfaces.hand.states', 'A', 'list'),
+    ({'interfaces': {'hand': {'action': 'a', 'args': []}}
+      }, 'interfaces.hand.args', [], 'launch or node'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'launch': 'p/f.launch'}}
+      }, 'interfaces.hand.node', 'p t', 'not both'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': '/tmp/f.launch'}}
+      }, 'interfaces.hand.launch', '/tmp/f.launch', 'PACKAGE/FILE.launch'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}
+      }, 'interfaces.hand.launch', 'p/../f.launch', 'PACKAGE/FILE.launch'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t; rm'}}
+      }, 'interfaces.hand.node', 'p t; rm', 'PACKAGE TYPE'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'args': 'x'}}
+      }, 'interfaces.hand.args', 'x', 'list'),
+    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x': [1]}}}
+      }, 'interfaces.hand.args.x', [1], 'launch argument'),
+    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}
+      }, 'interfaces.hand.start_limit_s', 0, 'seconds'), ('prose', 'settings', 'prose', 'mapping')
+])
 def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value, allowed):
-    with pytest.raises(ConfigError) as raised:
+    with pytest.raises(SettingsError) as raised:
         Settings.from_dict(given)
     assert raised.value.key == key
     if value is not None:
@@ -84,14 +88,17 @@ def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value,
 def test_settings_of_a_state_win_over_the_machines_and_a_path_over_a_label():
     settings = Settings.from_dict({'prior': 0.2, 'memory': 5, 'states': {
         'PICK': {'prior': 0.3}, 'LEFT/PICK': {'memory': 7}}})
-    assert (settings.for_state('', 'PLACE').prior, settings.for_state('', 'PICK').prior) == (0.2, 0.3)
+    assert (settings.for_state('', 'PLACE').prior, settings.for_state('',
+                                                                      'PICK').prior) == (0.2, 0.3)
     assert settings.for_state('LEFT', 'PICK').memory == 7
     assert settings.for_state('LEFT', 'PICK').prior == 0.3
     assert settings.for_state('RIGHT', 'PICK').memory == 5
 
 
-@pytest.mark.parametrize('given, taken', [('stop', ('stop', '')), ({'goto': 'SAFE'}, ('goto', 'SAFE')),
-                                          ('goto:SAFE', ('goto', 'SAFE')), ('give_up:aborted', ('give_up', 'aborted')),
+@pytest.mark.parametrize('given, taken', [('stop', ('stop', '')),
+                                          ({'goto': 'SAFE'}, ('goto', 'SAFE')),
+                                          ('goto:SAFE', ('goto', 'SAFE')),
+                                          ('give_up:aborted', ('give_up', 'aborted')),
                                           ({'give_up': 'aborted'}, ('give_up', 'aborted'))])
 def test_fallbacks(given, taken):
     assert Settings.from_dict({'on_no_answer': given}).on_no_answer == taken
@@ -112,9 +119,16 @@ def test_interfaces_are_offered_for_the_states_they_name_or_for_all():
 
 
 def test_an_interface_may_say_how_it_is_started():
-    settings = Settings.from_dict({'interfaces': {
-        'hand': {'action': 'a', 'launch': 'my_robot/hand.launch', 'args': {'camera': 'head', 'clearance': False}},
-        'eye': {'action': 'b', 'node': 'my_robot eye.py', 'args': ['_rate:=5'], 'start_limit_s': 5}}})
+    settings = Settings.from_dict({
+        'interfaces': {
+            'hand': {
+                'action': 'a', 'launch': 'my_robot/hand.launch',
+                'args': {'camera': 'head', 'clearance': False}
+            }, 'eye': {
+                'action': 'b', 'node': 'my_robot eye.py', 'args': ['_rate:=5'], 'start_limit_s': 5
+            }
+        }
+    })
     assert [offer.start for offer in settings.offers_for('', 'PICK')] == [
         InterfaceStart('launch', 'my_robot', 'hand.launch', ('camera:=head', 'clearance:=false')),
         InterfaceStart('node', 'my_robot', 'eye.py', ('_rate:=5',), 5.0)]
@@ -126,10 +140,12 @@ def test_empty_sections_of_a_file_are_empty():
 
 
 def test_a_key_that_is_not_known_is_answered_with_all_that_are():
-    with pytest.raises(ConfigError) as raised:
+    with pytest.raises(SettingsError) as raised:
         Settings.from_dict({'polcy': 'prose'})
     assert set(str(raised.value).split('one of the keys ')[1].split(', ')) == {
-        'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries', 'failing_outcomes',
-        'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys', 'time_limit_s', 'grace_period_s',
-        'deadline_s', 'on_no_answer', 'escalate', 'watch_preconditions', 'history_length', 'rates_file', 'oracle_label',
-        'nested', 'interfaces', 'states'}
+        'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries',
+        'failing_outcomes', 'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys',
+        'time_limit_s', 'grace_period_s', 'deadline_s', 'on_no_answer', 'escalate',
+        'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
+        'interfaces', 'states'
+    }

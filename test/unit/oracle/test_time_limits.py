@@ -1,16 +1,59 @@
 """States with a time limit: preempted, given grace, abandoned, blocked while their thread lives."""
 import threading
 import time
+from typing import List
 
 import pytest
+from machines import (
+    FakeExpert,
+    Gate,
+    Scripted,
+    Watched,
+    chain_of,
+    contents,
+    goto,
+    in_thread,
+    supersede,
+    watched,
+)
+from waiting import wait_for
+
 import smach
-from machines import FakeExpert, Gate, Scripted, Watched, chain_of, goto, in_thread, supersede, watched
+import smach_oracle.oracle.machine.workers as worker
+from smach_oracle.oracle.records.events import EventKind, FailureKind
 
-from smach_oracle.oracle.events import EventKind, FailureKind
+LIMITED = {'time_limit_s': 30.0, 'grace_period_s': 5.0}
+ABANDONING = {'time_limit_s': 30.0, 'grace_period_s': 0.1}
+BRIEF_S = 0.1  # a limit that is waited for in full, by a state which never ends before
 
-LIMITED = {'time_limit_s': 1.0, 'grace_period_s': 5.0}  # a visit that does nothing keeps it, on a busy machine, too
-AMPLE = {'time_limit_s': 30.0, 'grace_period_s': 5.0}  # where no visit is to overrun it
-ABANDONING = {'time_limit_s': 0.5, 'grace_period_s': 0.1}
+
+class Clock:
+    """The time that the executive gives to states: what it waits for is over once a test allows it.
+
+    Nothing depends on how busy the machine is, and no second is waited for in full.
+    """
+
+    def __init__(self):
+        self._over: List[threading.Event] = []
+
+    def end(self, waits, once):
+        """Let the next so many waits (a limit, then a grace period) be over once `once` is set."""
+        self._over += [once] * waits
+
+    def wait(self, event, seconds):
+        """In place of `worker.wait`."""
+        ended = wait_for(lambda: event.is_set() or self._over and self._over[0].is_set())
+        assert ended, 'nothing ends this wait'
+        if not event.is_set():
+            self._over.pop(0)
+        return event.is_set()
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(worker, 'wait', clock.wait)
+    return clock
 
 
 class Stubborn(Scripted):
@@ -18,6 +61,7 @@ class Stubborn(Scripted):
 
     def __init__(self, outcome='ok', **keys):
         Scripted.__init__(self, output_keys=['late', 'early'], **keys)
+        self.stuck = threading.Event()
         self.let_go = threading.Event()
         self.left = threading.Event()
         self._outcome = outcome
@@ -27,28 +71,29 @@ class Stubborn(Scripted):
         if self.runs > 1:
             return 'ok'
         ud.early = 'in time'
+        self.stuck.set()
         assert self.let_go.wait(20)
         ud.late = 'too late'
         ud.early = 'too late'
         self.left.set()
         return self._outcome
 
+    def leave(self):
+        """Let the first execution end, and wait for it."""
+        self.let_go.set()
+        assert self.left.wait(20)
+
 
 def limited(state, *others, expert=None, machine_settings=None, **settings):
     machine = chain_of(state, *others)
-    return Watched(machine, expert=expert, settings=dict(machine_settings or {}, states={'A': settings or LIMITED}))
-
-
-def wait_until(condition, timeout_s=10.0):
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    return Watched(machine, expert=expert, settings=dict(machine_settings or {},
+                                                         states={'A': settings or LIMITED}))
 
 
 def test_a_state_within_its_limit_is_as_any_other():
-    state = Scripted(lambda self, ud: setattr(ud, 'x', ud.y + 1) or 'ok', input_keys=['y'], output_keys=['x'])
-    machine = limited(state, **AMPLE)
+    state = Scripted(lambda self, ud: setattr(ud, 'x', ud.y + 1) or 'ok', input_keys=['y'],
+                     output_keys=['x'])
+    machine = limited(state, **LIMITED)
     machine.machine.userdata.y = 1
     assert machine.run() == 'done'
     assert machine.machine.userdata.x == 2
@@ -58,64 +103,70 @@ def test_a_state_without_a_limit_runs_in_the_machines_own_thread_and_one_with_a_
     threads = []
     state = Scripted(*[lambda self, ud: threads.append(threading.current_thread()) or 'ok'] * 2)
     watched(state).run()
-    limited(state, **AMPLE).run()
+    limited(state, **LIMITED).run()
     assert threads[0] is threading.current_thread()
     assert threads[1] is not threads[0]
 
 
-def test_an_overrun_is_a_failure_and_the_state_is_preempted():
+def test_an_overrun_is_a_failure_and_the_state_is_preempted(clock):
     gate = Gate()
     machine = limited(Scripted(gate), Scripted())
+    clock.end(1, gate.entered)
     assert machine.run() == 'done'
     failure = machine.of(EventKind.FAILURE)[0]
     assert failure.failure_kind == FailureKind.TIME_LIMIT
-    assert failure.text == 'overran its time limit of 1 s and ended when it was preempted'
+    assert failure.text == 'overran its time limit of 30 s and ended when it was preempted'
     assert machine.visits() == ['A', 'A', 'B']
     assert machine.machine['A'].preempt_requested() is False
 
 
-def test_a_preempt_that_the_state_did_not_service_in_its_grace_does_not_reach_its_next_visit():
+def test_a_preempt_that_the_state_did_not_service_in_its_grace_does_not_reach_its_next_visit(clock):
+    entered = threading.Event()
+
     def slow(state, ud):
-        while not state.preempt_requested():
-            time.sleep(0.01)
+        entered.set()
+        assert wait_for(state.preempt_requested)
         return 'ok'
 
     seen = []
-    machine = limited(Scripted(slow, lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
+    machine = limited(Scripted(slow,
+                               lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
+    clock.end(1, entered)
     assert machine.run() == 'done'
     assert seen == [False]
 
 
-def test_late_outcome_and_late_writes_are_dropped(log):
+def test_late_outcome_and_late_writes_are_dropped(log, clock):
     state = Stubborn('aborted')
+    clock.end(2, state.stuck)
     machine = limited(state, Scripted(), expert=FakeExpert(goto('B')), **ABANDONING)
     assert machine.run() == 'done'
-    state.let_go.set()
-    assert state.left.wait(10)
-    wait_until(lambda: any('dropped' in text for _, text in log))
-    assert machine.machine.userdata._data == {'early': 'in time'}
+    state.leave()
+    assert wait_for(lambda: any('dropped' in text for _, text in log))
+    assert contents(machine.machine.userdata) == {'early': 'in time'}
     assert len(machine.of(EventKind.FAILURE)) == 1
 
 
-def test_a_nested_machine_that_is_abandoned_hands_no_late_outputs_up():
+def test_a_nested_machine_that_is_abandoned_hands_no_late_outputs_up(clock):
     inner_state = Stubborn()
+    clock.end(2, inner_state.stuck)
     inner = chain_of(inner_state, output_keys=['late'])
     outer = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with outer:
         smach.StateMachine.add('A', inner, {'done': 'B'})
         smach.StateMachine.add('B', Scripted(), {'ok': 'done'})
-    machine = Watched(outer, expert=FakeExpert(goto('B')), settings={'states': {'TOP': {}, 'A': ABANDONING}},
-                      strict=False)
+    machine = Watched(outer, expert=FakeExpert(goto('B')),
+                      settings={'states': {'TOP': {}, 'A': ABANDONING}}, strict=False)
     machine.machine._oracle.configure(machine.machine.settings)
     assert machine.run() == 'done'
-    inner_state.let_go.set()
-    assert inner_state.left.wait(10)
-    wait_until(lambda: not inner.is_running())
+    inner_state.leave()
+    assert wait_for(lambda: not inner.is_running())
     assert 'late' not in outer.userdata
 
 
-def test_a_state_whose_thread_lives_is_not_entered_again():
+def test_a_state_whose_thread_lives_is_not_entered_again(clock):
     state = Stubborn()
+    clock.end(2, state.stuck)
     expert = FakeExpert(goto('A'), supersede('ok'))
     machine = limited(state, Scripted(), expert=expert, **ABANDONING)
     assert machine.run() == 'done'
@@ -124,60 +175,65 @@ def test_a_state_whose_thread_lives_is_not_entered_again():
     assert 'still runs' in expert.questions[0].reason
     assert 'still runs' in expert.questions[0].choices[0].blocked
     assert 'still runs' in machine.of(EventKind.WARNING)[0].text, 'the answer naming it is refused'
-    state.let_go.set()
+    state.leave()
 
 
-def test_a_transition_into_a_state_whose_thread_lives_fails_at_once():
+def test_a_transition_into_a_state_whose_thread_lives_fails_at_once(clock):
     state = Stubborn()
+    clock.end(2, state.stuck)
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', state, {'ok': 'done'})
         smach.StateMachine.add('B', Scripted(), {'ok': 'A'})
-    machine = Watched(machine, expert=FakeExpert(goto('B'), supersede('ok')), settings={'states': {'A': ABANDONING}})
+    machine = Watched(machine, expert=FakeExpert(goto('B'), supersede('ok')),
+                      settings={'states': {'A': ABANDONING}})
     assert machine.run() == 'done'
     failures = machine.of(EventKind.FAILURE)
     assert {event.failure_kind for event in failures} == {FailureKind.TIME_LIMIT}
     assert {event.text for event in failures[1:]} == {'still runs since it overran its time limit'}
     assert state.runs == 1
-    state.let_go.set()
+    state.leave()
 
 
-def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too():
+def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too(clock):
     state = Stubborn()
+    clock.end(2, state.stuck)
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', state, {'ok': 'done'})
         smach.StateMachine.add('TWIN', state, {'ok': 'done'})
         smach.StateMachine.add('B', Scripted('aborted'), {'ok': 'done'})
     expert = FakeExpert(goto('TWIN'), goto('B'), goto('B'))
-    machine = Watched(machine, expert=expert, preconditions={'B': ['TWIN']}, settings={'states': {'A': ABANDONING}})
+    machine = Watched(machine, expert=expert, preconditions={'B': ['TWIN']},
+                      settings={'states': {'A': ABANDONING}})
     assert machine.run() == 'done'
     assert state.runs == 1
     end = machine.of(EventKind.PRECONDITION_END)[0]
     assert (end.outcome, end.text) == ('not met', 'still runs since it overran its time limit')
-    state.let_go.set()
+    state.leave()
 
 
-def test_once_its_thread_has_ended_the_state_is_entered_again():
+def test_once_its_thread_has_ended_the_state_is_entered_again(clock):
     state = Stubborn()
-    machine = limited(state, expert=FakeExpert(supersede('ok')), time_limit_s=1.0, grace_period_s=0.1)
+    clock.end(2, state.stuck)
+    machine = limited(state, expert=FakeExpert(supersede('ok')), **ABANDONING)
     assert machine.run() == 'done'
-    state.let_go.set()
-    wait_until(lambda: not machine.machine._oracle.tree.workers.blocked(state))
+    state.leave()
+    assert wait_for(lambda: not any('worker of A' in each.name for each in threading.enumerate()))
     assert machine.run() == 'done'
     assert state.runs == 2
     assert state.preempt_requested() is False
 
 
 def test_an_exception_in_the_worker_is_the_states_exception():
-    machine = limited(Scripted(ValueError('no grasp')), max_recoveries=0, **AMPLE)
+    machine = limited(Scripted(ValueError('no grasp')), max_recoveries=0, **LIMITED)
     with pytest.raises(smach.InvalidUserCodeError, match='(?s)Traceback.*no grasp'):
         machine.run()
 
 
 @pytest.mark.parametrize('stop', [KeyboardInterrupt, SystemExit])
 def test_ctrl_c_in_the_worker_reaches_the_machine(stop):
-    machine = limited(Scripted(stop()), **AMPLE)
+    machine = limited(Scripted(stop()), **LIMITED)
     with pytest.raises(stop):
         machine.run()
     assert machine.machine.is_running() is False
@@ -186,13 +242,12 @@ def test_ctrl_c_in_the_worker_reaches_the_machine(stop):
 def test_ctrl_c_while_the_machine_waits_leaves_the_state_behind(monkeypatch):
     state = Stubborn()
     machine = limited(state, time_limit_s=10.0)
-    import smach_oracle.oracle.worker as worker
     real = worker.wait
 
     def interrupted(event, seconds):
         if seconds == 10.0:
             monkeypatch.setattr(worker, 'wait', real)
-            wait_until(lambda: state.runs)
+            assert state.stuck.wait(20)
             raise KeyboardInterrupt
         return real(event, seconds)
     monkeypatch.setattr(worker, 'wait', interrupted)
@@ -200,8 +255,7 @@ def test_ctrl_c_while_the_machine_waits_leaves_the_state_behind(monkeypatch):
         machine.run()
     assert machine.machine.is_running() is False
     assert state.preempt_requested() is True
-    state.let_go.set()
-    assert state.left.wait(10)
+    state.leave()
     assert 'late' not in machine.machine.userdata
 
 
@@ -215,42 +269,58 @@ def test_a_preempt_reaches_a_state_in_a_worker():
     assert not machine.of(EventKind.FAILURE)
 
 
-def test_an_overrun_under_a_preempt_ends_the_machine_as_preempted():
+def test_an_overrun_under_a_preempt_ends_the_machine_as_preempted(clock):
     state = Stubborn()
-    machine = limited(state, time_limit_s=1.0, grace_period_s=0.1)
+    preempted = threading.Event()
+    clock.end(2, preempted)
+    machine = limited(state, **ABANDONING)
     run = in_thread(machine.run)
-    wait_until(lambda: state.runs)
+    assert state.stuck.wait(20)
     machine.machine.request_preempt()
+    preempted.set()
     assert run.result() == 'preempted'
-    state.let_go.set()
+    state.leave()
 
 
 def test_an_overrun_that_nobody_resolves_stops_with_the_machines_failing_outcome():
-    machine = limited(Scripted(Gate()), max_recoveries=0, time_limit_s=0.1)
+    machine = limited(Scripted(Gate()), max_recoveries=0, time_limit_s=BRIEF_S)
+    begin = time.monotonic()
     assert machine.run() == 'aborted'
+    assert time.monotonic() - begin >= BRIEF_S, 'not a moment less than its limit'
 
 
 def test_an_overrun_in_a_machine_without_a_failing_outcome_raises():
     machine = Watched(chain_of(Scripted(Gate(), outcomes=('ok',)), outcomes=('done',)),
-                      settings={'max_recoveries': 0, 'time_limit_s': 0.1})
+                      settings={'max_recoveries': 0, 'time_limit_s': BRIEF_S})
     with pytest.raises(smach.InvalidUserCodeError, match='overran its time limit of 0.1 s'):
         machine.run()
 
 
+def test_what_is_waited_for_ends_a_wait_and_so_do_its_seconds():
+    event = threading.Event()
+    begin = time.monotonic()
+    assert worker.wait(event, BRIEF_S) is False
+    assert time.monotonic() - begin >= BRIEF_S
+    event.set()
+    assert worker.wait(event, 10.0 * threading.TIMEOUT_MAX) is True
+
+
 def test_without_recovery_there_are_no_limits():
-    def slow(state, ud):
-        time.sleep(0.2)
+    def longer_than_its_limit(state, ud):
+        time.sleep(0.02)  # what makes it late is that time passes
         return 'ok'
-    machine = watched(Scripted(slow), settings={'time_limit_s': 0.05}, recover=False)
+    machine = watched(Scripted(longer_than_its_limit), settings={'time_limit_s': 0.01},
+                      recover=False)
     assert machine.run() == 'done'
     assert not machine.of(EventKind.FAILURE)
 
 
 def test_a_limit_given_with_add():
     from smach_oracle.oracle import OracleContainer
-    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'], settings={'max_recoveries': 0})
+    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'],
+                              settings={'max_recoveries': 0})
     with machine:
-        OracleContainer.add('A', Scripted(Gate()), {'ok': 'done'}, time_limit_s=0.05)
+        OracleContainer.add('A', Scripted(Gate()), {'ok': 'done'}, time_limit_s=BRIEF_S)
     assert machine.execute() == 'aborted'
 
 
@@ -259,5 +329,5 @@ def test_context_variables_reach_the_worker():
     variable = contextvars.ContextVar('v', default='unset')
     seen = []
     variable.set('set')
-    limited(Scripted(lambda self, ud: seen.append(variable.get()) or 'ok'), **AMPLE).run()
+    limited(Scripted(lambda self, ud: seen.append(variable.get()) or 'ok'), **LIMITED).run()
     assert seen == ['set']

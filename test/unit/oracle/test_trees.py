@@ -1,11 +1,11 @@
 """Nested machines: wrapped at any depth, escalating, concurrent."""
 import pytest
-import smach
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede
 
+import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.oracle.events import EventKind, FailureKind
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 
 def around(label, child, target='done'):
@@ -17,7 +17,8 @@ def around(label, child, target='done'):
 
 
 def iterator_of(child, count):
-    iterator = smach.Iterator(outcomes=['done', 'aborted', 'preempted'], input_keys=[], output_keys=[],
+    iterator = smach.Iterator(outcomes=['done', 'aborted',
+                                        'preempted'], input_keys=[], output_keys=[],
                               it=list(range(count)), it_label='item', exhausted_outcome='done')
     with iterator:
         smach.Iterator.set_contained_state('EACH', child, loop_outcomes=['done'])
@@ -34,7 +35,8 @@ def concurrence_of(**children):
 
 
 def sequence_of(*states, connector='ok'):
-    sequence = smach.Sequence(outcomes=['done', 'aborted', 'preempted'], connector_outcome=connector)
+    sequence = smach.Sequence(outcomes=['done', 'aborted', 'preempted'],
+                              connector_outcome=connector)
     with sequence:
         for index, state in enumerate(states):
             last = {connector: 'done'} if index == len(states) - 1 else {}
@@ -86,11 +88,13 @@ def test_nested_machines_stay_as_they_are_where_told():
 def test_an_inner_oracle_that_gives_up_hands_the_failure_up_and_only_the_outermost_asks():
     inner = chain_of(Scripted(), Scripted(*['aborted'] * 20))
     expert = FakeExpert(supersede('done'))
-    machine = Watched(around('INNER', inner), name='TOP', expert=expert, settings={'max_recoveries': 1})
+    machine = Watched(around('INNER', inner), name='TOP', expert=expert,
+                      settings={'max_recoveries': 1})
     assert machine.run() == 'done'
     assert [question.container_path for question in expert.questions] == ['TOP']
     assert expert.questions[0].failed_state == 'INNER'
-    assert [(event.path, event.state) for event in machine.of(EventKind.FAILURE)][-1] == ('TOP', 'INNER')
+    assert [(event.path, event.state)
+            for event in machine.of(EventKind.FAILURE)][-1] == ('TOP', 'INNER')
     assert 'handed to the oracle above' in machine.of(EventKind.GIVE_UP)[0].text
 
 
@@ -99,7 +103,8 @@ def test_an_exception_below_is_handed_up_with_its_traceback():
     machine = Watched(around('INNER', inner), settings={'max_recoveries': 0})
     with pytest.raises(smach.InvalidUserCodeError, match='(?s)Traceback.*no grasp'):
         machine.run()
-    assert [event.failure_kind for event in machine.of(EventKind.FAILURE)] == [FailureKind.EXCEPTION] * 2
+    assert [event.failure_kind
+            for event in machine.of(EventKind.FAILURE)] == [FailureKind.EXCEPTION] * 2
 
 
 def test_without_escalation_the_inner_oracle_asks_itself():
@@ -113,21 +118,27 @@ def test_without_escalation_the_inner_oracle_asks_itself():
 
 def test_an_inner_machine_run_by_itself_is_a_trial_and_asks_itself():
     inner = chain_of(Scripted('aborted'))
-    machine = Watched(around('INNER', inner), expert=FakeExpert(supersede('ok')), settings={'max_recoveries': 0})
+    machine = Watched(around('INNER', inner), expert=FakeExpert(supersede('ok')),
+                      settings={'max_recoveries': 0})
     assert inner.execute() == 'done'
     assert machine.kinds()[0] == 'TRIAL_START' and machine.kinds()[-1] == 'TRIAL_END'
 
 
-def test_what_a_machine_recalls_of_its_failures_lasts_for_the_trial_and_its_chain_for_one_execution():
+def test_what_a_machine_recalls_of_its_failures_lasts_for_the_trial_and_its_chain_for_one_execution(
+):
     inner = chain_of(Scripted(), Scripted('aborted', 'ok', 'aborted', 'aborted', 'ok'))
-    machine = Watched(around('MIDDLE', iterator_of(inner, 2)), settings={'max_recoveries': 2, 'memory': 1000})
+    machine = Watched(around('MIDDLE', iterator_of(inner, 2)),
+                      settings={'max_recoveries': 2, 'memory': 1000})
     machine.run()
     assert machine.rate('B').recoveries == 2
     assert [action for action, _ in machine.decisions()][:2] == ['revisit', 'revisit']
 
 
 def test_failures_in_concurrent_machines_do_not_disturb_each_other():
-    children = {'M{}'.format(index): chain_of(Scripted(), Scripted(*['aborted', 'ok'] * 40)) for index in range(6)}
+    children = {
+        'M{}'.format(index): chain_of(Scripted(), Scripted(*['aborted', 'ok'] * 40))
+        for index in range(6)
+    }
     concurrence = concurrence_of(**children)
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
@@ -139,7 +150,8 @@ def test_failures_in_concurrent_machines_do_not_disturb_each_other():
     for event in machine.events:
         by_trial.setdefault(event.trial_id, []).append(event.seq)
     assert len(by_trial) == 20
-    assert all(seqs == list(range(len(seqs))) for seqs in by_trial.values()), 'numbered without gap, in order'
+    assert all(seqs == list(range(len(seqs)))
+               for seqs in by_trial.values()), 'numbered without gap, in order'
     rows = {(row.path, row.state): row for row in machine.machine.rates()}
     for label in children:
         row = rows['TOP/ALL/' + label, 'B']
@@ -153,30 +165,34 @@ def test_settings_reach_a_state_by_label_and_by_path():
     with machine:
         smach.StateMachine.add('LEFT', left, {'done': 'RIGHT'})
         smach.StateMachine.add('RIGHT', right, {'done': 'done'})
-    machine = Watched(machine, name='TOP', settings={'states': {'A': {'prior': 0.2}, 'LEFT/A': {'prior': 0.3}}})
+    machine = Watched(machine, name='TOP',
+                      settings={'states': {'A': {'prior': 0.2}, 'LEFT/A': {'prior': 0.3}}})
     rates = {(row.path, row.state): row.rate for row in machine.machine.rates()}
     assert rates['TOP/LEFT', 'A'] == pytest.approx(0.3)
     assert rates['TOP/RIGHT', 'A'] == pytest.approx(0.2)
 
 
 def test_settings_for_a_state_that_is_nowhere_are_refused_with_those_there_are():
-    with pytest.raises(ConfigError, match='states.PIKC.*INNER, INNER/A'):
-        Watched(around('INNER', chain_of(Scripted())), settings={'states': {'PIKC': {'prior': 0.5}}})
+    with pytest.raises(SettingsError, match='states.PIKC.*INNER, INNER/A'):
+        Watched(around('INNER', chain_of(Scripted())),
+                settings={'states': {'PIKC': {'prior': 0.5}}})
 
 
 def test_an_interface_for_a_state_that_is_nowhere_is_refused_or_where_not_strict_warned_of(log):
     settings = {'interfaces': {'hand': {'action': '/hand', 'states': ['INNER/A', 'PIKC']}}}
-    with pytest.raises(ConfigError, match=r"interfaces\.hand\.states: 'PIKC'.*A, INNER, INNER/A"):
+    with pytest.raises(SettingsError, match=r"interfaces\.hand\.states: 'PIKC'.*A, INNER, INNER/A"):
         OracleContainer.wrap(around('INNER', chain_of(Scripted())), settings=settings)
     OracleContainer.wrap(around('INNER', chain_of(Scripted())), settings=settings, strict=False)
     assert [text for level, text in log if level == 'warn' and 'PIKC' in text]
 
 
 def test_an_oracle_container_built_inside_another_joins_its_tree():
-    inner = OracleContainer(outcomes=['done', 'aborted', 'preempted'], settings={'max_recoveries': 0})
+    inner = OracleContainer(outcomes=['done', 'aborted', 'preempted'],
+                            settings={'max_recoveries': 0})
     with inner:
         OracleContainer.add('A', Scripted('aborted'), {'ok': 'done'})
-    outer = OracleContainer(outcomes=['done', 'aborted', 'preempted'], name='TOP', expert=FakeExpert(goto('INNER')))
+    outer = OracleContainer(outcomes=['done', 'aborted', 'preempted'], name='TOP',
+                            expert=FakeExpert(goto('INNER')))
     with outer:
         OracleContainer.add('INNER', inner, {'done': 'done'})
     events = []
@@ -213,10 +229,12 @@ def test_a_shared_nested_machine_under_two_labels():
 def test_the_trial_is_told_apart_from_its_containers():
     machine = Watched(around('INNER', chain_of(Scripted())), name='TOP')
     machine.run()
-    assert [(event.kind.name, event.path, event.outcome) for event in machine.of(
-        EventKind.TRIAL_START, EventKind.TRIAL_END, EventKind.CONTAINER_START, EventKind.CONTAINER_END)] == [
-        ('TRIAL_START', 'TOP', ''), ('CONTAINER_START', 'TOP', ''), ('CONTAINER_START', 'TOP/INNER', ''),
-        ('CONTAINER_END', 'TOP/INNER', 'done'), ('CONTAINER_END', 'TOP', 'done'), ('TRIAL_END', 'TOP', 'done')]
+    assert [(event.kind.name, event.path, event.outcome)
+            for event in machine.of(EventKind.TRIAL_START, EventKind.TRIAL_END,
+                                    EventKind.CONTAINER_START, EventKind.CONTAINER_END)
+            ] == [('TRIAL_START', 'TOP', ''), ('CONTAINER_START', 'TOP', ''),
+                  ('CONTAINER_START', 'TOP/INNER', ''), ('CONTAINER_END', 'TOP/INNER', 'done'),
+                  ('CONTAINER_END', 'TOP', 'done'), ('TRIAL_END', 'TOP', 'done')]
 
 
 def test_an_iterator_item_that_the_oracle_below_recovers_counts_as_done():
@@ -230,7 +248,8 @@ def test_a_machine_that_is_nested_in_one_top_machine_after_another_belongs_to_th
     shared = chain_of(Scripted(*['aborted', 'ok'] * 3))
     first = Watched(around('INNER', shared), name='FIRST', settings={'oracle_label': 'HELP'})
     second = Watched(around('INNER', shared), name='SECOND', recover=True)
-    for machine, name, meta in ((first, 'FIRST', 'HELP'), (second, 'SECOND', 'ORACLE'), (first, 'FIRST', 'HELP')):
+    for machine, name, meta in ((first, 'FIRST', 'HELP'), (second, 'SECOND', 'ORACLE'),
+                                (first, 'FIRST', 'HELP')):
         del machine.events[:]
         assert machine.run() == 'done'
         assert {event.path for event in machine.events} == {name, name + '/INNER'}

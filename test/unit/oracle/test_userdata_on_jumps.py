@@ -1,9 +1,9 @@
 """What userdata looks like after a jump, and what a recovery's own writes are worth."""
 import pytest
-import smach
-from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede
+from machines import FakeExpert, Scripted, Watched, chain_of, contents, goto, supersede
 
-from smach_oracle.oracle.events import EventKind
+import smach
+from smach_oracle.oracle.records.events import EventKind
 
 
 def writes(key, value, outcome):
@@ -28,7 +28,7 @@ def seen_by(*script, **keys):
 
     class Noting(Scripted):
         def execute(self, ud):
-            seen.append(dict(machine_data[0]()))
+            seen.append(machine_data[0]())
             return Scripted.execute(self, ud)
 
     machine_data = [None]
@@ -40,7 +40,7 @@ def run(b_script, preconditions=(), expert=None, **settings):
     state, seen, data = seen_by(*b_script, **IO)
     machine = machine_of(state, preconditions, **settings)
     machine.machine.expert = expert
-    data[0] = lambda: machine.machine.userdata._data
+    data[0] = lambda: contents(machine.machine.userdata)
     machine.run()
     return machine, seen
 
@@ -83,7 +83,8 @@ def test_what_a_precondition_wrote_survives_though_it_is_what_the_failed_state_w
 
 
 def test_what_a_state_precondition_wrote_survives():
-    _, seen = run([writes('x', 'half done', 'aborted')], [Scripted(writes('x', 'achieved', 'ok'), **IO)])
+    _, seen = run([writes('x', 'half done', 'aborted')],
+                  [Scripted(writes('x', 'achieved', 'ok'), **IO)])
     assert seen[1] == {'x': 'achieved'}
 
 
@@ -98,10 +99,11 @@ def test_what_a_precondition_that_was_not_met_wrote_is_taken_back(userdata):
                 raise end
             return end
         expert = FakeExpert(supersede('ok'))
-        machine, _ = run([writes('x', 'half done', 'aborted')], [Scripted(fail, **IO)], expert=expert,
-                         userdata=userdata, max_recoveries=1)
+        machine, _ = run([writes('x', 'half done', 'aborted')], [Scripted(fail, **IO)],
+                         expert=expert, userdata=userdata, max_recoveries=1)
         assert machine.of(EventKind.PRECONDITION_END)[0].outcome == 'not met'
-        assert machine.machine.userdata._data == {'x': 'at the start' if userdata == 'restore' else 'half done'}
+        left = {'x': 'at the start' if userdata == 'restore' else 'half done'}
+        assert contents(machine.machine.userdata) == left
 
 
 def test_of_two_preconditions_the_one_that_was_met_keeps_what_it_wrote():
@@ -130,7 +132,8 @@ def test_what_a_check_found_is_there_for_what_achieves_it(achieves):
 
 
 def test_what_an_unmet_precondition_wrote_past_its_view_is_taken_back():
-    machine = machine_of(Scripted('aborted', **IO), [lambda ud: setattr(holder[0].userdata, 'x', 'half achieved')])
+    machine = machine_of(Scripted('aborted', **IO),
+                         [lambda ud: setattr(holder[0].userdata, 'x', 'half achieved')])
     holder = [machine.machine]
     machine.run()
     assert machine.machine.userdata.x == 'at the start'
@@ -188,14 +191,16 @@ def test_what_the_expert_wrote_survives():
 def test_superseding_hands_on_the_experts_outputs_by_the_states_remapping():
     machine = smach.StateMachine(outcomes=['done', 'aborted'])
     with machine:
-        smach.StateMachine.add('A', Scripted('aborted', output_keys=['mine']), {'ok': 'done', 'preempted': 'aborted'},
-                               remapping={'mine': 'yours'})
-    Watched(machine, expert=FakeExpert(supersede('ok', outputs={'mine': 7})), settings={'max_recoveries': 0}).run()
-    assert machine.userdata._data == {'yours': 7}
+        smach.StateMachine.add('A', Scripted('aborted', output_keys=['mine']),
+                               {'ok': 'done', 'preempted': 'aborted'}, remapping={'mine': 'yours'})
+    Watched(machine, expert=FakeExpert(supersede('ok', outputs={'mine': 7})),
+            settings={'max_recoveries': 0}).run()
+    assert contents(machine.userdata) == {'yours': 7}
 
 
 def test_a_jump_to_a_state_never_entered_restores_nothing():
-    machine, _ = run([writes('x', 'half done', 'aborted')], expert=FakeExpert(goto('C')), max_recoveries=0)
+    machine, _ = run([writes('x', 'half done', 'aborted')], expert=FakeExpert(goto('C')),
+                     max_recoveries=0)
     assert machine.machine.userdata.x == 'half done'
     assert machine.of(EventKind.JUMP)[0].data['userdata'] == 'keep'
 
@@ -250,7 +255,8 @@ def test_the_dictionary_that_a_script_holds_on_to_is_restored_in_place():
 
 def test_missing_input_keys_of_the_target_are_said_before_the_jump():
     expert = FakeExpert(goto('C'))
-    machine = chain_of(Scripted(), Scripted('aborted'), Scripted(input_keys=['grasp', 'x'], outcomes=('ok',)))
+    machine = chain_of(Scripted(), Scripted('aborted'),
+                       Scripted(input_keys=['grasp', 'x'], outcomes=('ok',)))
     machine.userdata.x = 1
     machine = Watched(machine, expert=expert, settings={'max_recoveries': 0})
     machine.run()

@@ -1,8 +1,8 @@
 """The command line of oracle_run: what is ours, what is the script's."""
 import pytest
 
-from smach_oracle.ros import script_runner
-from smach_oracle.ros.script_runner import OPTIONS_WITH_VALUE, make_parser, parse, split
+from smach_oracle.ros.oracle_run import script_runner
+from smach_oracle.ros.oracle_run.script_runner import OPTIONS_WITH_VALUE, make_parser, parse, split
 
 
 @pytest.fixture
@@ -34,10 +34,14 @@ def test_every_option_that_takes_a_value_is_known_to_the_splitter():
 
 
 def test_options_become_settings_and_options_of_the_process(script, tmp_path):
-    run = parse(['--policy=algorithm1', '--rates-file', 'rates.json', '--no-nested', '--without-oracle',
-                 '--record', 'bags', '--record-topic', '/tf', '--record-topic', '/camera', '--config', 'o.yaml',
-                 script, '--n', '3'])
-    assert run.overrides == {'policy': 'algorithm1', 'rates_file': str(tmp_path / 'rates.json'), 'nested': False}
+    run = parse([
+        '--policy=algorithm1', '--rates-file', 'rates.json', '--no-nested', '--without-oracle',
+        '--record', 'bags', '--record-topic', '/tf', '--record-topic', '/camera', '--config',
+        'o.yaml', script, '--n', '3'
+    ])
+    assert run.overrides == {
+        'policy': 'algorithm1', 'rates_file': str(tmp_path / 'rates.json'), 'nested': False
+    }
     assert run.options == (str(tmp_path / 'bags'), ('/tf', '/camera'))
     assert (run.recover, run.config, run.script_args) == (False, 'o.yaml', ['--n', '3'])
 
@@ -50,7 +54,8 @@ def test_options_become_settings_and_options_of_the_process(script, tmp_path):
     (['no_such.py'], 'no_such.py: no such file'),
     (['--no-nested'], 'which SCRIPT'),
     (['__name:=x'], 'which SCRIPT'),
-    (['--config', 'o.yaml', 'none', '--speed', '2'], 'which SCRIPT? (under roslaunch: script:=FILE)'),
+    (['--config', 'o.yaml', 'none', '--speed', '2'
+      ], 'which SCRIPT? (under roslaunch: script:=FILE)'),
 ])
 def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
     with pytest.raises(SystemExit) as caught:
@@ -64,9 +69,11 @@ def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
     ('states:\n  PICK:\n    memory: 0\n', ['o.yaml line 3', 'states.PICK.memory', '0', 'from 1']),
     ('memory: [\n', ['o.yaml line', 'YAML']),
     ('high_from: 0.2\n', ['o.yaml line 1', 'high_from', '0.2', 'at least']),
-    ('states: {PICK: {preconditions: ["python:os"]}}\n', ['o.yaml line 1', 'python:os', 'module:attribute']),
+    ('states: {PICK: {preconditions: ["python:os"]}}\n',
+     ['o.yaml line 1', 'python:os', 'module:attribute']),
 ])
-def test_a_mistake_in_the_file_is_told_before_the_script_starts(script, tmp_path, capsys, text, parts):
+def test_a_mistake_in_the_file_is_told_before_the_script_starts(script, tmp_path, capsys, text,
+                                                                parts):
     (tmp_path / 'o.yaml').write_text(text)
     (tmp_path / 'task.py').write_text('raise AssertionError("started")\n')
     with pytest.raises(SystemExit) as caught:
@@ -99,15 +106,17 @@ def test_a_script_that_cannot_be_read_is_told_before_it_starts(script, monkeypat
     ('.', ['it is a folder']),
 ])
 @pytest.mark.parametrize('in_file', [True, False])
-def test_a_file_of_rates_that_cannot_be_written_is_told_before_the_script_starts(script, tmp_path, capsys, given,
-                                                                                 words, in_file):
+def test_a_file_of_rates_that_cannot_be_written_is_told_before_the_script_starts(
+        script, tmp_path, capsys, given, words, in_file):
     (tmp_path / 'task.py').write_text('raise AssertionError("started")\n')
     (tmp_path / 'o.yaml').write_text('memory: 5\nrates_file: {}\n'.format(given))
     with pytest.raises(SystemExit) as caught:
-        script_runner.main((['--config', 'o.yaml'] if in_file else ['--rates-file', given]) + [script])
+        script_runner.main((['--config', 'o.yaml'] if in_file else ['--rates-file', given]) +
+                           [script])
     error = capsys.readouterr().err
     assert caught.value.code == 2
-    assert all(word in error for word in words + ['o.yaml line 2' if in_file else 'command line']), error
+    assert all(word in error
+               for word in words + ['o.yaml line 2' if in_file else 'command line']), error
 
 
 def test_every_path_may_begin_with_the_home_folder(script, tmp_path, monkeypatch):
@@ -117,7 +126,8 @@ def test_every_path_may_begin_with_the_home_folder(script, tmp_path, monkeypatch
     assert (run.script, run.script_args) == (str(tmp_path / 'task.py'), ['~/as it is'])
     assert run.options.record == str(tmp_path / 'bags')
     assert script_runner.read_settings(run).rates_file == str(tmp_path / 'rates.json')
-    assert parse(['--rates-file', '~/r.json', script]).overrides['rates_file'] == str(tmp_path / 'r.json')
+    assert parse(['--rates-file', '~/r.json',
+                  script]).overrides['rates_file'] == str(tmp_path / 'r.json')
     script_runner.check(run)
 
 
@@ -126,4 +136,5 @@ def test_help_names_every_option(capsys):
         parse(['--help'])
     text = capsys.readouterr().out
     assert caught.value.code == 0
-    assert all(option in text for option in OPTIONS_WITH_VALUE + ('--no-nested', '--without-oracle', 'SCRIPT'))
+    assert all(option in text
+               for option in OPTIONS_WITH_VALUE + ('--no-nested', '--without-oracle', 'SCRIPT'))

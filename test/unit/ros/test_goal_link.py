@@ -1,10 +1,13 @@
 """What of a goal on its way counts as lost; no master."""
 import time
 
+import actionlib
 import pytest
+import rospy
 from actionlib import CommState
 
-from smach_oracle.ros import goal_link, settling
+from smach_oracle.msg import SharedAutonomyAction
+from smach_oracle.ros import connections
 from smach_oracle.ros.goal_link import GoalLink, SentGoal, _reaches
 
 
@@ -86,15 +89,23 @@ class FakeClient:
 
     def __init__(self):
         self.pub_goal, self.pub_cancel = FakePublisher('/server'), FakePublisher('/server')
-        self.status_sub, self.result_sub, self.feedback_sub = (FakeSubscriber('/server') for _ in range(3))
+        self.status_sub, self.result_sub, self.feedback_sub = (FakeSubscriber('/server')
+                                                               for _ in range(3))
 
 
 @pytest.fixture
-def link(monkeypatch):
-    monkeypatch.setattr(settling, 'SETTLE_S', 0.2)
-    link = GoalLink.__new__(GoalLink)
-    link._client, link._settling = FakeClient(), goal_link.Settling()
-    return link
+def client(monkeypatch):
+    """What a link is made of, connected to a server."""
+    monkeypatch.setattr(connections, 'GRACE_S', 0.2)
+    monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
+    client = FakeClient()
+    monkeypatch.setattr(actionlib, 'ActionClient', lambda *_: client)
+    return client
+
+
+@pytest.fixture
+def link(client):
+    return GoalLink('/server', SharedAutonomyAction)
 
 
 def ready_after_s(link):
@@ -111,16 +122,16 @@ def test_a_new_connection_is_given_time_to_be_known_to_the_server(link):
 @pytest.mark.parametrize('made_anew', [
     lambda client: setattr(client, 'result_sub', FakeSubscriber('/server')),
     lambda client: setattr(client.result_sub.connections[0], 'socket', object())])
-def test_a_connection_made_anew_is_given_that_time_again(link, made_anew):
+def test_a_connection_made_anew_is_given_that_time_again(client, link, made_anew):
     link.ready()
-    made_anew(link._client)
+    made_anew(client)
     assert ready_after_s(link) >= 0.2
 
 
 @pytest.mark.parametrize('topic', ['status_sub', 'result_sub', 'feedback_sub'])
-def test_a_topic_without_the_server_is_waited_for(link, topic):
-    getattr(link._client, topic).connections[0].callerid_pub = '/another'
+def test_a_topic_without_the_server_is_waited_for(client, link, topic):
+    connection, = getattr(client, topic).connections
+    connection.callerid_pub = '/another'
     assert not link.ready()
-    getattr(link._client, topic).connections[0].callerid_pub = '/server'
-    getattr(link._client, topic).connections[0].socket = None
+    connection.callerid_pub, connection.socket = '/server', None
     assert not link.ready(), 'a connection whose socket is gone'

@@ -1,13 +1,21 @@
-"""Settings from a file, the parameter server and the command line; every mistake says where it was made."""
+"""Settings from a file, the parameter server and the command line; every mistake says where it was
+made.
+"""
 import sys
 import types
 
 import pytest
 
-from smach_oracle.oracle.config import Settings
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.ros import settings as settings_module
-from smach_oracle.ros.settings import LoadedSettings, load_settings, read_param, read_yaml, resolve_python
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.ros import loaded_settings as settings_module
+from smach_oracle.ros.loaded_settings import (
+    LoadedSettings,
+    load_settings,
+    read_param,
+    read_yaml,
+    resolve_python,
+)
 
 
 class FakeParameterServer:
@@ -36,13 +44,16 @@ def node(monkeypatch):
         server = FakeParameterServer({'~' + name: value for name, value in values.items()})
         monkeypatch.setattr(settings_module.rospy, 'get_param', server.get_param)
         monkeypatch.setattr(settings_module.rospy.core, 'is_initialized', lambda: True)
-        monkeypatch.setattr(settings_module.rospy, 'resolve_name', lambda name: name.replace('~', '/robot/'))
+        monkeypatch.setattr(settings_module.rospy, 'resolve_name',
+                            lambda name: name.replace('~', '/robot/'))
     return be_node
 
 
 def test_a_file_is_read_as_it_is_written(write):
     path = write('policy: prose\nstates:\n  PICK: {memory: 4, preconditions: [DETECT]}\n')
-    assert load_settings(path) == {'policy': 'prose', 'states': {'PICK': {'memory': 4, 'preconditions': ['DETECT']}}}
+    assert load_settings(path) == {
+        'policy': 'prose', 'states': {'PICK': {'memory': 4, 'preconditions': ['DETECT']}}
+    }
 
 
 def test_an_empty_file_sets_nothing(write):
@@ -50,36 +61,36 @@ def test_an_empty_file_sets_nothing(write):
 
 
 def test_a_missing_file_is_named():
-    with pytest.raises(ConfigError, match='no_such_file.yaml.*readable YAML file'):
+    with pytest.raises(SettingsError, match='no_such_file.yaml.*readable YAML file'):
         read_yaml('no_such_file.yaml')
 
 
 def test_a_file_that_is_no_mapping_is_refused(write):
-    with pytest.raises(ConfigError, match='a mapping of settings'):
+    with pytest.raises(SettingsError, match='a mapping of settings'):
         read_yaml(write('- policy\n- prose\n'))
 
 
 def test_a_syntax_error_names_its_line(write):
-    with pytest.raises(ConfigError, match=r'oracle\.yaml line [23]: '):
+    with pytest.raises(SettingsError, match=r'oracle\.yaml line [23]: '):
         read_yaml(write('policy: prose\nstates: {PICK: [\n'))
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / 'oracle.yaml'
     path.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ConfigError, match='readable YAML file'):
+    with pytest.raises(SettingsError, match='readable YAML file'):
         read_yaml(str(path))
 
 
 @pytest.mark.parametrize('text', [
     'states: &a {PICK: *a}\n', 'x: ' + '[' * 3000 + '\n', 'memory: !!int many\n'])
 def test_a_file_that_no_yaml_reader_can_make_sense_of_is_refused_by_name(write, text):
-    with pytest.raises(ConfigError, match=r'oracle\.yaml'):
+    with pytest.raises(SettingsError, match=r'oracle\.yaml'):
         read_yaml(write(text))
 
 
 def test_an_object_from_a_file_is_never_made(write):
-    with pytest.raises(ConfigError, match='line 1'):
+    with pytest.raises(SettingsError, match='line 1'):
         read_yaml(write('policy: !!python/object/apply:os.getcwd []\n'))
 
 
@@ -91,7 +102,7 @@ def test_an_object_from_a_file_is_never_made(write):
      r'line 4: states\.A\.preconditions\[0\]\.check'),
 ])
 def test_a_key_given_twice_names_both_lines(write, text, place):
-    with pytest.raises(ConfigError, match=place):
+    with pytest.raises(SettingsError, match=place):
         read_yaml(write(text))
 
 
@@ -102,14 +113,15 @@ def test_the_same_key_in_different_mappings_is_no_repetition(write):
 
 
 def test_anchors_and_merge_keys_work(write):
-    values, _ = read_yaml(write('states:\n  A: &usual {memory: 4}\n  B:\n    <<: *usual\n    prior: 0.3\n'))
+    values, _ = read_yaml(
+        write('states:\n  A: &usual {memory: 4}\n  B:\n    <<: *usual\n    prior: 0.3\n'))
     assert values['states']['B'] == {'memory': 4, 'prior': 0.3}
 
 
 def test_a_wrong_value_names_file_line_key_value_and_what_is_allowed(write):
     path = write('policy: prose\nstates:\n  PICK:\n    memory: many\n')
     settings = load_settings(path)
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(SettingsError) as caught:
         Settings.from_dict(settings)
     text = str(settings.located(caught.value))
     for part in ('oracle.yaml line 4', 'states.PICK.memory', "'many'", 'a whole number'):
@@ -136,13 +148,19 @@ def test_the_file_is_not_changed_by_what_goes_over_it():
 
 def test_a_parameter_that_is_no_mapping_is_refused(node):
     node(oracle='prose')
-    with pytest.raises(ConfigError, match="parameter /robot/oracle: 'prose'.*mapping"):
+    with pytest.raises(SettingsError, match="parameter /robot/oracle: 'prose'.*mapping"):
         read_param('~oracle')
 
 
 def test_a_state_of_a_nested_machine_can_be_set_by_parameter(node):
     # set_param('~oracle', {'states': {'TASK/PICK': ...}}) comes back as states/TASK/PICK
-    node(oracle={'states': {'TASK': {'memory': 3, 'PICK': {'memory': 4}, 'ARM': {'MOVE': {'prior': 0.2}}}, 'X': {}}})
+    node(
+        oracle={
+            'states': {
+                'TASK': {'memory': 3, 'PICK': {'memory': 4}, 'ARM': {'MOVE': {'prior': 0.2}}},
+                'X': {}
+            }
+        })
     assert read_param('~oracle')['states'] == {
         'TASK': {'memory': 3}, 'TASK/PICK': {'memory': 4}, 'TASK/ARM/MOVE': {'prior': 0.2}, 'X': {}}
 
@@ -199,8 +217,9 @@ def test_a_name_that_leads_nowhere_says_why(checks_module, name, reason):
 
 
 def test_the_key_is_named_where_a_precondition_cannot_be_imported(write, checks_module):
-    settings = load_settings(write('states:\n  PICK:\n    preconditions: ["python:robot_checks:blind"]\n'))
-    with pytest.raises(ConfigError) as caught:
+    settings = load_settings(
+        write('states:\n  PICK:\n    preconditions: ["python:robot_checks:blind"]\n'))
+    with pytest.raises(SettingsError) as caught:
         Settings.from_dict(settings, resolve_python)
     text = str(settings.located(caught.value))
     assert 'line 3' in text and 'states.PICK.preconditions' in text and "has no 'blind'" in text

@@ -89,7 +89,10 @@ def test_a_registration_that_fails_half_way_is_tried_again(watch, link):
     assert link.registered == [ITEMS]
 
 
-@pytest.mark.parametrize('error', [OSError('no route'), ValueError('half an answer'), KeyError('odd')])
+@pytest.mark.parametrize(
+    'error',
+    [OSError('no route'), ValueError('half an answer'),
+     KeyError('odd')])
 def test_whatever_a_dying_master_answers_the_watch_goes_on(watch, link, error):
     link.error = error
     watch.check()

@@ -4,12 +4,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from waiting import wait_for
 
-from smach_oracle.ros import process_keeper
-from smach_oracle.ros.process_keeper import descendants
+from smach_oracle.ros.interfaces import process_keeper
+from smach_oracle.ros.interfaces.process_keeper import descendants
 
 KEEPER = [sys.executable, '-I', process_keeper.__file__, '1', '0.5']
 STUBBORN = '''
@@ -31,7 +31,8 @@ def stubborn(tmp_path):
 
 
 def begin(command, **options):
-    return subprocess.Popen(KEEPER + command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
+    return subprocess.Popen(KEEPER + command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                            text=True, **options)
 
 
 def two_pids(stream):
@@ -40,10 +41,8 @@ def two_pids(stream):
 
 
 def all_gone(pids, limit_s=20.0):
-    until_s = time.monotonic() + limit_s
-    while any(os.path.exists('/proc/{}'.format(pid)) for pid in pids) and time.monotonic() < until_s:
-        time.sleep(0.02)
-    return not any(os.path.exists('/proc/{}'.format(pid)) for pid in pids)
+    return wait_for(lambda: not any(os.path.exists('/proc/{}'.format(pid)) for pid in pids),
+                    limit_s)
 
 
 def test_what_ignores_every_signal_is_gone_when_the_pipe_closes(stubborn):
@@ -56,8 +55,11 @@ def test_what_ignores_every_signal_is_gone_when_the_pipe_closes(stubborn):
 
 
 def test_it_is_asked_to_end_before_it_is_forced(tmp_path):
-    keeper = begin(['sh', '-c', 'trap "echo in order > {}; exit" INT; echo up; while :; do sleep 0.05; done'.format(
-        tmp_path / 'end')])
+    keeper = begin([
+        'sh', '-c',
+        'trap "echo in order > {}; exit" INT; echo up; while :; do sleep 0.05; done'.format(
+            tmp_path / 'end')
+    ])
     assert keeper.stdout.readline() == 'up\n'
     keeper.stdin.close()
     keeper.wait(20)
@@ -66,9 +68,10 @@ def test_it_is_asked_to_end_before_it_is_forced(tmp_path):
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
 def test_nothing_is_left_when_whoever_started_it_is_killed(stubborn, number):
-    parent = subprocess.Popen([sys.executable, '-c', 'import subprocess, sys, time; subprocess.Popen(sys.argv[1:], '
-                               'stdin=subprocess.PIPE, start_new_session=True); time.sleep(600)', *KEEPER, *stubborn],
-                              stdout=subprocess.PIPE, text=True)
+    parent = subprocess.Popen([
+        sys.executable, '-c', 'import subprocess, sys, time; subprocess.Popen(sys.argv[1:], '
+        'stdin=subprocess.PIPE, start_new_session=True); time.sleep(600)', *KEEPER, *stubborn
+    ], stdout=subprocess.PIPE, text=True)
     pids = two_pids(parent.stdout)
     parent.send_signal(number)
     parent.wait(10)
@@ -88,15 +91,12 @@ def test_a_command_that_is_not_there_is_named():
     assert keeper.wait(20) == 127
 
 
-
 def test_a_name_that_is_cut_within_a_letter_hides_nothing(tmp_path):
     program = str(tmp_path / ('é' * 10))  # the system keeps 15 bytes of it
     shutil.copy(shutil.which('sleep'), program)
     keeper = begin([program, '600'])
     try:
-        until_s = time.monotonic() + 20.0
-        while not names_of(keeper.pid) and time.monotonic() < until_s:
-            time.sleep(0.02)
+        wait_for(lambda: names_of(keeper.pid), 20.0)
         assert names_of(keeper.pid) == [b'(' + 'é'.encode() * 7 + 'é'.encode()[:1] + b')']
     finally:
         keeper.stdin.close()

@@ -5,6 +5,8 @@ import pytest
 import rospy
 from waiting import wait_for
 
+import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.ros.publishers import RatesPublisher
 
 
@@ -14,7 +16,7 @@ class FakeTopic:
         self.told = []
 
     def publish(self, message):
-        self.told.append(message.transitions[0].count)
+        self.told.append(message.transitions[0].count if message.transitions else 0)
 
     def unregister(self):
         """Nobody listens."""
@@ -37,7 +39,8 @@ class Machine:
         rows = [('TOP', 'PICK', 'succeeded', 'PLACE', self.visits)]
         if not self.looked.is_set():
             self.looked.set()
-            self.go_on.wait(0.5)  # for ever would be a deadlock, since the other one waits for this one
+            # for ever would be a deadlock, since the other one waits for this one
+            self.go_on.wait(0.5)
         return rows
 
 
@@ -59,3 +62,13 @@ def test_what_was_learned_last_is_what_stays_latched(publisher):
     machine.go_on.set()
     told = publisher._publisher.told
     assert wait_for(lambda: len(told) == 2, 20.0) and told == [1, 2]
+
+
+def test_a_wrapped_machine_is_published_when_its_trial_ends(publisher):
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        smach.StateMachine.add('PICK', smach.CBState(lambda *_: 'succeeded',
+                                                     outcomes=['succeeded']))
+    publisher.watch(OracleContainer.wrap(machine))
+    assert machine.execute() == 'succeeded'
+    assert publisher._publisher.told[-1] == 1

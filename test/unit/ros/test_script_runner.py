@@ -1,4 +1,6 @@
-"""Scripts under oracle_run, in a process without a ROS master: they run as they run by themselves."""
+"""Scripts under oracle_run, in a process without a ROS master: they run as they run by
+themselves.
+"""
 import os
 import subprocess
 import sys
@@ -6,7 +8,7 @@ import textwrap
 
 import pytest
 
-RUNNER = 'from smach_oracle.ros.script_runner import main; main()'
+RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
 PRELUDE = '''
 import smach
 smach.set_loggers(*[lambda text, *args: None] * 4)
@@ -35,8 +37,9 @@ def run(tmp_path):
         path.write_text(PRELUDE + textwrap.dedent(text))
         command = [sys.executable] if directly else [sys.executable, '-c', RUNNER] + list(options)
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
-        return subprocess.run(command + [name] + list(args), cwd=str(tmp_path), env=environment, timeout=60,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+        return subprocess.run(command + [name] + list(args), cwd=str(tmp_path), env=environment,
+                              timeout=60, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                              universal_newlines=True)
     return run_script
 
 
@@ -63,7 +66,8 @@ def both(run, text, *args):
 ])
 def test_a_script_behaves_as_when_it_runs_by_itself(run, text):
     under, alone = both(run, text, '--config', 'x', '_rate:=5')
-    assert (under.returncode, under.stdout, under.stderr) == (alone.returncode, alone.stdout, alone.stderr)
+    assert (under.returncode, under.stdout, under.stderr) == (alone.returncode, alone.stdout,
+                                                              alone.stderr)
 
 
 def test_a_syntax_error_is_shown_as_python_shows_it(run):
@@ -89,7 +93,8 @@ def test_without_an_expert_a_machine_ends_as_it_would_have(run):
 
 
 def test_the_scripts_handle_is_the_wrapped_machine(run):
-    result = run('''
+    result = run(
+        '''
         sm = machine('aborted')
         sm.userdata.box = 3
         print(sm.execute(), type(sm).__name__, sm.name, sm.userdata.box, isinstance(sm, smach.StateMachine))
@@ -115,7 +120,8 @@ def test_an_execute_of_the_authors_own_runs_once(run):
         print(machine('aborted', cls=Mine).execute())
         print(machine('aborted', cls=Mixed).execute())
     ''')
-    assert result.stdout.split() == ['before', 'after', 'succeeded', 'mixed', 'in', 'succeeded'], result.stderr
+    assert result.stdout.split() == ['before', 'after', 'succeeded', 'mixed', 'in',
+                                     'succeeded'], result.stderr
 
 
 def test_machines_in_threads_are_wrapped(run):
@@ -160,12 +166,15 @@ def test_nested_machines_are_wrapped_unless_told_otherwise(run):
     "top = smach.Concurrence(outcomes=['succeeded', 'aborted'], default_outcome='aborted',\n"
     "                        outcome_map={'succeeded': {'INNER': 'succeeded'}})\n"
     "with top:\n    smach.Concurrence.add('INNER', inner)",
-    "top = smach.Iterator(outcomes=['succeeded', 'aborted', 'preempted'], input_keys=[], output_keys=[], it=[1, 2],\n"
+    "top = smach.Iterator(outcomes=['succeeded', 'aborted', 'preempted'], input_keys=[], "
+    "output_keys=[], it=[1, 2],\n"
     "                     it_label='i', exhausted_outcome='succeeded')\n"
-    "with top:\n    smach.Iterator.set_contained_state('INNER', inner, loop_outcomes=['succeeded'])",
+    "with top:\n    smach.Iterator.set_contained_state('INNER', inner, "
+    "loop_outcomes=['succeeded'])",
 ])
 def test_machines_inside_a_concurrence_or_an_iterator_at_the_top_are_wrapped(run, add):
-    result = run("inner = machine('aborted')\n" + add + "\nprint(top.execute(), hasattr(inner, 'rates'))")
+    result = run("inner = machine('aborted')\n" + add +
+                 "\nprint(top.execute(), hasattr(inner, 'rates'))")
     assert result.stdout == 'succeeded True\n', result.stderr
 
 
@@ -205,7 +214,8 @@ def test_learned_rates_are_kept_across_runs(run):
 
 
 def test_a_script_that_is_no_node_is_recorded_too(run, tmp_path):
-    result = run('print(machine("aborted").execute(), machine().execute())', options=['--record', 'bags'])
+    result = run('print(machine("aborted").execute(), machine().execute())',
+                 options=['--record', 'bags'])
     assert result.stdout == 'succeeded succeeded\n', result.stderr
     assert len(list((tmp_path / 'bags').glob('*.bag'))) == 2
 

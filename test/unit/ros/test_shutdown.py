@@ -1,4 +1,6 @@
-"""A process with a ShutdownGuard ends in time, whatever its main thread does. Real processes, real signals."""
+"""A process with a ShutdownGuard ends in time, whatever its main thread does. Real processes, real
+signals.
+"""
 import signal
 import subprocess
 import sys
@@ -6,7 +8,7 @@ import textwrap
 import time
 
 import pytest
-from waiting import wait_for
+from waiting import asleep, stays, wait_for
 
 from smach_oracle.ros.shutdown import ShutdownGuard
 
@@ -40,12 +42,15 @@ ENDS_ON_SIGNAL = "say('ready'); time.sleep(60)"
 
 
 def run_and_signal(body, number):
-    """Run a program, send the signal once it is ready; returns exit code, its output and how long it took to end."""
-    process = subprocess.Popen([sys.executable, '-c', PRELUDE + textwrap.dedent(body)], stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, universal_newlines=True)
+    """Run a program, send the signal once it is ready; returns exit code, its output and how long
+    it took to end.
+    """
+    process = subprocess.Popen([sys.executable, '-c', PRELUDE + textwrap.dedent(body)],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               universal_newlines=True)
     try:
         lines = [process.stdout.readline().strip()]
-        time.sleep(0.2)
+        assert wait_for(lambda: asleep(process.pid))
         sent = time.monotonic()
         process.send_signal(number)
         output, _ = process.communicate(timeout=60)
@@ -112,13 +117,10 @@ def test_only_the_first_signal_counts():
     guard.arm(130)
     guard.arm(143)
     assert wait_for(lambda: 130 in calls)
-    time.sleep(0.5)  # for a second end
-    assert calls == ['preempt', 'close', 130]
+    assert stays(lambda: calls == ['preempt', 'close', 130], 0.5), 'there is no second end'
 
 
 def test_a_close_that_hangs_does_not_hold_the_end_up():
-    code, _, in_time = ends_within(2.0, 'guard._close = lambda limit_s: time.sleep(60)\n' + NEVER_RETURNS,
-                                   signal.SIGTERM)
+    code, _, in_time = ends_within(
+        2.0, 'guard._close = lambda limit_s: time.sleep(60)\n' + NEVER_RETURNS, signal.SIGTERM)
     assert code == 128 + signal.SIGTERM and in_time
-
-

@@ -1,6 +1,7 @@
 """The messages that stand in for upstream's are upstream's to every other node: the same sums."""
-import control_msgs.msg
 import pytest
+
+import control_msgs.msg
 import smach_msgs.msg
 
 SUMS = {

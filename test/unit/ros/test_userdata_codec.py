@@ -9,7 +9,13 @@ from std_msgs.msg import String
 
 from smach_oracle.msg import UserdataItem
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.ros.userdata_codec import UserdataCodecError, decode, decode_all, encode, encode_all
+from smach_oracle.ros.userdata_codec import (
+    UserdataCodecError,
+    decode,
+    decode_all,
+    encode,
+    encode_all,
+)
 
 
 def over_the_wire(item):
@@ -19,7 +25,9 @@ def over_the_wire(item):
 
 
 @pytest.mark.parametrize('value', [
-    None, True, 0, -3, 1.5, '', 'Tür ✓', [], {}, [1, [2, {'a': None}]], {'x': {'y': [1.25, 'z']}}, 10 ** 30])
+    None, True, 0, -3, 1.5, '', 'Tür ✓', [], {}, [1, [2, {'a': None}]], {'x': {'y': [1.25, 'z']}},
+    10**30
+])
 def test_plain_data_arrives_as_it_was(value):
     item = over_the_wire(encode('key', value))
     assert item.encoding == UserdataItem.JSON
@@ -56,9 +64,11 @@ def deep(levels):
     return value
 
 
-@pytest.mark.parametrize('value, type_name', [
-    (Opaque(), __name__ + '.Opaque'), (b'bytes', 'bytes'), ({1: 'a'}, 'dict'), ({1, 2}, 'set'), (math.nan, 'float'),
-    ([math.inf], 'list'), ([1, Opaque()], 'list'), (cyclic(), 'list'), (deep(5000), 'list')])
+@pytest.mark.parametrize('value, type_name', [(Opaque(), __name__ + '.Opaque'), (b'bytes', 'bytes'),
+                                              ({1: 'a'}, 'dict'), ({1, 2}, 'set'),
+                                              (math.nan, 'float'), ([math.inf], 'list'),
+                                              ([1, Opaque()], 'list'), (cyclic(), 'list'),
+                                              (deep(5000), 'list')])
 def test_what_fits_neither_is_named_and_not_sent(value, type_name):
     item = encode('key', value)
     assert (item.encoding, item.type, bytes(item.value)) == (UserdataItem.UNSENT, type_name, b'')
@@ -67,7 +77,8 @@ def test_what_fits_neither_is_named_and_not_sent(value, type_name):
 def test_a_value_above_the_limit_is_named_and_not_sent():
     assert encode('text', 'x' * 5000, 4096).encoding == UserdataItem.UNSENT
     assert encode('text', 'x' * 4000, 4096).encoding == UserdataItem.JSON
-    assert encode('wide', '\u00e4' * 1000, 4096).encoding == UserdataItem.UNSENT  # six bytes each in JSON
+    # six bytes each in JSON
+    assert encode('wide', '\u00e4' * 1000, 4096).encoding == UserdataItem.UNSENT
     item = encode('message', String('x' * 5000), 4096)
     assert (item.encoding, item.type) == (UserdataItem.UNSENT, 'std_msgs/String')
 

@@ -1,18 +1,26 @@
-"""The scripted expert's hand and eye in one process with the world, without ROS: the same drive, the same truth."""
+"""The scripted expert's hand and eye in one process with the world, without ROS: the same drive,
+the same truth.
+"""
 from pathlib import Path
 
 import numpy as np
 import yaml
 
-from smach_oracle.expert.teleoperation import CartesianDrive, DriveLimits, pulled_back
-from smach_oracle.geometry.chain import Chain, read_joints
+from smach_oracle.geometry.chain import JointChain
+from smach_oracle.geometry.joints import read_joints
 from smach_oracle.geometry.links import link_pose
 from smach_oracle.geometry.transforms import inverse
-from smach_oracle.simulation.operator.pilot import Grip
-from smach_oracle.simulation.operator.sight import Seen, Sight
-from smach_oracle.simulation.robot.pr2_model import pr2_urdf
+from smach_oracle.interfaces.manipulation.cartesian_drive import (
+    CartesianDrive,
+    DriveLimits,
+    pulled_back,
+)
+from smach_oracle.pr2.model.pr2_model import pr2_urdf
+from smach_oracle.scripted_operator.hand_driver import GripResult
+from smach_oracle.scripted_operator.true_scene import TrueBody, TrueScene
 
-SETTINGS = yaml.safe_load((Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text())
+SETTINGS = yaml.safe_load(
+    (Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text())
 PERIODS = 2  # of the world, for one of the hand
 
 
@@ -29,7 +37,7 @@ class DirectHand:
         text = pr2_urdf().read_text()
         self._tree = read_joints(text)
         self._names = names
-        self._chain = Chain.from_urdf(text, names['base'], names['tool'])
+        self._chain = JointChain.from_urdf(text, names['base'], names['tool'])
         self._drive = CartesianDrive(self._chain, DriveLimits(**SETTINGS['limits']),
                                      posture=np.array(names['posture']))
         self._targets = self._measured()
@@ -63,16 +71,17 @@ class DirectHand:
             if abs(now - before) < 1e-4:
                 break
             before = now
-        return Grip(now, now > gap + 0.004)
+        return GripResult(now, now > gap + 0.004)
 
 
-def look(world):
+def read_scene(world):
     """Everything, as the eye sees it."""
     base = inverse(world.true_base())
     bodies = {}
     for name in world.body_names:
         body = world.body(name)
-        size = body.size if body.shape == 'box' else (2 * body.size[0], 2 * body.size[1], body.size[2])
-        bodies[name] = Seen(name, base @ world.body_pose(name), tuple(size), name in world.movable(),
-                            world.holding(name))
-    return Sight(bodies, world.scene.seed, world.scene.goal.body)
+        size = body.size if body.shape == 'box' else (2 * body.size[0], 2 * body.size[1],
+                                                      body.size[2])
+        bodies[name] = TrueBody(name, base @ world.body_pose(name), tuple(size), name
+                                in world.movable(), world.holding(name))
+    return TrueScene(bodies, world.scene.seed, world.scene.goal.body)

@@ -1,9 +1,9 @@
-"""Driving a hand by velocities: no hand, however odd, keeps the pilot for ever."""
+"""Driving a hand by velocities: no hand, however odd, keeps the driver for ever."""
 import numpy as np
 import pytest
 
 from smach_oracle.geometry.transforms import transform
-from smach_oracle.simulation.operator.pilot import Pilot, Stuck
+from smach_oracle.scripted_operator.hand_driver import HandDriver, StuckError
 
 
 class Hand:
@@ -28,13 +28,13 @@ class Hand:
 
 def test_a_hand_that_obeys_comes_to_its_place_and_stays_there():
     hand = Hand()
-    Pilot(hand).come_to(np.array([0.3, 0.0, 0.1]))
+    HandDriver(hand).come_to(np.array([0.3, 0.0, 0.1]))
     assert hand.at == pytest.approx([0.3, 0.0, 0.1], abs=0.01) and hand.moves < 200
 
 
 def test_a_hand_that_sways_on_is_taken_as_it_is_or_given_up():
     hand = Hand(sway=0.02)
-    Pilot(hand).come_to(np.array([0.3, 0.0, 0.1]))
+    HandDriver(hand).come_to(np.array([0.3, 0.0, 0.1]))
     assert hand.moves <= 900
-    with pytest.raises(Stuck, match='cm away'):
-        Pilot(Hand(sway=0.2)).come_to(np.array([0.3, 0.0, 0.1]))
+    with pytest.raises(StuckError, match='cm away'):
+        HandDriver(Hand(sway=0.2)).come_to(np.array([0.3, 0.0, 0.1]))

@@ -1,16 +1,18 @@
-"""The scripted operator's hand in the kitchen, without ROS: a drink taken off its shelf, and handed over."""
+"""The scripted operator's hand in the kitchen, without ROS: a drink taken off its shelf, and handed
+over.
+"""
 import numpy as np
 import pytest
-from direct_hand import DirectHand, look
+from direct_hand import DirectHand, read_scene
 
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.simulation.operator.manoeuvres import Attempt, Failed, pull_out, put_down
-from smach_oracle.simulation.operator.pilot import Pilot
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.fridge import DOOR_JOINT
-from smach_oracle.simulation.world.judge import judge
-from smach_oracle.simulation.world.kitchen_scene import draw
-from smach_oracle.simulation.world.physics import World
+from smach_oracle.scripted_operator.hand_driver import HandDriver
+from smach_oracle.scripted_operator.manoeuvres import Attempt, ManoeuvreError, pull_out, put_down
+from smach_oracle.simulation.physics.judge import judge
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
+from smach_oracle.simulation.scenes.kitchen_scene import draw
 from smach_oracle.tasks.drink_retrieval import HOME, IN_THE_FRIDGE, OUT_OF_THE_FRIDGE, TORSO_HEIGHT
 
 
@@ -25,27 +27,29 @@ def before_the_shelf(seed):
     """A benign kitchen with its door open and the robot before the drinks."""
     scene = draw(seed, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, 1.7),))
-    joints = tuple((name, TORSO_HEIGHT if name == 'torso_lift_joint' else at) for name, at in scene.robot.joints)
+    joints = tuple((name, TORSO_HEIGHT if name == 'torso_lift_joint' else at)
+                   for name, at in scene.robot.joints)
     return scene._replace(bodies=(fridge,) + scene.bodies[1:],
                           robot=scene.robot._replace(joints=joints, base=IN_THE_FRIDGE))
 
 
 def attempt(world, number=0, sigma=0.004):
     generator = np.random.default_rng(number)
-    return Attempt(Pilot(DirectHand(world, 'right')), lambda: look(world), number,
+    return Attempt(HandDriver(DirectHand(world, 'right')), lambda: read_scene(world), number,
                    lambda: generator.normal(0.0, sigma, 3))
 
 
 def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(world):
     world.reset(before_the_shelf(3))
-    pull_out(attempt(world), lambda sight: sight.bodies['drink_0'])
+    pull_out(attempt(world), lambda scene: scene.bodies['drink_0'])
     assert world.holding('drink_0') == 'right'
     robot = DirectRobot(world)
     for x, y, yaw in (OUT_OF_THE_FRIDGE, HOME):
         robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
-    sight = look(world)
-    palm, drink = sight.bodies['palm'], sight.held_by('right')
-    put_down(attempt(world), np.array([palm.centre[0], palm.centre[1], palm.top + drink.size[2] / 2]))
+    scene = read_scene(world)
+    palm, drink = scene.bodies['palm'], scene.held_by('right')
+    put_down(attempt(world),
+             np.array([palm.centre[0], palm.centre[1], palm.top + drink.size[2] / 2]))
     verdict = judge(world, world.scene.goal)
     assert verdict.success, verdict.why
 
@@ -53,7 +57,7 @@ def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(worl
 def test_a_hand_that_misses_in_the_fridge_comes_out_open(world):
     world.reset(before_the_shelf(3))
     at = attempt(world)._replace(slip=lambda: np.array([0.0, 0.0, 0.10]))
-    with pytest.raises(Failed, match='closed on nothing'):
-        pull_out(at, lambda sight: sight.bodies['drink_0'])
+    with pytest.raises(ManoeuvreError, match='closed on nothing'):
+        pull_out(at, lambda scene: scene.bodies['drink_0'])
     assert world.gap('right') > 0.07
     assert not [each for each in world.contacts('fridge') if each.other == 'robot']

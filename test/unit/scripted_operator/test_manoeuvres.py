@@ -1,15 +1,23 @@
-"""The scripted operator's hand in the world, without ROS: it takes things, puts them down, and knows when it failed."""
+"""The scripted operator's hand in the world, without ROS: it takes things, puts them down, and
+knows when it failed.
+"""
 import numpy as np
 import pytest
-from direct_hand import DirectHand, look
+from direct_hand import DirectHand, read_scene
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.simulation.operator.manoeuvres import Attempt, Failed, grasps, pick, put_down
-from smach_oracle.simulation.operator.pilot import Pilot, Stuck
-from smach_oracle.simulation.world.judge import judge
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.tabletop_scene import GOAL, TABLE_TOP, draw
+from smach_oracle.scripted_operator.hand_driver import HandDriver, StuckError
+from smach_oracle.scripted_operator.manoeuvres import (
+    Attempt,
+    ManoeuvreError,
+    grasps,
+    pick,
+    put_down,
+)
+from smach_oracle.simulation.physics.judge import judge
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.scenes.tabletop_scene import GOAL, TABLE_TOP, draw
 
 
 @pytest.fixture(scope='module', name='world')
@@ -21,7 +29,7 @@ def make_world():
 
 def attempt(world, number=0, sigma=0.004):
     generator = np.random.default_rng(number)
-    return Attempt(Pilot(DirectHand(world, 'right')), lambda: look(world), number,
+    return Attempt(HandDriver(DirectHand(world, 'right')), lambda: read_scene(world), number,
                    lambda: generator.normal(0.0, sigma, 3))
 
 
@@ -29,41 +37,44 @@ def attempt(world, number=0, sigma=0.004):
 def test_a_thing_is_taken_and_put_down_where_it_shall_stand(world, seed):
     world.reset(draw(seed, benign=True))
     at = attempt(world)
-    pick(at, lambda sight: sight.bodies['object_0'])
+    pick(at, lambda scene: scene.bodies['object_0'])
     assert world.holding('object_0') == 'right'
-    assert look(world).bodies['object_0'].bottom > TABLE_TOP + 0.08
+    assert read_scene(world).bodies['object_0'].bottom > TABLE_TOP + 0.08
     put_down(at, np.array([GOAL[0], GOAL[1], TABLE_TOP + world.body('object_0').size[2] / 2]))
     assert judge(world, world.scene.goal).success
-    assert not [name for name in world.movable() if not look(world).bodies[name].upright], 'nothing fell over'
+    assert not [name for name in world.movable() if not read_scene(world).bodies[name].upright
+                ], 'nothing fell over'
 
 
 def test_a_hand_that_misses_says_so_and_comes_away_open(world):
     world.reset(draw(2, benign=True))
     at = attempt(world)._replace(slip=lambda: np.array([0.0, 0.0, 0.12]))
-    with pytest.raises(Failed, match='closed on nothing'):
-        pick(at, lambda sight: sight.bodies['object_0'])
+    with pytest.raises(ManoeuvreError, match='closed on nothing'):
+        pick(at, lambda scene: scene.bodies['object_0'])
     assert world.gap('right') > 0.07 and world.holding('object_0') == ''
 
 
 def test_nothing_to_take_and_nothing_to_put_down(world):
     world.reset(draw(2, benign=True))
-    with pytest.raises(Failed, match='nothing to take'):
-        pick(attempt(world), lambda sight: None)
-    with pytest.raises(Failed, match='holds nothing'):
+    with pytest.raises(ManoeuvreError, match='nothing to take'):
+        pick(attempt(world), lambda scene: None)
+    with pytest.raises(ManoeuvreError, match='holds nothing'):
         put_down(attempt(world), np.array([0.6, -0.35, 0.8]))
 
 
 def test_a_place_beyond_reach_is_told_with_what_stopped_the_hand(world):
     world.reset(draw(2, benign=True))
-    with pytest.raises(Stuck, match='the hand stays .* cm'):
-        Pilot(DirectHand(world, 'right')).go(from_rpy((1.8, 0.0, 1.0)))
+    with pytest.raises(StuckError, match='the hand stays .* cm'):
+        HandDriver(DirectHand(world, 'right')).go(from_rpy((1.8, 0.0, 1.0)))
 
 
 def test_grasps_avoid_what_stands_beside_and_before():
     can = UprightBox(np.array([0.6, -0.1, 0.78]), np.array([0.06, 0.06, 0.12]), 0.0)
     alone = grasps(can, [], 'right')[0]
-    before = UprightBox(alone[:3, 3] - 0.09 * alone[:3, 0] * [1, 1, 0], np.array([0.06, 0.06, 0.12]), 0.0)
+    before = UprightBox(alone[:3, 3] - 0.09 * alone[:3, 0] * [1, 1, 0], np.array([0.06, 0.06,
+                                                                                  0.12]), 0.0)
     past = grasps(can, [before], 'right')[0]
-    assert abs(np.arctan2(*past[1::-1, 0]) - np.arctan2(*alone[1::-1, 0])) > 0.2 or past[2, 0] < alone[2, 0] - 0.2
+    assert abs(np.arctan2(*past[1::-1, 0]) -
+               np.arctan2(*alone[1::-1, 0])) > 0.2 or past[2, 0] < alone[2, 0] - 0.2
     wide = can._replace(size=np.array([0.2, 0.2, 0.12]))
     assert grasps(wide, [], 'right') == []

@@ -1,4 +1,6 @@
-"""The scripted operator when others fail it: a world or an interface that does not answer must not end the trial."""
+"""The scripted operator when others fail it: a world or an interface that does not answer must not
+end the trial.
+"""
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,12 +9,12 @@ import rospy
 from geometry_msgs.msg import Point, PoseStamped
 
 from smach_oracle.msg import OpenQuery
-from smach_oracle.simulation.operator.eye import EyeError
-from smach_oracle.simulation.operator.node import Operator
-from smach_oracle.simulation.operator.plans import Means, Plans
-from smach_oracle.simulation.operator.sight import Sight
-from smach_oracle.simulation.operator.topic_hand import Interrupted
-from smach_oracle.simulation.operator.work import Job, do, point_in_base
+from smach_oracle.scripted_operator.ground_truth import GroundTruthError
+from smach_oracle.scripted_operator.manual_task import ManualTask, carry_out, point_in_base
+from smach_oracle.scripted_operator.node import ScriptedOperator
+from smach_oracle.scripted_operator.state_plans import StatePlan, StatePlans
+from smach_oracle.scripted_operator.topic_hand import GoalEndedError
+from smach_oracle.scripted_operator.true_scene import TrueScene
 
 QUESTION = SimpleNamespace(key='r/q1', status=OpenQuery.PENDING, goal=SimpleNamespace(
     failed_state='PICK', container_path='SM', robot='r', trial_id='t'))
@@ -42,40 +44,47 @@ class Questions:
         return SimpleNamespace(ok=False)
 
 
-class Eye:
+class World:
     """Blind at first."""
 
     def __init__(self, blind):
         self.looks = 0
         self._blind = blind
 
-    def look(self):
+    def read_scene(self):
         self.looks += 1
         if self.looks <= self._blind:
-            raise EyeError('the world does not answer')
-        return Sight({}, 1, '')
+            raise GroundTruthError('the world does not answer')
+        return TrueScene({}, 1, '')
 
 
 @pytest.mark.parametrize('blind, looks, claims', [(0, 1, 1), (2, 3, 1), (9, 3, 0)])
-def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_ever(blind, looks, claims):
-    questions, eye = Questions(10), Eye(blind)
+def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_ever(
+        blind, looks, claims):
+    questions, world = Questions(10), World(blind)
     with pytest.raises(KeyboardInterrupt):
-        Operator(SimpleNamespace(seed=1), questions, eye, None).run()
-    assert (eye.looks, questions.claims) == (looks, claims)
+        ScriptedOperator(SimpleNamespace(seed=1), questions, world, None).run()
+    assert (world.looks, questions.claims) == (looks, claims)
 
 
-@pytest.mark.parametrize('offered, told', [
-    (['eye', 'hand'], "PICK: means take needs an interface offered under the name 'manipulation'; offered: eye, hand"),
-    ([], "'manipulation'; offered: none"), (['manipulation'], ''), (['perception', 'manipulation'], '')])
-def test_where_an_interface_has_another_name_it_says_so_once_and_tries_without(monkeypatch, offered, told):
+@pytest.mark.parametrize('offered, told', [([
+    'eye', 'hand'
+], "PICK: means take needs an interface offered under the name 'manipulation'; offered: eye, hand"),
+                                           ([], "'manipulation'; offered: none"),
+                                           (['manipulation'], ''),
+                                           (['perception', 'manipulation'], '')])
+def test_where_an_interface_has_another_name_it_says_so_once_and_tries_without(
+        monkeypatch, offered, told):
     warned = []
     monkeypatch.setattr(rospy, 'logwarn', lambda text, *what: warned.append(text % what))
-    settings = SimpleNamespace(plans=Plans({'PICK': {'means': 'take'}}), most_questions=9)
-    operator = Operator(settings, None, None, None)
+    settings = SimpleNamespace(plans=StatePlans({'PICK': {'means': 'take'}}), most_questions=9)
+    operator = ScriptedOperator(settings, None, None, None)
     goal = SimpleNamespace(failed_state='PICK', choices=[SimpleNamespace(state='PICK', blocked='')],
                            interfaces=[SimpleNamespace(name=name) for name in offered])
-    decisions = [operator._decide(SimpleNamespace(goal=goal), 0, Sight({}, 1, '')) for _ in range(2)]
-    assert all(bool(decision.interface) != bool(told) for decision in decisions)
+    answers = [
+        operator._plan_answer(SimpleNamespace(goal=goal), 0, TrueScene({}, 1, '')) for _ in range(2)
+    ]
+    assert all(bool(answer.interface) != bool(told) for answer in answers)
     assert len(warned) == bool(told) and told in ''.join(warned)
 
 
@@ -89,15 +98,18 @@ class Settled:
         self.gave_up.append(text)
 
 
-@pytest.mark.parametrize('fault', [Interrupted('no frame within 20 s'), rospy.ServiceException('gone')])
-def test_an_interface_that_fails_under_the_hands_is_given_up_so_that_the_question_is_asked_again(fault):
-    def take_frame(_limit_s):
+@pytest.mark.parametrize('fault',
+                         [GoalEndedError('no image within 20 s'),
+                          rospy.ServiceException('gone')])
+def test_an_interface_that_fails_under_the_hands_is_given_up_so_that_the_question_is_asked_again(
+        fault):
+    def take_image(_limit_s):
         raise fault
     settled = Settled()
-    interfaces = SimpleNamespace(drawing=SimpleNamespace(take_frame=take_frame), drawing_settling=settled,
-                                 hand_settling=None)
-    job = Job('q1', Means('show'), {}, 0, np.random.default_rng(1))
-    assert do(job, interfaces, None) == str(fault)
+    interfaces = SimpleNamespace(perception=SimpleNamespace(take_image=take_image),
+                                 perception_finish=settled, hand_finish=None)
+    task = ManualTask('q1', StatePlan('show'), {}, 0, np.random.default_rng(1))
+    assert carry_out(task, interfaces, None) == str(fault)
     assert settled.gave_up == [str(fault)]
 
 

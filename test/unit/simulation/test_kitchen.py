@@ -1,4 +1,6 @@
-"""The kitchen of the second use case: its map, its scenes, the door as it is seen, and the task from end to end."""
+"""The kitchen of the second use case: its map, its scenes, the door as it is seen, and the task
+from end to end.
+"""
 import collections
 import itertools
 
@@ -9,21 +11,22 @@ from std_msgs.msg import Header
 
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal, PickGoal
-from smach_oracle.simulation.robot import door, kitchen_skills
-from smach_oracle.simulation.robot.arm import Arm, Means, SkillError
-from smach_oracle.simulation.robot.collision import installed_model
-from smach_oracle.simulation.robot.door_view import DoorNotSeen, find_door
-from smach_oracle.simulation.robot.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
-from smach_oracle.simulation.robot.kitchen_skills import KitchenSkills
-from smach_oracle.simulation.robot.pick import Slipped
-from smach_oracle.simulation.robot.travel import carry, stow
-from smach_oracle.simulation.world import drink_rehearsal
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
-from smach_oracle.simulation.world.judge import judge
-from smach_oracle.simulation.world.kitchen_causes import CHANCE
-from smach_oracle.simulation.world.kitchen_scene import PALM, draw
-from smach_oracle.simulation.world.physics import World
+from smach_oracle.pr2.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
+from smach_oracle.pr2.nodes import kitchen_skills
+from smach_oracle.pr2.nodes.kitchen_skills import KitchenSkills
+from smach_oracle.pr2.perception.door_view import DoorNotSeen, find_door
+from smach_oracle.pr2.planning.arm import Arm, SkillContext, SkillError
+from smach_oracle.pr2.planning.collision import installed_model
+from smach_oracle.pr2.planning.travel import carry, stow
+from smach_oracle.pr2.skills import door
+from smach_oracle.pr2.skills.pick import ObjectSlipped
+from smach_oracle.simulation.physics.judge import judge
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal import drink_retrieval as drink_rehearsal
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
+from smach_oracle.simulation.scenes.kitchen_causes import CHANCE
+from smach_oracle.simulation.scenes.kitchen_scene import PALM, draw
 from smach_oracle.tasks import drink_retrieval
 
 OPENING = (0.62, 0.02, 0.0)  # x, y, yaw from where the door is in view
@@ -33,12 +36,15 @@ def door_at(degrees, base=OPENING, seed=1):
     """A benign kitchen with the robot before the fridge and its door open by so much."""
     scene = draw(seed, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(degrees)),))
-    return scene._replace(bodies=(fridge,) + scene.bodies[1:], robot=scene.robot._replace(base=base))
+    return scene._replace(bodies=(fridge,) + scene.bodies[1:],
+                          robot=scene.robot._replace(base=base))
 
 
-@pytest.mark.parametrize('settings, words', [
-    ({'widht': 0.6}, 'widht'), ({'width': -1}, 'width'), ({'width': 'wide'}, 'width'), ({'place': [1, 2]}, 'place'),
-    ({'drinks_shelf': 7}, 'drinks_shelf'), ({'shelves': []}, 'shelves'), ([1], 'dictionary')])
+@pytest.mark.parametrize('settings, words', [({'widht': 0.6}, 'widht'), ({'width': -1}, 'width'),
+                                             ({'width': 'wide'}, 'width'),
+                                             ({'place': [1, 2]}, 'place'),
+                                             ({'drinks_shelf': 7}, 'drinks_shelf'),
+                                             ({'shelves': []}, 'shelves'), ([1], 'dictionary')])
 def test_a_wrong_map_is_refused_by_the_name_of_what_is_wrong(settings, words):
     with pytest.raises(ValueError, match=words):
         kitchen_from(settings)
@@ -52,7 +58,8 @@ def test_a_map_takes_what_is_given_and_the_usual_for_the_rest():
 @pytest.mark.parametrize('degrees', [0, 55, 104])
 def test_the_handle_is_where_the_map_computes_it(degrees):
     world = World(door_at(degrees))
-    inside = (-Kitchen().door_thickness - Kitchen().handle_stand_off, -(Kitchen().width - Kitchen().handle_inset), 1.0)
+    inside = (-Kitchen().door_thickness - Kitchen().handle_stand_off,
+              -(Kitchen().width - Kitchen().handle_inset), 1.0)
     truth = apply(world.body_pose('fridge', 'door'), np.array(inside))
     fridge = from_rpy((Kitchen().place[0], Kitchen().place[1], 0.0))
     angle = world.body_joint('fridge', DOOR_JOINT)
@@ -78,7 +85,8 @@ def test_all_causes_come_up_and_each_kitchen_can_be_built():
     assert all(cause.text for scene in scenes for cause in scene.causes)
     world = World()
     for kind in counts:
-        world.reset(next(scene for scene in scenes if kind in [cause.kind for cause in scene.causes]))
+        world.reset(
+            next(scene for scene in scenes if kind in [cause.kind for cause in scene.causes]))
         assert not judge(world, world.scene.goal).success
     world.close()
 
@@ -90,7 +98,9 @@ def test_drinks_stand_apart_on_their_shelf():
         places = [world.body_pose(name) for name in world.movable()]
         assert len(places) >= 2
         assert all(place[2, 2] > 0.999 and abs(place[2, 3] - 0.86) < 0.01 for place in places)
-        assert min(np.linalg.norm(one[:2, 3] - other[:2, 3]) for one, other in itertools.combinations(places, 2)) > 0.09
+        assert min(
+            np.linalg.norm(one[:2, 3] - other[:2, 3])
+            for one, other in itertools.combinations(places, 2)) > 0.09
     world.close()
 
 
@@ -103,7 +113,8 @@ def test_the_door_is_seen_at_its_angle_though_the_map_is_a_little_wrong(degrees)
     view = find_door(robot.see(), Kitchen(), believed)
     truth = base_from_fridge(Kitchen(), world.true_base())
     assert abs(view.angle - world.body_joint('fridge', DOOR_JOINT)) < np.radians(3.0)
-    seen, real = (apply(frame, handle_point(Kitchen(), view.angle, 1.0)) for frame in (view.base_from_fridge, truth))
+    seen, real = (apply(frame, handle_point(Kitchen(), view.angle, 1.0))
+                  for frame in (view.base_from_fridge, truth))
     assert np.linalg.norm(seen - real) < (0.015 if degrees == 0 else 0.025)
     world.close()
 
@@ -119,12 +130,14 @@ def test_a_door_that_is_not_in_view_is_not_seen():
 
 def test_bad_goals_are_refused_with_what_is_allowed():
     world = World(draw(1, benign=True))
-    skills = KitchenSkills(Means(DirectRobot(world), installed_model()), Kitchen())
-    for work, goal in ((skills.open_door, OpenDoorGoal('upper')), (skills.close_door, CloseDoorGoal('upper')),
+    skills = KitchenSkills(SkillContext(DirectRobot(world), installed_model()), Kitchen())
+    for work, goal in ((skills.open_door, OpenDoorGoal('upper')), (skills.close_door,
+                                                                   CloseDoorGoal('upper')),
                        (skills.hand_over, HandOverGoal('upper', PoseStamped()))):
         with pytest.raises(SkillError, match='left, right'):
             work(goal, lambda status: None)
-    nowhere = PoseStamped(Header(frame_id='base_link'), Pose(Point(0.8, -0.6, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    nowhere = PoseStamped(Header(frame_id='base_link'),
+                          Pose(Point(0.8, -0.6, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
     with pytest.raises(SkillError, match='no hand waits'):
         skills.hand_over(HandOverGoal('right', nowhere), lambda status: None)
     nowhere.header.frame_id = 'kitchen'
@@ -135,11 +148,13 @@ def test_bad_goals_are_refused_with_what_is_allowed():
 
 def test_the_rehearsal_goes_the_way_of_the_script():
     assert drink_retrieval.PALM == PALM
-    assert drink_rehearsal.DRIVES == {'MOVE_IN': drink_retrieval.IN_THE_FRIDGE, 'MOVE_HOME': drink_retrieval.HOME,
-                                      'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE}
+    assert drink_rehearsal.DRIVES == {
+        'MOVE_IN': drink_retrieval.IN_THE_FRIDGE, 'MOVE_HOME': drink_retrieval.HOME,
+        'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE
+    }
     assert drink_rehearsal.TORSO_HEIGHT == drink_retrieval.TORSO_HEIGHT
     world = World(draw(1, benign=True))
-    states = [name for name, _ in drink_rehearsal.DrinkTrial(world).states]
+    states = [name for name, _ in drink_rehearsal.DrinkRetrievalRehearsal(world).states]
     machine = drink_retrieval.make_machine()
     label = machine.get_initial_states()[0]
     for name in states:
@@ -151,12 +166,13 @@ def test_the_rehearsal_goes_the_way_of_the_script():
 
 def next_of(machine, label):
     """Where a state's success leads."""
-    return next(edge[2] for edge in machine.get_internal_edges() if edge[0] == 'succeeded' and edge[1] == label)
+    return next(edge[2] for edge in machine.get_internal_edges()
+                if edge[0] == 'succeeded' and edge[1] == label)
 
 
 def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of_it():
     world = World(draw(3, benign=True))
-    for _, work in drink_rehearsal.DrinkTrial(world).states[:2]:
+    for _, work in drink_rehearsal.DrinkRetrievalRehearsal(world).states[:2]:
         work()
     assert world.body_joint('fridge', DOOR_JOINT) > np.radians(85.0)
     assert not [contact for contact in world.contacts('fridge') if contact.other == 'robot']
@@ -171,7 +187,7 @@ def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monke
         raise SkillError('caught behind the handle')
     monkeypatch.setattr(door, '_open', fail)
     with pytest.raises(SkillError, match='caught behind'):
-        door.open_door(Means(robot, installed_model()), Kitchen(), 'right')
+        door.open_door(SkillContext(robot, installed_model()), Kitchen(), 'right')
     assert world.true_base()[0, 3] < 0.4 - 0.3
     world.close()
 
@@ -181,26 +197,26 @@ def test_a_hand_in_the_way_goes_to_its_side_before_the_other_shuts_the_door(hand
     """As a person may leave it, who took the drink out."""
     world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
     robot = DirectRobot(world)
-    means = Means(robot, installed_model())
+    context = SkillContext(robot, installed_model())
     robot.torso(drink_rehearsal.TORSO_HEIGHT)
-    stow(means, ('left',), {})
-    with Arm(means, 'right', {}, 1) as limb:
+    stow(context, ('left',), {})
+    with Arm(context, 'right', {}, 1) as limb:
         limb.go(limb.reach(from_rpy(hand, yaw=0.3))[0])
-    door.close_door(means, Kitchen(), 'left')
+    door.close_door(context, Kitchen(), 'left')
     assert world.body_joint('fridge', DOOR_JOINT) < 2 * door.STEP
     world.close()
 
 
 def test_what_a_person_put_into_a_hand_that_is_not_level_stays_upright():
     world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
-    means = Means(DirectRobot(world), installed_model())
-    with Arm(means, 'right', {}, 1) as limb:
+    context = SkillContext(DirectRobot(world), installed_model())
+    with Arm(context, 'right', {}, 1) as limb:
         limb.go(limb.reach(from_rpy((0.55, -0.20, 0.95), pitch=0.3, yaw=0.5))[0])
         before = limb.pose()
         carry(limb, level=False)
         after = limb.pose()
     assert after[1, 3] < -0.25
-    held = kitchen_skills.unknown_held(means, 'right')
+    held = kitchen_skills.unknown_held(context, 'right')
     upright = held.grasp @ held.tool_from_object
     assert np.allclose(upright[:3, :3], np.eye(3)) and np.allclose(upright[:3, 3], after[:3, 3])
     hanging = np.linalg.inv(before)[:3, 2]  # the vertical, in the tool
@@ -210,31 +226,38 @@ def test_what_a_person_put_into_a_hand_that_is_not_level_stays_upright():
 
 def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeypatch):
     world = World(draw(1, benign=True))
-    skills = KitchenSkills(Means(DirectRobot(world), installed_model()), Kitchen())
+    skills = KitchenSkills(SkillContext(DirectRobot(world), installed_model()), Kitchen())
     efforts = []
 
     def slip(*given):
         efforts.append(given[-1])
-        raise Slipped('it slipped')
+        raise ObjectSlipped('it slipped')
     monkeypatch.setattr(kitchen_skills, 'pick_from_fridge', slip)
     monkeypatch.setattr(kitchen_skills, 'open_door', lambda *_: 1.6)
-    drink = PoseStamped(Header(frame_id='base_link'), Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    drink = PoseStamped(Header(frame_id='base_link'),
+                        Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
     for _ in range(2):
-        with pytest.raises(Slipped):
-            skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'), lambda status: None)
+        with pytest.raises(ObjectSlipped):
+            skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'),
+                        lambda status: None)
     skills.open_door(OpenDoorGoal('right'), lambda status: None)
-    with pytest.raises(Slipped):
-        skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'), lambda status: None)
+    with pytest.raises(ObjectSlipped):
+        skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'),
+                    lambda status: None)
     assert efforts[0] < efforts[1] and efforts[2] == efforts[0]
     world.close()
 
 
 def test_a_moved_drink_is_moved_to_where_there_is_room():
-    scenes = [scene for scene in map(draw, range(300)) if 'drink_moved' in [cause.kind for cause in scene.causes]]
+    scenes = [
+        scene for scene in map(draw, range(300))
+        if 'drink_moved' in [cause.kind for cause in scene.causes]
+    ]
     assert len(scenes) > 10
     for scene in scenes:
         drinks = [body for body in scene.bodies if body.name.startswith('drink')]
-        values = dict(next(each.values for each in scene.disturbances if each.kind.startswith('nudge')))
+        values = dict(
+            next(each.values for each in scene.disturbances if each.kind.startswith('nudge')))
         there = np.add(drinks[0].position[:2], (values['dx'], values['dy']))
         assert min(np.linalg.norm(there - other.position[:2]) for other in drinks[1:]) > 0.07
         assert abs(there[1]) < Kitchen().width / 2 - 0.06

@@ -1,4 +1,6 @@
-"""Fixtures for tests of the engine. With $SMACH_UPSTREAM they run on upstream, without those of our improvements."""
+"""Fixtures for tests of the engine. With $SMACH_UPSTREAM they run on upstream, without those of our
+improvements.
+"""
 import os
 import sys
 
@@ -23,7 +25,9 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(autouse=True)
 def log(monkeypatch):
-    """Everything that is logged, as (level, text); shutdown check and open containers are put back afterwards."""
+    """Everything that is logged, as (level, text); shutdown check and open containers are put back
+    afterwards.
+    """
     lines = []
     for level in ('info', 'warn', 'debug', 'err'):
         def logger(text, level=level):

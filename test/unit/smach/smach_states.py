@@ -17,7 +17,9 @@ def that_name(names, texts):
 
 
 class Scripted(smach.State):
-    """Runs ``work(state, userdata)`` for its outcome, or returns ``work`` itself if that is a string."""
+    """Runs ``work(state, userdata)`` for its outcome, or returns ``work`` itself if that is a
+    string.
+    """
 
     def __init__(self, work, outcomes=('done', 'failed', 'preempted'), **keys):
         smach.State.__init__(self, outcomes=list(outcomes), **keys)

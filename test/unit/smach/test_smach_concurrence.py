@@ -7,15 +7,15 @@ import threading
 import time
 
 import pytest
-import smach
 from smach_states import Fixed, Scripted, UntilPreempted, concurrence, machine, naming, that_name
+from waiting import Once, asleep, wait_for
+
+import smach
 
 
-def after(time_s, outcome='done'):
-    def work(state, ud):
-        time.sleep(time_s)
-        return outcome
-    return Scripted(work)
+def after(event):
+    """A state that ends once the event is set, and ignores preempts."""
+    return Scripted(lambda state, ud: event.wait(20.0) and 'done')
 
 
 def flags(container):
@@ -24,14 +24,18 @@ def flags(container):
 
 def test_all_children_run_at_the_same_time_and_the_slowest_ends_it(said):
     meet = threading.Barrier(2, timeout=5.0)
-    both = concurrence({label: Scripted(lambda state, ud: meet.wait() is None or 'done') for label in 'AB'})
+    both = concurrence(
+        {label: Scripted(lambda state, ud: meet.wait() is None or 'done')
+         for label in 'AB'})
     assert both.execute() == 'done'
     assert "Concurrent Outcomes: {'A': 'done', 'B': 'done'}" in said('info')
     assert "Concurrent state 'A' returned outcome 'done' on termination." in said('info')
 
 
 def test_the_satisfied_entry_with_most_conditions_wins():
-    outcome_map = {'done': {'A': 'done'}, 'failed': {'A': 'done', 'B': 'failed'}, 'preempted': {'B': 'done'}}
+    outcome_map = {
+        'done': {'A': 'done'}, 'failed': {'A': 'done', 'B': 'failed'}, 'preempted': {'B': 'done'}
+    }
     children = {'A': Fixed('done'), 'B': Fixed('failed')}
     with pytest.raises(smach.InvalidStateError):
         concurrence(children, outcome_map={'unknown': {'A': 'done'}})
@@ -51,11 +55,13 @@ def test_the_default_counts_when_nothing_else_does():
 def test_the_outcome_callback_comes_first_if_it_gives_an_outcome(said):
     given = []
     children = {'A': Fixed('done'), 'B': Fixed('failed')}
-    both = concurrence(children, outcome_cb=lambda outcomes: given.append(dict(outcomes)) or 'failed')
+    both = concurrence(children,
+                       outcome_cb=lambda outcomes: given.append(dict(outcomes)) or 'failed')
     assert both.execute() == 'failed' and given == [{'A': 'done', 'B': 'failed'}]
-    assert concurrence(children, outcome_cb=lambda outcomes: None, outcome_map={'preempted': {'A': 'done'}}
-                       ).execute() == 'preempted'
-    assert any("Outcome callback returned None, using outcome 'preempted'" in text for text in said('warn'))
+    assert concurrence(children, outcome_cb=lambda outcomes: None,
+                       outcome_map={'preempted': {'A': 'done'}}).execute() == 'preempted'
+    assert any("Outcome callback returned None, using outcome 'preempted'" in text
+               for text in said('warn'))
 
 
 def test_an_exception_in_the_outcome_callback_surfaces():
@@ -82,7 +88,9 @@ def test_a_termination_callback_may_name_whom_to_preempt():
     def only_b(outcomes):
         seen.update(outcomes)
         return ['B', 'A']
-    three = concurrence({'A': Fixed(), 'B': UntilPreempted(), 'C': UntilPreempted(0.1)}, child_termination_cb=only_b)
+
+    three = concurrence({'A': Fixed(), 'B': UntilPreempted(), 'C': UntilPreempted(0.1)},
+                        child_termination_cb=only_b)
     three.execute()
     assert seen == {'A': 'done', 'B': 'preempted', 'C': 'done'} and flags(three) == [False] * 3
 
@@ -90,7 +98,8 @@ def test_a_termination_callback_may_name_whom_to_preempt():
 @pytest.mark.improvement
 def test_an_exception_in_the_termination_callback_surfaces_after_the_others_ended():
     other = UntilPreempted()
-    both = concurrence({'A': after(0.05), 'B': other}, child_termination_cb=lambda outcomes: 1 // 0)
+    both = concurrence({'A': after(other.started), 'B': other},
+                       child_termination_cb=lambda outcomes: 1 // 0)
     begin = time.monotonic()
     with pytest.raises(smach.InvalidUserCodeError, match='child termination callback'):
         both.execute()
@@ -101,7 +110,9 @@ def test_a_childs_exception_preempts_the_others_and_surfaces_when_they_have_ende
     other = UntilPreempted()
     begin = time.monotonic()
     with pytest.raises(smach.InvalidStateError):
-        concurrence({'A': Scripted(lambda state, ud: other.started.wait(5.0) and 1 // 0), 'B': other}).execute()
+        concurrence(
+            {'A': Scripted(lambda state, ud: other.started.wait(5.0) and 1 // 0),
+             'B': other}).execute()
     assert time.monotonic() - begin < 10.0
     assert any('ZeroDivisionError' in text for text in that_name(['A'], said('err')))
 
@@ -114,7 +125,8 @@ def test_a_child_that_returns_nothing_is_an_error_not_a_hang():
 
 @pytest.mark.improvement
 def test_a_childs_unregistered_outcome_is_logged(said):
-    assert concurrence({'A': Scripted(lambda state, ud: 'surprise')}, default='failed').execute() == 'failed'
+    assert concurrence({'A': Scripted(lambda state, ud: 'surprise')},
+                       default='failed').execute() == 'failed'
     assert any("'surprise', which it has not registered" in text for text in said('err'))
 
 
@@ -129,7 +141,8 @@ def test_userdata_goes_through_the_remapping_in_both_directions():
         return 'done'
     both = smach.Concurrence(['done'], 'done', input_keys=['x'], output_keys=['y'])
     with both:
-        smach.Concurrence.add('A', Scripted(add, input_keys=['a'], output_keys=['sum']), {'a': 'x', 'sum': 'y'})
+        smach.Concurrence.add('A', Scripted(add, input_keys=['a'], output_keys=['sum']),
+                              {'a': 'x', 'sum': 'y'})
     parent = smach.UserData()
     parent.x = 1
     assert both.execute(parent) == 'done' and parent.y == 2
@@ -138,8 +151,9 @@ def test_userdata_goes_through_the_remapping_in_both_directions():
 def test_a_preempt_reaches_all_running_children_and_is_serviced(said):
     both = concurrence({'A': UntilPreempted(), 'B': UntilPreempted(), 'ENDED': Fixed()},
                        outcome_map={'preempted': {'A': 'preempted', 'B': 'preempted'}})
-    threading.Timer(0.1, both.request_preempt).start()
+    asker = Once(lambda: sorted(both.get_active_states()) == ['A', 'B'], both.request_preempt)
     assert both.execute() == 'preempted'
+    asker.join()
     assert not both.preempt_requested() and flags(both) == [False] * 3
     assert 'Concurrence serviced preempt.' in said('info')
 
@@ -147,43 +161,47 @@ def test_a_preempt_reaches_all_running_children_and_is_serviced(said):
 @pytest.mark.improvement
 def test_a_serviced_preempt_ends_in_preempted_without_a_map():
     both = concurrence({'A': UntilPreempted(), 'B': UntilPreempted()}, default='failed')
-    threading.Timer(0.1, both.request_preempt).start()
+    asker = Once(lambda: len(both.get_active_states()) == 2, both.request_preempt)
     assert both.execute() == 'preempted'
+    asker.join()
 
 
 class SlowToAsk(UntilPreempted):
-    """Has ended before its request_preempt() returns, as an action state may that sends a cancel."""
+    """Has ended, and its container knows, before its request_preempt() returns.
+
+    So may an action state that sends a cancel.
+    """
 
     def __init__(self):
         UntilPreempted.__init__(self)
-        self.ended = threading.Event()
+        self.end_is_known = threading.Event()
 
     def request_preempt(self):
         UntilPreempted.request_preempt(self)
-        self.ended.wait(5.0)
-        time.sleep(0.02)
-
-    def execute(self, ud):
-        try:
-            return UntilPreempted.execute(self, ud)
-        finally:
-            self.ended.set()
+        self.end_is_known.wait(5.0)
 
 
 @pytest.mark.improvement
 def test_a_child_that_ends_while_it_is_being_asked_has_serviced_the_preempt():
-    cc = concurrence({'A': SlowToAsk()}, default='failed', child_termination_cb=lambda outcomes: time.sleep(0.2))
-    timer = threading.Timer(0.05, cc.request_preempt)
-    timer.start()
+    child = SlowToAsk()
+
+    def child_ended(outcomes):
+        child.end_is_known.set()
+        asker.join(5.0)
+    cc = concurrence({'A': child}, default='failed', child_termination_cb=child_ended)
+    asker = Once(child.started.is_set, cc.request_preempt)
     assert cc.execute() == 'preempted'
-    timer.join()
+    asker.join()
     assert not cc.preempt_requested()
 
 
 def test_a_child_that_ignores_the_preempt_leaves_it_to_the_parent(said):
-    both = concurrence({'A': UntilPreempted(), 'DEAF': after(0.2)}, default='done')
-    threading.Timer(0.05, both.request_preempt).start()
+    asked = threading.Event()
+    both = concurrence({'A': UntilPreempted(), 'DEAF': after(asked)}, default='done')
+    asker = Once(lambda: len(both.get_active_states()) == 2,
+                 lambda: (both.request_preempt(), asked.set()))
     assert both.execute() == 'done' and both.preempt_requested()
+    asker.join()
     assert len(that_name(['DEAF'], said('warn'))) == 1 and not that_name(['A'], said('warn'))
     assert flags(both) == [False, False]
 
@@ -191,8 +209,10 @@ def test_a_child_that_ignores_the_preempt_leaves_it_to_the_parent(said):
 @pytest.mark.improvement
 def test_a_preempt_that_comes_while_it_ends_is_not_swallowed():
     both = concurrence({'A': Fixed()}, outcome_cb=lambda outcomes: both.request_preempt() or 'done')
-    sm = machine(('BOTH', both, {'done': 'NEXT'}),
-                 ('NEXT', Scripted(lambda state, ud: 'preempted' if state.preempt_requested() else 'failed'), None))
+    sm = machine(
+        ('BOTH', both, {'done': 'NEXT'}),
+        ('NEXT', Scripted(lambda state, ud: 'preempted' if state.preempt_requested() else 'failed'),
+         None))
     both_of_machine = sm['BOTH']
     both_of_machine.register_termination_cb(lambda ud, labels, outcome: sm.request_preempt())
     assert sm.execute() == 'preempted'
@@ -201,9 +221,11 @@ def test_a_preempt_that_comes_while_it_ends_is_not_swallowed():
 
 @pytest.mark.improvement
 def test_a_preempt_left_over_from_the_last_run_is_not_meant_for_the_next():
-    both = concurrence({'DEAF': after(0.1)}, outcomes=('done', 'preempted'))
-    threading.Timer(0.03, both.request_preempt).start()
+    asked = threading.Event()
+    both = concurrence({'DEAF': after(asked)}, outcomes=('done', 'preempted'))
+    asker = Once(both.get_active_states, lambda: (both.request_preempt(), asked.set()))
     both.execute()
+    asker.join()
     assert both.preempt_requested()
     assert both.execute() == 'done' and not both.preempt_requested()
 
@@ -225,15 +247,22 @@ def test_hammering_it_with_preempts_neither_hangs_nor_leaves_flags_behind():
 
 
 def test_active_states_are_those_that_still_run():
-    active = []
-    both = concurrence({'A': Fixed(), 'B': after(0.2)})
-    both.register_transition_cb(lambda ud, states: active.append(sorted(states)))
+    active, alone = [], threading.Event()
+
+    def note(ud, states):
+        active.append(sorted(states))
+        if active[-1] == ['B']:
+            alone.set()
+    both = concurrence({'A': Fixed(), 'B': after(alone)})
+    both.register_transition_cb(note)
     both.execute()
-    assert active[:1] == [['A', 'B']] and active[-2:] == [['B'], []] and both.get_active_states() == []
+    assert active[:1] == [['A', 'B']] and active[-2:] == [['B'], []
+                                                          ] and both.get_active_states() == []
 
 
 def test_edges_are_the_conditions_of_the_outcome_map():
-    both = concurrence({'A': Fixed(), 'B': Fixed()}, outcome_map={'failed': {'A': 'done', 'B': 'done'}})
+    both = concurrence({'A': Fixed(), 'B': Fixed()},
+                       outcome_map={'failed': {'A': 'done', 'B': 'done'}})
     assert sorted(both.get_internal_edges()) == [('done', 'A', 'failed'), ('done', 'B', 'failed')]
     assert sorted(both.get_initial_states()) == ['A', 'B']
 
@@ -245,24 +274,26 @@ def test_a_map_that_names_an_outcome_no_child_has_is_logged(said):
 
 @pytest.mark.improvement
 def test_a_shutdown_preempts_the_children_and_a_deaf_one_cannot_hold_it_up(monkeypatch, said):
-    down = threading.Event()
+    down, over = threading.Event(), threading.Event()
     monkeypatch.setattr(smach, 'is_shutdown', down.is_set)
-    both = concurrence({'A': UntilPreempted(), 'DEAF': after(8.0)})
-    threading.Timer(0.1, down.set).start()
+    both = concurrence({'A': UntilPreempted(), 'DEAF': after(over)})
+    stopper = Once(lambda: len(both.get_active_states()) == 2, down.set)
     begin = time.monotonic()
     both.execute()
     assert time.monotonic() - begin < 4.0
+    over.set()
+    stopper.join()
     assert any("['DEAF'] did not end" in text for text in said('err'))
 
 
 INTERRUPTED = '''
-import sys
+import sys, threading
 sys.path[:0] = {paths!r}
 import smach
 from smach_states import UntilPreempted, concurrence, machine
 child = UntilPreempted(30.0)
 sm = machine(('BOTH', concurrence({{'A': child, 'B': UntilPreempted(30.0)}}), None))
-sm.register_start_cb(lambda ud, states: (print('started'), sys.stdout.flush()))
+threading.Thread(target=lambda: (child.started.wait(), print('started', flush=True))).start()
 try:
     sm.execute()
 except KeyboardInterrupt:
@@ -274,11 +305,12 @@ except KeyboardInterrupt:
 def test_ctrl_c_stops_a_concurrence_in_a_machine_at_once():
     here = os.path.dirname(os.path.abspath(__file__))
     script = INTERRUPTED.format(paths=[here] + sys.path)
-    process = subprocess.Popen([sys.executable, '-c', script], stdout=subprocess.PIPE, universal_newlines=True)
+    process = subprocess.Popen([sys.executable, '-c', script], stdout=subprocess.PIPE,
+                               universal_newlines=True)
     try:
         while 'started' not in process.stdout.readline():
             pass
-        time.sleep(0.3)
+        assert wait_for(lambda: asleep(process.pid))
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=60.0)

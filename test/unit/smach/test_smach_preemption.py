@@ -3,9 +3,10 @@ import threading
 import time
 
 import pytest
-import smach
 from smach_states import Fixed, Scripted, UntilPreempted, concurrence, machine, that_name
-from waiting import wait_for
+from waiting import Once, stays, wait_for
+
+import smach
 
 
 def preempt(sm_holder, serviced):
@@ -27,16 +28,16 @@ def flagged(state, ud):
 def test_a_running_state_is_asked_and_the_machine_ends_serviced():
     state = UntilPreempted()
     sm = machine(('A', state, None))
-    timer = threading.Timer(0.05, sm.request_preempt)
-    timer.start()
+    asker = Once(state.started.is_set, sm.request_preempt)
     assert sm.execute() == 'preempted'
-    timer.join()
+    asker.join()
     assert not sm.preempt_requested()
 
 
 def test_a_state_that_ignores_the_request_hands_it_to_the_next_before_that_runs(said):
     holder = []
-    sm = machine(('A', Scripted(preempt(holder, False)), {'done': 'B'}), ('B', Scripted(flagged), None))
+    sm = machine(('A', Scripted(preempt(holder, False)), {'done': 'B'}),
+                 ('B', Scripted(flagged), None))
     holder.append(sm)
     assert sm.execute() == 'preempted'
     assert not sm['A'].preempt_requested() and not sm.preempt_requested()
@@ -45,7 +46,8 @@ def test_a_state_that_ignores_the_request_hands_it_to_the_next_before_that_runs(
 
 def test_a_state_that_services_the_request_and_goes_on_frees_the_rest():
     holder = []
-    sm = machine(('A', Scripted(preempt(holder, True)), {'done': 'B'}), ('B', Scripted(flagged), None))
+    sm = machine(('A', Scripted(preempt(holder, True)), {'done': 'B'}),
+                 ('B', Scripted(flagged), None))
     holder.append(sm)
     assert sm.execute() == 'done' and not sm.preempt_requested()
 
@@ -97,10 +99,13 @@ def test_a_request_a_state_ignored_and_the_parent_settled_does_not_meet_its_next
 
 
 def test_every_run_can_be_preempted():
-    sm = machine(('A', UntilPreempted(), None))
+    state = UntilPreempted()
+    sm = machine(('A', state, None))
     for _ in range(3):
-        threading.Timer(0.02, sm.request_preempt).start()
+        state.started.clear()
+        asker = Once(state.started.is_set, sm.request_preempt)
         assert sm.execute() == 'preempted' and not sm.preempt_requested()
+        asker.join()
 
 
 def test_a_state_whose_request_preempt_raises_does_not_hurt_the_one_who_asks(said):
@@ -126,15 +131,23 @@ def test_a_callback_may_request_a_preempt(kind):
 
 @pytest.mark.improvement
 def test_a_request_reaches_a_machine_that_only_rushes_from_state_to_state():
-    sm = machine(('A', Scripted(lambda state, ud: flagged(state, ud)), {'done': 'A'}))
-    threading.Timer(0.05, sm.request_preempt).start()
+    visits = []
+
+    def rush(state, ud):
+        visits.append(1)
+        return flagged(state, ud)
+    sm = machine(('A', Scripted(rush), {'done': 'A'}))
+    asker = Once(lambda: len(visits) > 100, sm.request_preempt)
     begin = time.monotonic()
     assert sm.execute() == 'preempted'
+    asker.join()
     assert time.monotonic() - begin < 10.0
 
 
 class LateLock(object):
-    """A transitioning lock that threads other than the machine's get only once ``open_to_others`` is set."""
+    """A transitioning lock that threads other than the machine's get only once ``open_to_others``
+    is set.
+    """
 
     def __init__(self):
         self.open_to_others = threading.Event()
@@ -153,12 +166,11 @@ class LateLock(object):
 
 @pytest.mark.improvement
 def test_one_request_to_a_machine_that_rushes_stops_one_state_not_two():
-    serviced = []
+    began, serviced = threading.Event(), []
 
     def until_requested(state, ud):
-        deadline = time.monotonic() + 5.0
-        while not sm.preempt_requested() and time.monotonic() < deadline:
-            time.sleep(0.001)
+        began.set()
+        wait_for(sm.preempt_requested, 5.0)
         return 'done'
 
     def service(state, ud):
@@ -166,14 +178,13 @@ def test_one_request_to_a_machine_that_rushes_stops_one_state_not_two():
             state.service_preempt()
             serviced.append(state)
             lock.open_to_others.set()
-            time.sleep(0.1)
+            asker.join(5.0)
         return 'done'
 
-    sm = machine(('A', Scripted(until_requested), {'done': 'B'}), ('B', Scripted(service), {'done': 'C'}),
-                 ('C', Scripted(service), None))
+    sm = machine(('A', Scripted(until_requested), {'done': 'B'}),
+                 ('B', Scripted(service), {'done': 'C'}), ('C', Scripted(service), None))
     lock = sm._state_transitioning_lock = LateLock()
-    asker = threading.Timer(0.05, sm.request_preempt)
-    asker.start()
+    asker = Once(began.is_set, sm.request_preempt)
     assert sm.execute() == 'done'
     asker.join()
     assert serviced == [sm['B']] and not sm.preempt_requested()
@@ -192,8 +203,7 @@ def test_a_paused_machine_enters_no_state_until_resumed():
     thread = threading.Thread(target=sm.execute, daemon=True)
     thread.start()
     assert wait_for(lambda: entered and sm.pause_requested())
-    time.sleep(0.15)  # for it to go on all the same
-    assert entered == [1] and sm.is_running() and sm.pause_requested()
+    assert stays(lambda: entered == [1] and sm.is_running() and sm.pause_requested(), 0.15)
     sm.request_resume()
     thread.join(30.0)
     assert entered == [1, 1] and not sm.is_running()
@@ -209,8 +219,9 @@ def test_a_pause_reaches_the_machine_inside_and_a_preempt_ends_it():
     inner = machine(('I', Scripted(pause), {'done': 'J'}), ('J', Scripted(flagged), None))
     outer = machine(('IN', inner, None))
     holder.append(outer)
-    threading.Timer(0.1, outer.request_preempt).start()
+    asker = Once(inner.pause_requested, outer.request_preempt)
     assert outer.execute() == 'preempted'
+    asker.join()
     assert not inner.pause_requested()
 
 
@@ -218,7 +229,8 @@ def test_a_pause_reaches_the_machine_inside_and_a_preempt_ends_it():
 def test_a_preempt_pending_when_a_concurrence_starts_reaches_its_children():
     holder = []
     children = concurrence({'A': UntilPreempted(), 'B': UntilPreempted()})
-    outer = machine(('FIRST', Scripted(preempt(holder, False)), {'done': 'BOTH'}), ('BOTH', children, None))
+    outer = machine(('FIRST', Scripted(preempt(holder, False)), {'done': 'BOTH'}),
+                    ('BOTH', children, None))
     holder.append(outer)
     begin = time.monotonic()
     assert outer.execute() == 'preempted'

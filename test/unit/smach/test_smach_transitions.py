@@ -1,7 +1,8 @@
 """Where outcomes lead, and what happens when they lead nowhere."""
 import pytest
-import smach
 from smach_states import Counting, Fixed, Scripted, machine, naming, that_name
+
+import smach
 
 
 def test_states_follow_their_transitions_and_the_machine_ends_with_its_outcome(said):
@@ -109,7 +110,8 @@ def test_a_machine_stops_with_none_when_everything_is_shut_down(monkeypatch):
 
 def test_one_state_object_may_have_two_labels():
     shared = Counting(2)
-    sm = machine(('A', shared, {'again': 'B', 'done': 'failed'}), ('B', shared, {'again': 'failed', 'done': 'done'}))
+    sm = machine(('A', shared, {'again': 'B', 'done': 'failed'}),
+                 ('B', shared, {'again': 'failed', 'done': 'done'}))
     sm.userdata.count = 0
     assert sm.execute() == 'done'
 
@@ -168,7 +170,8 @@ def test_a_step_patched_on_one_machine_is_used(monkeypatch):
 
 def test_a_method_patched_on_the_base_class_is_used(monkeypatch):
     calls = []
-    monkeypatch.setattr(smach.Container, 'call_transition_cbs', lambda self: calls.append(self.get_active_states()))
+    monkeypatch.setattr(smach.Container, 'call_transition_cbs',
+                        lambda self: calls.append(self.get_active_states()))
     machine(('A', Fixed('x'), {'x': 'B'}), ('B', Fixed('done'), None)).execute()
     assert calls == [['B']]
 
@@ -179,8 +182,13 @@ def test_a_logger_set_in_mid_run_hears_the_next_transition(said):
     def replace(state, ud):
         smach.loginfo = heard.append
         return 'done'
-    machine(('A', Scripted(replace), {'done': 'B', 'failed': 'done'}), ('B', Fixed('done'), None)).execute()
-    assert heard == ["State machine transitioning 'A':'done'-->'B'", "State machine terminating 'B':'done':'done'"]
+
+    machine(('A', Scripted(replace), {'done': 'B', 'failed': 'done'}),
+            ('B', Fixed('done'), None)).execute()
+    assert heard == [
+        "State machine transitioning 'A':'done'-->'B'",
+        "State machine terminating 'B':'done':'done'"
+    ]
 
 
 def test_edges_children_and_lookup_describe_the_machine():

@@ -5,8 +5,9 @@ import pickle
 import threading
 
 import pytest
-import smach
 from smach_states import Scripted, machine, naming, that_name
+
+import smach
 
 
 class Pose(object):
@@ -26,7 +27,8 @@ def view(values, inputs=(), outputs=(), remapping=None):
     ud = smach.UserData()
     for key, value in values.items():
         ud[key] = value
-    return ud, smach.Remapper(ud, list(inputs), list(outputs), {} if remapping is None else remapping)
+    return ud, smach.Remapper(ud, list(inputs), list(outputs),
+                              {} if remapping is None else remapping)
 
 
 def test_attributes_and_items_are_the_same_keys():
@@ -143,7 +145,8 @@ def test_an_object_read_as_input_only_stays_unchanged():
     pose.inner = Pose()
     _, remapper = view({'pose': pose}, ['pose'])
     assert remapper.pose.x == 1
-    for change in (lambda: setattr(remapper.pose, 'x', 5), lambda: setattr(remapper.pose.inner, 'x', 5)):
+    for change in (lambda: setattr(remapper.pose, 'x', 5),
+                   lambda: setattr(remapper.pose.inner, 'x', 5)):
         try:
             change()
         except TypeError:
@@ -168,7 +171,8 @@ def test_setting_an_attribute_of_an_input_is_logged_and_refused(said):
 @pytest.mark.improvement
 def test_a_read_only_object_otherwise_behaves_like_the_object():
     pose = Pose()
-    _, remapper = view({'pose': pose, 'mode': Mode.AUTO, 'function': len}, ['pose', 'mode', 'function'])
+    _, remapper = view({'pose': pose, 'mode': Mode.AUTO, 'function': len},
+                       ['pose', 'mode', 'function'])
     assert remapper.pose == pose and isinstance(remapper.pose, Pose) and remapper.pose.norm() == 1
     assert remapper.mode is Mode.AUTO and remapper.function([1]) == 1
     mine = copy.deepcopy(remapper.pose)
@@ -185,7 +189,8 @@ def test_an_object_that_is_also_an_output_is_the_object():
 
 @pytest.mark.improvement
 def test_keys_lists_the_inputs_there_are_by_the_names_of_the_state():
-    _, remapper = view({'real': 1, 'other': 2, 'plain': 3}, ['mine', 'plain', 'missing'], [], {'mine': 'real'})
+    _, remapper = view({'real': 1, 'other': 2, 'plain': 3}, ['mine', 'plain', 'missing'], [],
+                       {'mine': 'real'})
     assert remapper.keys() == ['mine', 'plain']
 
 
@@ -259,8 +264,9 @@ def test_missing_inputs_and_outputs_are_warnings(said):
 
 
 def test_a_parent_userdata_is_read_and_written():
-    sm = machine(('A', Scripted(lambda state, ud: setattr(ud, 'b', ud.a) or 'done', io_keys=['a', 'b']), None),
-                 input_keys=['a'], output_keys=['b'])
+    sm = machine(
+        ('A', Scripted(lambda state, ud: setattr(ud, 'b', ud.a) or 'done',
+                       io_keys=['a', 'b']), None), input_keys=['a'], output_keys=['b'])
     parent = smach.UserData()
     parent.a = 3
     assert sm.execute(parent) == 'done' and parent.b == 3

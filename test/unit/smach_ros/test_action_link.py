@@ -2,6 +2,7 @@
 import time
 
 import pytest
+from waiting import stays, wait_for
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
@@ -49,8 +50,7 @@ def link(monkeypatch):
 
 def becomes_ready_s(link):
     begin = time.monotonic()
-    while not link.ready() and time.monotonic() - begin < 5.0:
-        time.sleep(0.005)
+    wait_for(link.ready, 5.0)
     return time.monotonic() - begin
 
 
@@ -68,5 +68,4 @@ def test_a_connection_made_anew_is_given_that_time_again(link):
 @pytest.mark.parametrize('topic', ['pub_goal', 'pub_cancel', 'result_sub', 'feedback_sub'])
 def test_a_topic_without_the_server_is_waited_for(link, topic):
     setattr(link.client, topic, FakeTopic('/another'))
-    time.sleep(0.3)
-    assert not link.ready() and not link.ready()
+    assert stays(lambda: not link.ready(), 0.3), 'longer than a new connection is given'

@@ -2,6 +2,7 @@
 import pickle
 
 import pytest
+
 import smach
 
 pytest.importorskip('rospy')
@@ -40,14 +41,16 @@ def seen():
 
 @pytest.fixture
 def tree(seen):
-    return ContainerTree(lambda watch, info, states, ud: seen.append((watch.paths[0], info, states)))
+    return ContainerTree(lambda watch, info, states, ud: seen.append(
+        (watch.paths[0], info, states)))
 
 
 def test_start_transitions_and_end_are_reported_in_order(tree, seen):
     machine = chain('A', 'B')
     tree.add_root('/R', machine)
     machine.execute()
-    assert seen == [('/R', 'START', ['A']), ('/R', 'TRANSITION', ['B']), ('/R', 'TERMINATION next', ['None'])]
+    assert seen == [('/R', 'START', ['A']), ('/R', 'TRANSITION', ['B']),
+                    ('/R', 'TERMINATION next', ['None'])]
 
 
 def test_nothing_is_reported_while_nobody_listens(seen):
@@ -63,7 +66,8 @@ def test_nothing_is_reported_while_nobody_listens(seen):
 
 
 def test_containers_of_every_kind_are_found_at_any_depth(tree):
-    iterator = smach.Iterator(outcomes=['next'], input_keys=[], output_keys=[], it=[1], exhausted_outcome='next')
+    iterator = smach.Iterator(outcomes=['next'], input_keys=[], output_keys=[], it=[1],
+                              exhausted_outcome='next')
     with iterator:
         smach.Iterator.set_contained_state('BODY', chain('X'), loop_outcomes=['next'])
     concurrence = smach.Concurrence(outcomes=['next'], default_outcome='next')
@@ -123,14 +127,16 @@ def test_callback_sees_the_states_keys_or_its_own():
     data.a, data.b = 1, 2
     plain = UserCallback('cb', lambda ud, value, more: ud.a + value + more, [10], None, ['a'], [])
     assert plain(data, 100) == 111
-    own = UserCallback('cb', smach.cb_interface(input_keys=['b'])(lambda ud: ud.b), [], None, ['a'], [])
+    own = UserCallback('cb',
+                       smach.cb_interface(input_keys=['b'])(lambda ud: ud.b), [], None, ['a'], [])
     assert own(data) == 2
     with pytest.raises(smach.InvalidUserCodeError):
         UserCallback('cb', lambda ud: ud.b, [], None, ['a'], [])(data)
 
 
 @pytest.mark.parametrize('decides, outcomes', [(True, ('far',)), (False, ())])
-def test_a_callback_brings_its_keys_and_its_outcomes_only_where_it_decides_the_end(decides, outcomes):
+def test_a_callback_brings_its_keys_and_its_outcomes_only_where_it_decides_the_end(
+        decides, outcomes):
     state = smach.State()
     cb = smach.cb_interface(outcomes=['far'], input_keys=['i'], output_keys=['o'])(lambda ud: 'far')
     UserCallback('cb', cb, [], None, [], []).register_with(state, decides=decides)
@@ -141,5 +147,6 @@ def test_a_callback_brings_its_keys_and_its_outcomes_only_where_it_decides_the_e
 def test_unknown_slot_is_named_with_those_there_are():
     from std_msgs.msg import Header
     assert checked_slots('goal_slots', ['stamp'], Header()) == ('stamp',)
-    with pytest.raises(smach.InvalidStateError, match=r"goal_slots \['time'\].*std_msgs/Header.*stamp"):
+    with pytest.raises(smach.InvalidStateError,
+                       match=r"goal_slots \['time'\].*std_msgs/Header.*stamp"):
         checked_slots('goal_slots', ['stamp', 'time'], Header())

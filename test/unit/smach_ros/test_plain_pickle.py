@@ -8,8 +8,11 @@ import pytest
 pytest.importorskip('rospy')
 plain_pickle = pytest.importorskip('smach_ros.plain_pickle')
 
-PLAIN = {'number': 1, 'big': 2 ** 100, 'real': 1.5, 'text': 'Käse', 'raw': b'\x00\xff', 'none': None, 'yes': True,
-         'list': [1, [2, {'a': (3, 4)}]], 'set': {1, 2}, 'frozen': frozenset([3]), 'complex': 1 + 2j, 'empty': b''}
+PLAIN = {
+    'number': 1, 'big': 2**100, 'real': 1.5, 'text': 'Käse', 'raw': b'\x00\xff', 'none': None,
+    'yes': True, 'list': [1, [2, {'a': (3, 4)}]], 'set': {1, 2}, 'frozen': frozenset([3]),
+    'complex': 1 + 2j, 'empty': b''
+}
 
 
 class Custom(object):
@@ -40,7 +43,10 @@ def test_plain_data_comes_back_as_it_went():
 
 @pytest.mark.parametrize('protocol', range(pickle.HIGHEST_PROTOCOL + 1))
 def test_any_senders_protocol_is_read(protocol):
-    readable = {key: value for key, value in PLAIN.items() if protocol >= 2 or key not in ('complex',)}
+    readable = {
+        key: value
+        for key, value in PLAIN.items() if protocol >= 2 or key not in ('complex',)
+    }
     assert plain_pickle.decode_userdata(encoded(readable, protocol)) == readable
 
 

@@ -1,8 +1,9 @@
 """Waiting that a preempt or a shutdown ends at once."""
-import threading
 import time
 
 import pytest
+from waiting import Once
+
 import smach
 
 rospy = pytest.importorskip('rospy')
@@ -10,7 +11,8 @@ pytest.importorskip('smach_ros')
 from smach_ros.waiting import Aside, Signal, seconds  # noqa: E402
 
 
-@pytest.mark.parametrize('given, meant', [(None, None), (2, 2.0), (0.5, 0.5), (rospy.Duration(1.5), 1.5)])
+@pytest.mark.parametrize('given, meant', [(None, None), (2, 2.0), (0.5, 0.5),
+                                          (rospy.Duration(1.5), 1.5)])
 def test_durations_and_numbers_are_seconds(given, meant):
     assert seconds(given) == meant
 
@@ -21,11 +23,16 @@ def test_what_is_no_duration_is_refused_with_what_is_allowed():
 
 
 def test_notify_wakes_at_once():
-    signal, happened = Signal(), []
-    threading.Timer(0.2, lambda: (happened.append(1), signal.notify())).start()
+    signal, happened, looks = Signal(), [], []
+
+    def look():
+        looks.append(1)
+        return bool(happened)
+    notifier = Once(lambda: looks, lambda: (happened.append(1), signal.notify()))
     begin = time.monotonic()
-    assert signal.wait(lambda: bool(happened), longest_s=30.0)
+    assert signal.wait(look, longest_s=30.0)
     assert time.monotonic() - begin < 5.0
+    notifier.join()
 
 
 def test_what_has_happened_already_is_not_waited_for():

@@ -4,18 +4,20 @@ from typing import Dict, List, Mapping
 import numpy as np
 import pybullet
 
-from smach_oracle.simulation.robot.arms_aside import ASIDE
-from smach_oracle.simulation.robot.collision import CollisionWorld, RobotModel, installed_model
-from smach_oracle.simulation.robot.interface import ARM_JOINTS
-from smach_oracle.simulation.robot.kitchen import MapBox
-from smach_oracle.simulation.robot.pr2_model import pr2_urdf
+from smach_oracle.pr2.kitchen import MapBox
+from smach_oracle.pr2.model.pr2_model import pr2_urdf
+from smach_oracle.pr2.planning.collision import CollisionModel, CollisionWorld, installed_model
+from smach_oracle.pr2.robot import ARM_JOINTS
+from smach_oracle.pr2.skills.arms_aside import ASIDE
 
-REST = {'torso_lift_joint': 0.22, 'r_gripper_l_finger_joint': 0.045, 'r_gripper_r_finger_joint': 0.045,
-        'l_gripper_l_finger_joint': 0.045, 'l_gripper_r_finger_joint': 0.045,
-        **dict(zip(ARM_JOINTS['left'], ASIDE['left'])), **dict(zip(ARM_JOINTS['right'], ASIDE['right']))}
+REST = {
+    'torso_lift_joint': 0.22, 'r_gripper_l_finger_joint': 0.045, 'r_gripper_r_finger_joint': 0.045,
+    'l_gripper_l_finger_joint': 0.045, 'l_gripper_r_finger_joint': 0.045,
+    **dict(zip(ARM_JOINTS['left'], ASIDE['left'])), **dict(zip(ARM_JOINTS['right'], ASIDE['right']))
+}
 
 
-def model() -> RobotModel:
+def model() -> CollisionModel:
     return installed_model()
 
 
@@ -41,7 +43,9 @@ def right_arm(boxes: Mapping[str, MapBox]) -> CollisionWorld:
 
 
 def deepest(way: np.ndarray, boxes: Mapping[str, MapBox], step: float = 0.01) -> float:
-    """The deepest that the right arm gets into a box or into base and torso, m; points every `step` rad of the way."""
+    """The deepest that the right arm gets into a box or into base and torso, m; points every `step`
+    rad of the way.
+    """
     client = pybullet.connect(pybullet.DIRECT)
     try:
         robot = pybullet.loadURDF(str(pr2_urdf()), useFixedBase=True, physicsClientId=client)
@@ -52,15 +56,20 @@ def deepest(way: np.ndarray, boxes: Mapping[str, MapBox], step: float = 0.01) ->
         for name, value in REST.items():
             pybullet.resetJointState(robot, joints[name], value, physicsClientId=client)
         bodies = [_body(client, each) for each in boxes.values()]
-        arm = [index for name, index in links.items() if name.startswith(('r_gripper', 'r_wrist', 'r_forearm_link'))]
+        arm = [
+            index for name, index in links.items()
+            if name.startswith(('r_gripper', 'r_wrist', 'r_forearm_link'))
+        ]
         trunk = [links[name] for name in ('base_link', 'torso_lift_link', 'head_tilt_link')]
         worst = 0.0
         for q in _dense(way, step):
             for name, value in zip(ARM_JOINTS['right'], q):
                 pybullet.resetJointState(robot, joints[name], value, physicsClientId=client)
             for body in bodies:
-                worst = min([worst] + [point[8] for point in pybullet.getClosestPoints(robot, body, 0.0,
-                                                                                       physicsClientId=client)])
+                worst = min([worst] + [
+                    point[8]
+                    for point in pybullet.getClosestPoints(robot, body, 0.0, physicsClientId=client)
+                ])
             for one in arm:
                 for other in trunk:
                     worst = min([worst] + [point[8] for point in pybullet.getClosestPoints(
@@ -79,6 +88,8 @@ def _dense(way: np.ndarray, step: float) -> List[np.ndarray]:
 
 
 def _body(client: int, each: MapBox) -> int:
-    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=list(each.half), physicsClientId=client)
+    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=list(each.half),
+                                          physicsClientId=client)
     return pybullet.createMultiBody(0, shape, -1, list(each.centre),
-                                    pybullet.getQuaternionFromEuler([0, 0, each.yaw]), physicsClientId=client)
+                                    pybullet.getQuaternionFromEuler([0, 0, each.yaw]),
+                                    physicsClientId=client)

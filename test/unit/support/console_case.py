@@ -6,74 +6,77 @@ import pytest
 import tornado.httpclient
 import tornado.testing
 import tornado.websocket
+from waiting import wait_in_loop
 
-from smach_oracle.expert.console.access import Hosts, TokenBook
-from smach_oracle.expert.console.bags import BagShelf
-from smach_oracle.expert.console.commands import MOST_BYTES
-from smach_oracle.expert.console.desk import Reply
-from smach_oracle.expert.console.handlers import Gate
-from smach_oracle.expert.console.history_handlers import HistoryRoom
-from smach_oracle.expert.console.layout import Layouter
-from smach_oracle.expert.console.page_socket import Office
-from smach_oracle.expert.console.recorded import RecordedTrials
-from smach_oracle.expert.console.sections import Sections
-from smach_oracle.expert.console.sensors import Sensors
+from smach_oracle.expert.console.commands.commands import MOST_BYTES, CommandReply
+from smach_oracle.expert.console.graphs.layout_worker import LayoutWorker
+from smach_oracle.expert.console.page_socket import OpenPages
+from smach_oracle.expert.console.sensors.question_images import ImageStore
+from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
 from smach_oracle.expert.console.server import make_app, tls_context
-from smach_oracle.expert.console.settings import ConsoleSettings
-from smach_oracle.expert.console.stills import StillFiles
-from smach_oracle.expert.console.trial_log import TrialLog
+from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
+from smach_oracle.expert.console.trials.history_handlers import HistoryRequests
+from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials
+from smach_oracle.expert.console.trials.trial_log import TrialLog
+from smach_oracle.expert.console.web.access import AccessTokens, AllowedHosts
+from smach_oracle.expert.console.web.access_control import AccessControl
+from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.expert.console.web.settings import ConsoleSettings
 
 os.environ.setdefault('ASYNC_TEST_TIMEOUT', '30')  # s; the machine may be loaded
-TOKENS = {role: role + '-token-of-sufficient-length' for role in ('viewer', 'operator', 'teleoperator')}
+TOKENS = {
+    role: role + '-token-of-sufficient-length'
+    for role in ('viewer', 'operator', 'teleoperator')
+}
 
 
-class FakeDesk:
+class FakeQuestionCommands:
     """Does what it is told, and remembers."""
 
     def __init__(self):
         self.done = []
         self.left = []
 
-    def carry_out(self, command, person, browser):
+    def carry_out(self, command, person, page):
         self.done.append((command.name, person.expert, person.role))
-        return Reply(True, 'done')
+        return CommandReply(True, 'done')
 
-    def leave(self, browser):
-        self.left.append(browser)
+    def leave(self, page):
+        self.left.append(page)
 
 
-class FakeHands:
+class FakeTeleoperation:
     """One hand, whose wheel a page has once it has taken it."""
 
     def __init__(self):
-        self.wheels = set()
+        self.drivers = set()
         self.relayed = []
 
-    def drives(self, browser):
-        return browser in self.wheels
+    def drives(self, page):
+        return page in self.drivers
 
-    def drive(self, command, browser):
-        if browser not in self.wheels:
-            return Reply(False, 'Take the wheel first.')
+    def drive(self, command, page):
+        if page not in self.drivers:
+            return CommandReply(False, 'Take the wheel first.')
         self.relayed.append(command.arguments)
-        return Reply(True)
+        return CommandReply(True)
 
-    def carry_out(self, command, person, browser):
-        self.wheels.add(browser)
-        return Reply(True, '', {'wheel': browser})
+    def carry_out(self, command, person, page):
+        self.drivers.add(page)
+        return CommandReply(True, '', {'wheel': page})
 
-    def leave(self, browser):
-        self.wheels.discard(browser)
+    def leave(self, page):
+        self.drivers.discard(page)
 
 
 class FakeAudit:
     """Remembers what it is told."""
 
     def __init__(self):
-        self.told = []
+        self.records = []
 
-    def tell(self, person, command, ok, message, arguments=None, listed=None):
-        self.told.append((command, ok, person.role, message, arguments))
+    def record(self, person, command, ok, message, arguments=None, listed=None):
+        self.records.append((command, ok, person.role, message, arguments))
 
 
 class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
@@ -84,17 +87,21 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
 
     def get_app(self):
         text = '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items())
-        book = TokenBook(text, 'tokens') if self.tokens else None
-        self.audit, self.desk, self.sections, self.log = FakeAudit(), FakeDesk(), Sections(), TrialLog()
-        settings = ConsoleSettings('127.0.0.1', 1, book, Hosts([], False), self.certificate, self.private_key)
-        self.hands = FakeHands()
-        self.gate = Gate(settings, book.cookie_secret if book else 'secret', self.audit)
-        self.office = Office(self.sections, self.log, self.desk, self.hands)
-        self.sensors = Sensors()
-        self.files = StillFiles()
-        self.shelf = BagShelf(self.folders(), self.sections)
-        recorded = RecordedTrials(self.shelf, Layouter(), self.files)
-        return make_app(self.gate, self.office, self.sensors, HistoryRoom(recorded, self.files))
+        tokens = AccessTokens(text, 'tokens') if self.tokens else None
+        self.audit, self.question_commands, self.sections, self.log = FakeAudit(
+        ), FakeQuestionCommands(), PageSections(), TrialLog()
+        settings = ConsoleSettings('127.0.0.1', 1, tokens, AllowedHosts([], False),
+                                   self.certificate, self.private_key)
+        self.teleoperation = FakeTeleoperation()
+        self.access = AccessControl(settings, tokens.cookie_secret if tokens else 'secret',
+                                    self.audit)
+        self.pages = OpenPages(self.sections, self.log, self.question_commands, self.teleoperation)
+        self.sensors = SensorStreams()
+        self.files = ImageStore()
+        self.catalogue = BagCatalogue(self.folders(), self.sections)
+        recorded = RecordedTrials(self.catalogue, LayoutWorker(), self.files)
+        return make_app(self.access, self.pages, self.sensors,
+                        HistoryRequests(recorded, self.files))
 
     def folders(self):
         """Of bags."""
@@ -104,27 +111,34 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         return 'https' if self.certificate else 'http'
 
     def get_httpserver_options(self):
-        return {'ssl_options': tls_context(self.gate.settings), 'max_body_size': MOST_BYTES, 'max_header_size': 16384}
+        return {
+            'ssl_options': tls_context(self.access.settings), 'max_body_size': MOST_BYTES,
+            'max_header_size': 16384
+        }
 
     @property
     def origin(self):
         return '{}://127.0.0.1:{}'.format(self.get_protocol(), self.get_http_port())
 
     def ask(self, path, method='GET', body=None, **headers):
-        given = {name.replace('_', '-'): value for name, value in headers.items() if value is not None}
+        given = {
+            name.replace('_', '-'): value
+            for name, value in headers.items() if value is not None
+        }
         return self.fetch(path, method=method, body=body, headers=given, follow_redirects=False,
                           allow_nonstandard_methods=True, ca_certs=self.certificate or None)
 
     def begin(self, **headers):
         """A fresh session: its cookie and what the server says of it."""
         answer = self.ask('/session', **headers)
-        cookie = answer.headers['Set-Cookie'].split(';')[0] if 'Set-Cookie' in answer.headers else headers['Cookie']
+        cookie = answer.headers['Set-Cookie'].split(
+            ';')[0] if 'Set-Cookie' in answer.headers else headers['Cookie']
         return cookie, json.loads(answer.body)
 
     def sign_in(self, role):
-        cookie, said = self.begin()
-        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS[role]}), Cookie=cookie, Origin=self.origin,
-                          X_Xsrf=said['xsrf'])
+        cookie, info = self.begin()
+        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS[role]}), Cookie=cookie,
+                          Origin=self.origin, X_Xsrf=info['xsrf'])
         assert answer.code == 200
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
@@ -133,9 +147,12 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         client = self.http_client
         answer = await client.fetch(self.get_url('/session'), ca_certs=self.certificate or None)
         cookie = answer.headers['Set-Cookie'].split(';')[0]
-        headers = {'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']}
+        headers = {
+            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']
+        }
         answer = await client.fetch(self.get_url('/session'), method='POST', headers=headers,
-                                    ca_certs=self.certificate or None, body=json.dumps({'token': TOKENS[role]}))
+                                    ca_certs=self.certificate or None,
+                                    body=json.dumps({'token': TOKENS[role]}))
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
     def connect(self, cookie='', **headers):
@@ -160,8 +177,12 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
             if message.get('re') == number:
                 return message
 
-    async def open_page(self, cookie, said, expert='ann'):
+    async def until(self, condition):
+        """Let the console work until the condition holds."""
+        assert await wait_in_loop(condition)
+
+    async def open_page(self, cookie, info, expert='ann'):
         socket = await self.connect(cookie)
-        reply = await self.say(socket, do='hello', xsrf=said['xsrf'], expert=expert)
+        reply = await self.say(socket, do='hello', xsrf=info['xsrf'], expert=expert)
         assert reply['ok'], reply
         return socket

@@ -1,12 +1,14 @@
-"""A camera that sees boxes and upright cylinders, a ray per pixel: exact depth, colour, and whose pixel it is."""
+"""A camera that sees boxes and upright cylinders, a ray per pixel: exact depth, colour, and whose
+pixel it is.
+"""
 from typing import NamedTuple, Sequence
 
 import numpy as np
 
+from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import pixels_of
 from smach_oracle.geometry.transforms import apply, from_rpy, transform
-from smach_oracle.simulation.robot.interface import Frame
-from smach_oracle.simulation.world.scene import Body
+from smach_oracle.simulation.scenes.scene import Body
 
 WIDTH, HEIGHT = 640, 480
 FOCAL = HEIGHT / 2 / np.tan(np.radians(45) / 2)
@@ -15,9 +17,9 @@ LIGHT = np.array([-0.4, 0.3, 0.85])
 
 
 class Seen(NamedTuple):
-    """A frame and, for each pixel, the index of the body that it shows; -1 for none."""
+    """An image and, for each pixel, the index of the body that it shows; -1 for none."""
 
-    frame: Frame
+    image: CameraImage
     bodies: np.ndarray
 
 
@@ -29,8 +31,8 @@ def camera_at(eye: Sequence[float], target: Sequence[float]) -> np.ndarray:
     return transform(eye, np.column_stack([right, np.cross(forward, right), forward]))
 
 
-def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generator, noise: float = 1.0,
-        colour_noise: float = 6.0) -> Seen:
+def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generator,
+        noise: float = 1.0, colour_noise: float = 6.0) -> Seen:
     """What a Kinect-like camera sees: `noise` scales that of depth, 0 is a perfect one."""
     depth, whose = np.full((HEIGHT, WIDTH), np.inf), np.full((HEIGHT, WIDTH), -1)
     colour = np.full((HEIGHT, WIDTH, 3), 0.75)
@@ -45,15 +47,18 @@ def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generat
         shade = 0.55 + 0.45 * np.clip(normal @ LIGHT, 0, 1)
         colour[part][nearer] = (np.array(body.colour) * shade[..., None])[nearer]
     image = 255 * colour + generator.normal(0, colour_noise, colour.shape)
-    return Seen(Frame(1.0, np.clip(image, 0, 255).astype(np.uint8), _measured(depth, generator, noise), INTRINSICS,
-                      camera), whose)
+    return Seen(
+        CameraImage(1.0,
+                    np.clip(image, 0, 255).astype(np.uint8), _measured(depth, generator, noise),
+                    INTRINSICS, camera), whose)
 
 
 def _measured(depth: np.ndarray, generator: np.random.Generator, noise: float) -> np.ndarray:
     known = np.where(np.isfinite(depth), depth, np.nan)
     if noise == 0:
         return known.astype(np.float32)
-    measured = known + generator.normal(0, 1, depth.shape) * noise * (0.0012 + 0.0019 * (known - 0.4) ** 2)
+    measured = known + generator.normal(0, 1, depth.shape) * noise * (0.0012 + 0.0019 *
+                                                                      (known - 0.4)**2)
     measured[generator.random(depth.shape) < 0.005 * noise] = np.nan
     jump = np.abs(np.gradient(np.where(np.isfinite(depth), depth, 9.0))).max(axis=0) > 0.03
     measured[jump & (generator.random(depth.shape) < 0.7)] = np.nan
@@ -62,7 +67,9 @@ def _measured(depth: np.ndarray, generator: np.random.Generator, noise: float) -
 
 
 def _part_of_image(body: Body, camera: np.ndarray):
-    """Rows and columns of which all that the body covers lies; the whole image where it reaches behind the camera."""
+    """Rows and columns of which all that the body covers lies; the whole image where it reaches
+    behind the camera.
+    """
     size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     corners = apply(from_rpy(body.position, yaw=body.yaw), signs * size / 2)
@@ -75,12 +82,15 @@ def _part_of_image(body: Body, camera: np.ndarray):
 
 
 def _cast(body: Body, eye: np.ndarray, rays: np.ndarray):
-    """Distance along each ray (in units of the ray), inf where it misses, and the surface's normal there."""
+    """Distance along each ray (in units of the ray), inf where it misses, and the surface's normal
+    there.
+    """
     cos, sin = np.cos(body.yaw), np.sin(body.yaw)
     turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
     start, along = turn @ (eye - body.position), rays @ turn.T
     along = np.where(np.abs(along) < 1e-9, 1e-9, along)
-    distance, normal = (_box if body.shape == 'box' else _cylinder)(np.array(body.size), start, along)
+    distance, normal = (_box if body.shape == 'box' else _cylinder)(np.array(body.size), start,
+                                                                    along)
     return distance, normal @ turn
 
 
@@ -103,7 +113,8 @@ def _cylinder(size, start, along):
     side = np.where((root > 0) & (np.abs(side_z) <= half) & (side > 0), side, np.inf)
     top = (half - start[2]) / along[..., 2]
     top_point = start[:2] + top[..., None] * along[..., :2]
-    top = np.where((top > 0) & ((top_point ** 2).sum(axis=-1) <= radius ** 2) & (start[2] > half), top, np.inf)
+    top = np.where((top > 0) & ((top_point**2).sum(axis=-1) <= radius**2) & (start[2] > half), top,
+                   np.inf)
     hit = start[:2] + np.where(np.isfinite(side), side, 0)[..., None] * along[..., :2]
     normal = np.concatenate([hit / radius, np.zeros(hit.shape[:2] + (1,))], axis=-1)
     return np.minimum(side, top), np.where((top < side)[..., None], [0.0, 0.0, 1.0], normal)

@@ -1,10 +1,12 @@
-"""The use cases' scripts, and the launch file that runs any script: what is missing is told in one line."""
+"""The use cases' scripts, and the launch file that runs any script: what is missing is told in one
+line.
+"""
 import pytest
 import rospy
 from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
 
-from smach_oracle.ros.script_runner import parse
+from smach_oracle.ros.oracle_run.script_runner import parse
 from smach_oracle.tasks import drink_retrieval, pick_and_place
 
 
@@ -20,7 +22,8 @@ def test_without_a_world_a_task_names_the_launch_file_that_has_one(task, monkeyp
     name = task.__name__.split('.')[-1]
     text = caught.value.code
     assert isinstance(text, str), 'printed by Python, with exit code 1'
-    assert text.startswith(name + ': no world here') and name + '.launch' in text and '\n' not in text
+    assert text.startswith(name +
+                           ': no world here') and name + '.launch' in text and '\n' not in text
 
 
 def arguments_of(*given):

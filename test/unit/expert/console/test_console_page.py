@@ -1,16 +1,19 @@
-"""The page as it is shipped: no markup made of text, nothing from elsewhere, everything there that it names."""
+"""The page as it is shipped: no markup made of text, nothing from elsewhere, everything there that
+it names.
+"""
 import re
 from pathlib import Path
 
 import pytest
 
 from smach_oracle.expert.console import server
-from smach_oracle.expert.console.handlers import POLICY
+from smach_oracle.expert.console.web.handlers import POLICY
 
 FILES = sorted(path for path in server.STATIC.rglob('*') if path.is_file())
 SCRIPTS = [path for path in FILES if path.suffix == '.js']
-MARKUP = re.compile(r'innerHTML|outerHTML|insertAdjacentHTML|document\.write|createContextualFragment|DOMParser|srcdoc'
-                    r'|\beval\(|new Function|javascript:|setAttribute\(.on|Unsafe|parseFromString')
+MARKUP = re.compile(
+    r'innerHTML|outerHTML|insertAdjacentHTML|document\.write|createContextualFragment|DOMParser|srcdoc'
+    r'|\beval\(|new Function|javascript:|setAttribute\(.on|Unsafe|parseFromString')
 
 
 def test_there_is_a_page():
@@ -30,7 +33,7 @@ def test_nothing_comes_from_elsewhere(path):
 
 @pytest.mark.parametrize('path', SCRIPTS, ids=lambda path: path.name)
 def test_every_module_that_is_imported_is_there(path):
-    for name in re.findall(r"from '(\./[\w.]+)'", path.read_text(encoding='utf-8')):
+    for name in re.findall(r"from '(\.\.?/[\w./]+)'", path.read_text(encoding='utf-8')):
         assert (path.parent / name).is_file(), name
 
 
@@ -46,6 +49,8 @@ def test_the_policy_allows_nothing_that_is_not_its_own():
 
 
 def test_the_build_installs_all_of_it():
-    setup = Path(__file__).resolve().parents[3] / 'setup.py'
-    assert "'static/*.*', 'static/js/*.js'" in setup.read_text(encoding='utf-8')
-    assert {path.parent for path in FILES} == {server.STATIC, server.STATIC / 'js'}
+    setup = Path(__file__).resolve().parents[4] / 'setup.py'
+    patterns = re.findall(r"'(static/[^']+)'", setup.read_text(encoding='utf-8'))
+    assert {path
+            for pattern in patterns
+            for path in server.STATIC.parent.glob(pattern)} == set(FILES)

@@ -1,5 +1,6 @@
-"""The console's web server attacked over real connections: hosts, origins, cookies, forged requests, roles, floods."""
-import asyncio
+"""The console's web server attacked over real connections: hosts, origins, cookies, forged
+requests, roles, floods.
+"""
 import json
 import time
 
@@ -7,21 +8,25 @@ import console_case
 import tornado.testing
 from console_case import TOKENS
 
-from smach_oracle.expert.console import handlers, page_socket, server, sessions
+from smach_oracle.expert.console import page_socket, server
+from smach_oracle.expert.console.web import handlers, sessions
+from smach_oracle.expert.console.web.access import ClientRateLimits
 
 
 class TestRequests(console_case.ConsoleCase):
 
     def test_every_answer_keeps_the_page_to_itself(self):
-        for path, host in (('/', None), ('/session', None), ('/nothing', None), ('/static/js/main.js', None),
+        for path, host in (('/', None), ('/session', None), ('/nothing',
+                                                             None), ('/static/js/main.js', None),
                            ('/static/nothing.js', None), ('/', 'evil.example'), ('/socket', None)):
             answer = self.ask(path, Host=host)
             for name in handlers.HEADERS:
                 assert answer.headers.get(name), (path, name, answer.code)
-            assert 'Server' not in answer.headers and 'Access-Control-Allow-Origin' not in answer.headers
+            assert 'Server' not in answer.headers
+            assert 'Access-Control-Allow-Origin' not in answer.headers
 
     def test_another_host_name_is_refused_everywhere(self):
-        for path in ('/', '/session', '/static/app.css', '/socket', '/nothing'):
+        for path in ('/', '/session', '/static/css/page.css', '/socket', '/nothing'):
             for host in ('evil.example', '10.1.2.3', 'localhost.evil.example'):
                 assert self.ask(path, Host=host).code == 421
 
@@ -30,8 +35,9 @@ class TestRequests(console_case.ConsoleCase):
             assert self.ask('/session', Origin=origin).code == 403
 
     def test_no_file_outside_of_the_page_is_served(self):
-        for path in ('/static/../server.py', '/static/%2e%2e/server.py', '/static/..%2fserver.py', '/../server.py',
-                     '/static//etc/passwd', '/static/%2fetc%2fpasswd', '/server.py', '/static/js/..%5c..%5cserver.py'):
+        for path in ('/static/../server.py', '/static/%2e%2e/server.py', '/static/..%2fserver.py',
+                     '/../server.py', '/static//etc/passwd', '/static/%2fetc%2fpasswd',
+                     '/server.py', '/static/js/..%5c..%5cserver.py'):
             assert self.ask(path).code in (403, 404), path
 
     def test_an_error_repeats_nothing_of_the_request(self):
@@ -43,115 +49,125 @@ class TestRequests(console_case.ConsoleCase):
             assert self.ask('/session', method, Origin=self.origin).code in (405, 400), method
 
     def test_a_flood_of_requests_is_cut_off(self):
-        self.gate.requests._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 3.0)
+        self.access.requests = ClientRateLimits(rate=0.0, burst=3.0, for_all=5.0)
         assert [self.ask('/session').code for _ in range(4)] == [200, 200, 200, 429]
 
     def test_as_many_pages_as_one_browser_may_have_can_be_loaded_at_once(self):
         files = 1 + sum(path.is_file() for path in server.STATIC.rglob('*'))
-        assert self.gate.files.take('10.0.0.1'), 'the first of them'
+        assert self.access.files.take('10.0.0.1'), 'the first of them'
         wanted = page_socket.MOST_OF_A_SESSION * files - 1
-        assert sum(self.gate.files.take('10.0.0.1') for _ in range(wanted)) == wanted
-        self.gate.requests._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 0.0)
-        assert [self.ask(path).code for path in ('/', '/static/app.css', '/session')] == [200, 200, 429]
+        assert sum(self.access.files.take('10.0.0.1') for _ in range(wanted)) == wanted
+        self.access.requests = ClientRateLimits(rate=0.0, burst=0.0, for_all=5.0)
+        assert [self.ask(path).code
+                for path in ('/', '/static/css/page.css', '/session')] == [200, 200, 429]
 
 
 class TestSignIn(console_case.ConsoleCase):
 
     def test_the_cookie_is_for_this_page_s_requests_alone(self):
         cookie = self.ask('/session').headers['Set-Cookie']
-        assert 'HttpOnly' in cookie and 'SameSite=Strict' in cookie and 'Path=/' in cookie and 'Domain' not in cookie
+        assert all(part in cookie for part in ('HttpOnly', 'SameSite=Strict', 'Path=/'))
+        assert 'Domain' not in cookie
 
     def test_a_token_is_exchanged_for_a_new_session(self):
-        before, said = self.begin()
-        assert said['signed_in'] is False and said['role'] == ''
-        cookie, said = self.sign_in('operator')
-        assert (said['signed_in'], said['role']) == (True, 'operator') and cookie != before
+        before, info = self.begin()
+        assert info['signed_in'] is False and info['role'] == ''
+        cookie, info = self.sign_in('operator')
+        assert (info['signed_in'], info['role']) == (True, 'operator') and cookie != before
         assert TOKENS['operator'] not in cookie
-        assert ('sign_in', True, 'operator', '', None) in self.audit.told
+        assert ('sign_in', True, 'operator', '', None) in self.audit.records
 
     def test_a_forged_request_is_refused(self):
-        cookie, said = self.begin()
+        cookie, info = self.begin()
         other, other_said = self.begin()
         body = json.dumps({'token': TOKENS['operator']})
         for headers in ({}, {'X_Xsrf': ''}, {'X_Xsrf': 'wrong'}, {'X_Xsrf': other_said['xsrf']},
-                        {'X_Xsrf': said['xsrf'], 'Origin': None},
-                        {'X_Xsrf': said['xsrf'], 'Origin': 'http://evil.example'},
-                        {'X_Xsrf': said['xsrf'], 'Cookie': None}):
+                        {'X_Xsrf': info['xsrf'], 'Origin': None},
+                        {'X_Xsrf': info['xsrf'], 'Origin': 'http://evil.example'},
+                        {'X_Xsrf': info['xsrf'], 'Cookie': None}):
             given = dict({'Cookie': cookie, 'Origin': self.origin}, **headers)
             assert self.ask('/session', 'POST', body, **given).code == 403, headers
         assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin).code == 403
 
     def test_guessing_is_slowed_down_and_audited(self):
-        cookie, said = self.begin()
-        codes = [self.ask('/session', 'POST', json.dumps({'token': 'guess'}), Cookie=cookie, Origin=self.origin,
-                          X_Xsrf=said['xsrf']).code for _ in range(7)]
+        cookie, info = self.begin()
+        codes = [
+            self.ask('/session', 'POST', json.dumps({'token': 'guess'}), Cookie=cookie,
+                     Origin=self.origin, X_Xsrf=info['xsrf']).code for _ in range(7)
+        ]
         assert codes == [401] * 5 + [429] * 2
-        assert self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}), Cookie=cookie,
-                        Origin=self.origin, X_Xsrf=said['xsrf']).code == 429, 'the right one, too'
-        assert [told[:2] for told in self.audit.told] == [('sign_in', False)] * 8
-        assert 'guess' not in str(self.audit.told)
+        assert self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}),
+                        Cookie=cookie, Origin=self.origin,
+                        X_Xsrf=info['xsrf']).code == 429, 'the right one, too'
+        assert [record[:2] for record in self.audit.records] == [('sign_in', False)] * 8
+        assert 'guess' not in str(self.audit.records)
 
     def test_what_is_no_token_is_refused(self):
-        cookie, said = self.begin()
+        cookie, info = self.begin()
         for body in ('', '{', '[]', '{"token": 1}', '{"token": null}'):
-            answer = self.ask('/session', 'POST', body, Cookie=cookie, Origin=self.origin, X_Xsrf=said['xsrf'])
+            answer = self.ask('/session', 'POST', body, Cookie=cookie, Origin=self.origin,
+                              X_Xsrf=info['xsrf'])
             assert answer.code in (400, 429)
-        assert not any(told[1] for told in self.audit.told)
+        assert not any(record[1] for record in self.audit.records)
 
     def test_a_forged_cookie_is_none(self):
         name, value = self.sign_in('viewer')[0].split('=', 1)
         parts = value.strip('"').split('|')
-        for forged in (value[:-3] + 'aaa', '["x","operator",""]', '|'.join(parts[:-1] + ['0' * 64]), ''):
+        for forged in (value[:-3] + 'aaa', '["x","operator",""]', '|'.join(parts[:-1] + ['0' * 64]),
+                       ''):
             assert self.begin(Cookie='{}={}'.format(name, forged))[1]['signed_in'] is False
 
     def test_signing_out_ends_it(self):
-        cookie, said = self.sign_in('viewer')
-        answer = self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=said['xsrf'])
+        cookie, info = self.sign_in('viewer')
+        answer = self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin,
+                          X_Xsrf=info['xsrf'])
         assert json.loads(answer.body)['signed_in'] is False
-        assert ('sign_out', True, 'viewer', '', None) in self.audit.told
-        assert self.begin(Cookie=cookie)[1]['signed_in'] is False, 'a copy of its cookie is good for nothing'
+        assert ('sign_out', True, 'viewer', '', None) in self.audit.records
+        assert self.begin(
+            Cookie=cookie)[1]['signed_in'] is False, 'a copy of its cookie is good for nothing'
 
     def test_who_has_not_signed_in_cannot_flood_what_is_known_of_ended_sessions(self):
-        ended, said = self.sign_in('viewer')
-        self.ask('/session', 'DELETE', Cookie=ended, Origin=self.origin, X_Xsrf=said['xsrf'])
-        told, known = len(self.audit.told), len(self.gate._ended)
+        ended, info = self.sign_in('viewer')
+        self.ask('/session', 'DELETE', Cookie=ended, Origin=self.origin, X_Xsrf=info['xsrf'])
+        shown, known = len(self.audit.records), len(self.access._ended)
         for _ in range(3):
-            cookie, said = self.begin()
-            assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=said['xsrf']).code == 200
-        assert (len(self.audit.told), len(self.gate._ended)) == (told, known)
+            cookie, info = self.begin()
+            assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin,
+                            X_Xsrf=info['xsrf']).code == 200
+        assert (len(self.audit.records), len(self.access._ended)) == (shown, known)
 
     def test_sessions_whose_cookie_is_too_old_anyway_are_forgotten(self):
-        self.gate._ended['long ago'] = time.monotonic() - 3600.0 * sessions.HOURS - 1.0
-        self.gate.end(sessions.Session('now', time.time(), 'viewer'))
-        assert list(self.gate._ended) == ['now']
+        self.access._ended['long ago'] = time.monotonic() - 3600.0 * sessions.HOURS - 1.0
+        self.access.end(sessions.BrowserSession('now', time.time(), 'viewer'))
+        assert list(self.access._ended) == ['now']
 
     @tornado.testing.gen_test
     async def test_a_page_whose_session_ends_while_it_connects_gets_nothing(self):
-        cookie, said = await self.signed('operator')
+        cookie, info = await self.signed('operator')
         page = await self.connect(cookie)
-        self.gate.end(next(iter(self.office.open)).session)  # as between its handshake and its list of open pages
-        reply = await self.say(page, do='hello', xsrf=said['xsrf'], expert='ann')
+        # as between its handshake and its list of open pages
+        self.access.end(next(iter(self.pages.open)).session)
+        reply = await self.say(page, do='hello', xsrf=info['xsrf'], expert='ann')
         assert reply is None or not reply['ok']
-        assert not self.office.sockets
+        assert not self.pages.sockets
 
     @tornado.testing.gen_test
     async def test_a_page_that_takes_its_time_to_go_commands_nothing_any_more(self):
         page = await self.open_page(*await self.signed('operator'))
         assert (await self.say(page, 9, do='claim', question='/robot q'))['ok']
-        self.office.close(next(iter(self.office.open)).session)
+        self.pages.close(next(iter(self.pages.open)).session)
         for number in range(3):  # before it has heard that it shall go
             page.write_message(json.dumps({'id': number, 'do': 'claim', 'question': '/robot q'}))
-        while self.office.open:
-            await asyncio.sleep(0.01)
-        assert len(self.desk.done) == 1
+        await self.until(lambda: not self.pages.open)
+        assert len(self.question_commands.done) == 1
 
     @tornado.testing.gen_test
     async def test_signing_out_closes_the_pages_of_that_browser_alone(self):
-        cookie, said = await self.signed('operator')
-        pages = [await self.open_page(cookie, said) for _ in range(2)]
+        cookie, info = await self.signed('operator')
+        pages = [await self.open_page(cookie, info) for _ in range(2)]
         other = await self.open_page(*await self.signed('operator'))
         await self.http_client.fetch(self.get_url('/session'), method='DELETE', headers={
-            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': said['xsrf']})
+            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': info['xsrf']})
         for page in pages:
             while await page.read_message() is not None:
                 pass
@@ -172,42 +188,43 @@ class TestSocket(console_case.ConsoleCase):
 
     @tornado.testing.gen_test
     async def test_nothing_is_told_or_done_before_a_hello_that_is_not_forged(self):
-        cookie, said = await self.signed('operator')
+        cookie, info = await self.signed('operator')
         self.sections.put('questions', ['secret'])
         socket = await self.connect(cookie)
-        self.office.push()
+        self.pages.push()
         reply = await self.say(socket, do='claim', question='q')
-        assert not reply['ok'] and self.desk.done == []
+        assert not reply['ok'] and self.question_commands.done == []
         assert await self.say(socket, do='hello', xsrf='0' * 64, expert='ann') is None
         assert socket.close_code == 4003
-        assert self.desk.done == []
+        assert self.question_commands.done == []
 
     @tornado.testing.gen_test
     async def test_a_viewer_sees_and_does_nothing(self):
         self.sections.put('questions', [])
         socket = await self.open_page(*await self.signed('viewer'))
-        self.office.push()
+        self.pages.push()
         assert json.loads(await socket.read_message())['sections'] == {'questions': []}
         for command in ('claim', 'take_over', 'release'):
             assert not (await self.say(socket, do=command, question='q'))['ok']
         assert not (await self.say(socket, do='answer', question='q', kind='goto', name='x'))['ok']
-        assert self.desk.done == []
-        assert [told[:3] for told in self.audit.told if told[0] == 'answer'] == [('answer', False, 'viewer')]
+        assert self.question_commands.done == []
+        assert [record[:3] for record in self.audit.records
+                if record[0] == 'answer'] == [('answer', False, 'viewer')]
 
     @tornado.testing.gen_test
     async def test_an_operator_s_commands_are_carried_out_under_the_name_given(self):
         socket = await self.open_page(*await self.signed('operator'))
         reply = await self.say(socket, do='claim', question='q')
-        assert (reply['ok'], reply['message'], self.desk.done) == (True, 'done', [('claim', 'ann', 'operator')])
+        assert (reply['ok'], reply['message'],
+                self.question_commands.done) == (True, 'done', [('claim', 'ann', 'operator')])
         socket.close()
-        while not self.desk.left:
-            await asyncio.sleep(0.01)
+        await self.until(lambda: self.question_commands.left)
 
     @tornado.testing.gen_test
     async def test_a_message_that_is_no_command_is_refused_and_audited(self):
         socket = await self.open_page(*await self.signed('operator'))
         assert not (await self.say(socket, do='publish', topic='/cmd_vel'))['ok']
-        assert ('unknown', False) in [told[:2] for told in self.audit.told]
+        assert ('unknown', False) in [record[:2] for record in self.audit.records]
 
     @tornado.testing.gen_test
     async def test_a_flood_of_commands_is_dropped_and_then_cut_off(self):
@@ -216,7 +233,7 @@ class TestSocket(console_case.ConsoleCase):
             await socket.write_message('{"id": 2, "do": "claim", "question": "q"}')
         while await socket.read_message() is not None:
             pass
-        assert socket.close_code == 4008 and len(self.desk.done) < 50
+        assert socket.close_code == 4008 and len(self.question_commands.done) < 50
 
     @tornado.testing.gen_test
     async def test_an_oversized_message_ends_the_connection(self):
@@ -227,20 +244,21 @@ class TestSocket(console_case.ConsoleCase):
     @tornado.testing.gen_test
     async def test_a_slow_page_gets_the_newest_version_and_no_queue(self):
         socket = await self.open_page(*await self.signed('viewer'))
-        page, = self.office.sockets
+        page, = self.pages.sockets
         page._writing = True
         for number in range(100):
             self.sections.put('robots', [number])
-            self.office.push()
+            self.pages.push()
         page._writing = False
-        self.office.push()
-        self.office.push()
+        self.pages.push()
+        self.pages.push()
         first = json.loads(await socket.read_message())
-        assert first['sections'] == {'robots': [99]} and first['all'], 'what else a page knows from before is gone'
+        assert first['sections'] == {
+            'robots': [99]
+        } and first['all'], 'what else a page knows from before is gone'
         self.sections.put('robots', None)
-        while page._writing:
-            await asyncio.sleep(0.01)
-        self.office.push()
+        await self.until(lambda: not page._writing)
+        self.pages.push()
         second = json.loads(await socket.read_message())
         assert second['sections'] == {'robots': None} and 'all' not in second
 
@@ -250,6 +268,6 @@ class TestWithoutTokens(console_case.ConsoleCase):
     tokens = False
 
     def test_on_loopback_whoever_gets_there_is_at_home_but_not_a_page_elsewhere(self):
-        _, said = self.begin()
-        assert (said['signed_in'], said['role'], said['tokens']) == (True, 'teleoperator', False)
+        _, info = self.begin()
+        assert (info['signed_in'], info['role'], info['tokens']) == (True, 'teleoperator', False)
         assert self.ask('/session', Origin='http://evil.example').code == 403

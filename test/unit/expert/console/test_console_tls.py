@@ -11,8 +11,8 @@ import tornado.iostream
 import tornado.testing
 
 from smach_oracle.expert.console.server import tls_context
-from smach_oracle.expert.console.settings import read_settings
-from smach_oracle.oracle.errors import ConfigError
+from smach_oracle.expert.console.web.settings import read_settings
+from smach_oracle.oracle.errors import SettingsError
 
 FOLDER = tempfile.mkdtemp(prefix='console-tls-')
 
@@ -22,18 +22,21 @@ def path(name):
 
 
 def openssl(*arguments):
-    subprocess.run(['openssl', *arguments], check=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    subprocess.run(['openssl', *arguments], check=True, stdout=subprocess.PIPE,
+                   stderr=subprocess.PIPE)
 
 
 def make(name):
-    openssl('req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj', '/CN=robot', '-addext',
-            'subjectAltName=DNS:localhost,IP:127.0.0.1', '-keyout', path(name + '.key'), '-out', path(name + '.pem'))
+    openssl('req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
+            '/CN=robot', '-addext', 'subjectAltName=DNS:localhost,IP:127.0.0.1', '-keyout',
+            path(name + '.key'), '-out', path(name + '.pem'))
 
 
 def setup_module():
     make('own')
     make('other')
-    openssl('rsa', '-aes128', '-passout', 'pass:secret', '-in', path('own.key'), '-out', path('locked.key'))
+    openssl('rsa', '-aes128', '-passout', 'pass:secret', '-in', path('own.key'), '-out',
+            path('locked.key'))
     with open(path('empty'), 'w', encoding='utf-8'):
         pass
 
@@ -63,26 +66,30 @@ class TestEncrypted(console_case.ConsoleCase):
 
     @tornado.testing.gen_test
     async def test_the_socket_is_encrypted_too_and_a_page_that_is_not_may_not_open_it(self):
-        cookie, said = await self.signed('operator')
+        cookie, info = await self.signed('operator')
         assert await self.refused(cookie, Origin=self.origin.replace('https', 'http')) == 403
         self.sections.put('questions', [])
-        socket = await self.open_page(cookie, said)
-        self.office.push()
+        socket = await self.open_page(cookie, info)
+        self.pages.push()
         assert json.loads(await socket.read_message())['sections'] == {'questions': []}
 
 
 def refusal(certificate, key):
     given = {'certificate': path(certificate), 'private_key': path(key)}
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(SettingsError) as error:
         tls_context(read_settings(lambda name, default: given.get(name, default)))
     return str(error.value)
 
 
-@pytest.mark.parametrize('certificate, key, says', [
-    ('nothing.pem', 'own.key', "~certificate: '{}'"), ('own.pem', 'nothing.key', "~private_key: '{}'"),
-    ('own.pem', '', "~private_key: '{}'"), ('own.pem', 'other.key', 'KEY_VALUES_MISMATCH'),
-    ('own.key', 'own.pem', 'a certificate and the key'), ('empty', 'own.key', 'a certificate and the key'),
-    ('own.pem', 'empty', 'a certificate and the key'), ('own.pem', 'locked.key', 'a key with a passphrase')])
+@pytest.mark.parametrize('certificate, key, says',
+                         [('nothing.pem', 'own.key', "~certificate: '{}'"),
+                          ('own.pem', 'nothing.key', "~private_key: '{}'"),
+                          ('own.pem', '', "~private_key: '{}'"),
+                          ('own.pem', 'other.key', 'KEY_VALUES_MISMATCH'),
+                          ('own.key', 'own.pem', 'a certificate and the key'),
+                          ('empty', 'own.key', 'a certificate and the key'),
+                          ('own.pem', 'empty', 'a certificate and the key'),
+                          ('own.pem', 'locked.key', 'a key with a passphrase')])
 def test_what_cannot_be_used_is_named(certificate, key, says):
     wrong = path(certificate if 'certificate' in says else key)
     assert says.format(wrong) in refusal(certificate, key)

@@ -1,23 +1,25 @@
 """What an expert can type, and what it means."""
 import pytest
+import rospy
 from expert_fixtures import make_question
 
-import rospy
-from smach_oracle.expert.options import choose, options
+from smach_oracle.expert.terminal.options import choose, options
 from smach_oracle.msg import ExpertDecision
+from smach_oracle.oracle.asking.question import OutcomeChoice
 from smach_oracle.oracle.errors import AnswerError
-from smach_oracle.oracle.question import OutcomeChoice
-from smach_oracle.ros.decision_check import check_decision
-from smach_oracle.ros.question_messages import to_goal
+from smach_oracle.ros.expert.answer_rules import check_decision
+from smach_oracle.ros.expert.question_messages import to_goal
 
 GOAL = to_goal(make_question(), '/robot', rospy.Time(1))
 
 
 def test_every_answer_has_a_key():
-    assert [(option.key, option.words) for option in options(GOAL)] == [
-        ('1', 'goto DETECT'), ('2', 'goto PICK'), ('3', 'goto PLACE'), ('s1', 'supersede succeeded'),
-        ('s2', 'supersede aborted'), ('g', 'give_up'), ('g1', 'give_up succeeded'), ('g2', 'give_up aborted'),
-        ('i1', 'interface assist')]
+    assert [(option.key, option.words)
+            for option in options(GOAL)] == [('1', 'goto DETECT'), ('2', 'goto PICK'),
+                                             ('3', 'goto PLACE'), ('s1', 'supersede succeeded'),
+                                             ('s2', 'supersede aborted'), ('g', 'give_up'),
+                                             ('g1', 'give_up succeeded'), ('g2', 'give_up aborted'),
+                                             ('i1', 'interface assist')]
 
 
 def test_outcomes_with_which_the_machine_goes_on_come_first():
@@ -38,12 +40,16 @@ def test_every_answer_on_offer_fits_its_question():
             check_decision(GOAL, decision)
 
 
-@pytest.mark.parametrize('typed, kind, name', [
-    ('1', ExpertDecision.GOTO, 'DETECT'), ('DETECT', ExpertDecision.GOTO, 'DETECT'),
-    ('goto  PICK', ExpertDecision.GOTO, 'PICK'), ('S2', ExpertDecision.SUPERSEDE, 'aborted'),
-    ('supersede succeeded', ExpertDecision.SUPERSEDE, 'succeeded'), ('g', ExpertDecision.GIVE_UP, ''),
-    ('give_up aborted', ExpertDecision.GIVE_UP, 'aborted'), ('i', ExpertDecision.INTERFACE, 'assist'),
-    (' assist ', ExpertDecision.INTERFACE, 'assist')])
+@pytest.mark.parametrize('typed, kind, name',
+                         [('1', ExpertDecision.GOTO, 'DETECT'),
+                          ('DETECT', ExpertDecision.GOTO, 'DETECT'),
+                          ('goto  PICK', ExpertDecision.GOTO, 'PICK'),
+                          ('S2', ExpertDecision.SUPERSEDE, 'aborted'),
+                          ('supersede succeeded', ExpertDecision.SUPERSEDE, 'succeeded'),
+                          ('g', ExpertDecision.GIVE_UP, ''),
+                          ('give_up aborted', ExpertDecision.GIVE_UP, 'aborted'),
+                          ('i', ExpertDecision.INTERFACE, 'assist'),
+                          (' assist ', ExpertDecision.INTERFACE, 'assist')])
 def test_an_answer_is_typed_by_key_by_words_or_by_a_name_of_its_own(typed, kind, name):
     option = choose(typed, options(GOAL))
     assert (option.kind, option.name) == (kind, name)

@@ -4,10 +4,12 @@ import socket
 
 import pytest
 
-from smach_oracle.expert.terminal_start import parse
+from smach_oracle.expert.terminal.start import parse
 
 
-@pytest.mark.parametrize('raised', [KeyError('getpwuid(): uid not found: 4711'), OSError('No username set')])
+@pytest.mark.parametrize('raised',
+                         [KeyError('getpwuid(): uid not found: 4711'),
+                          OSError('No username set')])
 def test_a_user_without_a_name_is_an_operator(monkeypatch, raised):
     def nobody():
         raise raised

@@ -1,4 +1,6 @@
-"""Keys for a terminal under test: typed when the screen shows what they answer to, and never waited for without end."""
+"""Keys for a terminal under test: typed when the screen shows what they answer to, and never waited
+for without end.
+"""
 import contextlib
 import threading
 
@@ -13,14 +15,16 @@ PATIENCE_S = 60.0
 def typist(shown, typed, script=()):
     """A terminal's input that types at once what is given, and goes on as the script says.
 
-    `shown`: a function for what is on the screen. `script`: pairs of what is waited for, words on the screen or a
-    function, and what comes then, keys or a function. Where it waits in vain, or the terminal does not end after it,
-    Ctrl-C ends the terminal.
+    `shown`: a function for what is on the screen. `script`: pairs of what is waited for, words on
+    the screen or a function, and what comes then, keys or a function. Where it waits in vain, or
+    the terminal does not end after it, Ctrl-C ends the terminal.
     """
     over = threading.Event()
 
     def came(awaited):
-        return wait_for(lambda: over.is_set() or (awaited() if callable(awaited) else awaited in shown()), PATIENCE_S)
+        return wait_for(
+            lambda: over.is_set() or (awaited()
+                                      if callable(awaited) else awaited in shown()), PATIENCE_S)
 
     def work(keys):
         for awaited, then in script:

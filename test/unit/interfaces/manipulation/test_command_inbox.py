@@ -1,8 +1,12 @@
-"""Commands that wait for the thread that carries them out: all that have come, in order, and never too many."""
+"""Commands that wait for the thread that carries them out: all that have come, in order, and never
+too many.
+"""
 import threading
 import time
 
-from smach_oracle.expert.command_inbox import CommandInbox
+from waiting import Once, waits
+
+from smach_oracle.interfaces.manipulation.command_inbox import CommandInbox
 
 
 def test_all_that_have_come_are_taken_in_order_with_the_times_at_which_they_came():
@@ -19,8 +23,10 @@ def test_all_that_have_come_are_taken_in_order_with_the_times_at_which_they_came
 
 def test_one_that_comes_while_somebody_waits_is_taken_at_once():
     inbox = CommandInbox()
-    threading.Timer(0.05, inbox.put, ['go']).start()
+    taker = threading.current_thread()
+    putter = Once(lambda: waits(taker), lambda: inbox.put('go'))
     assert [arrived.command for arrived in inbox.take_all(30.0)] == ['go']
+    putter.join()
 
 
 def test_a_flood_costs_the_oldest():

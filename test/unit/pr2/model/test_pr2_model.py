@@ -8,12 +8,12 @@ import numpy as np
 import pybullet
 import pytest
 
-from smach_oracle.simulation.robot import pr2_model
-from smach_oracle.simulation.robot.pr2_model import BASE_JOINTS, ModelError, pr2_files, srdf_pairs
-from smach_oracle.simulation.robot.rigid_links import fixed_frames
-from smach_oracle.simulation.world.bodies import pose_of
+from smach_oracle.pr2.model import pr2_model
+from smach_oracle.pr2.model.pr2_model import BASE_JOINTS, ModelError, pr2_files, srdf_pairs
+from smach_oracle.pr2.model.rigid_links import fixed_frames
+from smach_oracle.simulation.physics.bodies import pose_of
 
-ASK = 'from smach_oracle.simulation.robot.pr2_model import pr2_files; print(pr2_files().urdf)'
+ASK = 'from smach_oracle.pr2.model.pr2_model import pr2_files; print(pr2_files().urdf)'
 
 
 @pytest.fixture(scope='module')
@@ -24,11 +24,13 @@ def client():
 
 
 def load(client, path):
-    body = pybullet.loadURDF(str(path), useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-                             physicsClientId=client)
+    body = pybullet.loadURDF(str(path), useFixedBase=True,
+                             flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
     infos = [pybullet.getJointInfo(body, k, physicsClientId=client)
              for k in range(pybullet.getNumJoints(body, physicsClientId=client))]
-    return body, {info[1].decode(): info for info in infos}, {info[12].decode(): info[0] for info in infos}
+    return body, {info[1].decode(): info
+                  for info in infos}, {info[12].decode(): info[0]
+                                       for info in infos}
 
 
 def mass(client, body):
@@ -38,8 +40,10 @@ def mass(client, body):
 
 def test_two_processes_that_derive_it_at_once_both_get_it(tmp_path, monkeypatch):
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
-    asked = [subprocess.Popen([sys.executable, '-c', ASK], stdout=subprocess.PIPE, universal_newlines=True)
-             for _ in range(2)]
+    asked = [
+        subprocess.Popen([sys.executable, '-c', ASK], stdout=subprocess.PIPE,
+                         universal_newlines=True) for _ in range(2)
+    ]
     answers = {process.communicate(timeout=60)[0].strip().splitlines()[-1] for process in asked}
     assert len(answers) == 1 and all(process.returncode == 0 for process in asked)
     (folder,) = (tmp_path / 'smach_oracle').iterdir()  # no draft is left over
@@ -74,8 +78,10 @@ def test_every_triangle_has_its_normal():
     for mesh in meshes:
         triangles = np.frombuffer(mesh.read_bytes()[84:], pr2_model.TRIANGLE)
         corners = triangles['corners'].astype(float)
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        assert np.allclose(np.linalg.norm(triangles['normal'][area > 1e-10], axis=1), 1, atol=1e-3), mesh.name
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        assert np.allclose(np.linalg.norm(triangles['normal'][area > 1e-10], axis=1), 1,
+                           atol=1e-3), mesh.name
 
 
 def test_every_file_that_it_names_is_there_and_every_link_has_a_mass():
@@ -91,18 +97,26 @@ def test_links_made_one_are_where_they_were_and_as_heavy(client):
     generator = np.random.default_rng(1)
     for name, info in joints.items():
         if info[2] != pybullet.JOINT_FIXED:
-            position = generator.uniform(*info[8:10]) if info[8] < info[9] else generator.uniform(-3, 3)
+            position = generator.uniform(
+                *info[8:10]) if info[8] < info[9] else generator.uniform(-3, 3)
             pybullet.resetJointState(whole, info[0], position, physicsClientId=client)
-            pybullet.resetJointState(merged, merged_joints[name][0], position, physicsClientId=client)
+            pybullet.resetJointState(merged, merged_joints[name][0], position,
+                                     physicsClientId=client)
     frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
     for name, number in links.items():
         holder, holder_from_link = frames[name]
-        poses = [pose_of(*pybullet.getLinkState(body, k, computeForwardKinematics=True, physicsClientId=client)[4:6])
-                 for body, k in ((whole, number), (merged, merged_links[holder]))]
+        poses = [
+            pose_of(*pybullet.getLinkState(body, k, computeForwardKinematics=True,
+                                           physicsClientId=client)[4:6])
+            for body, k in ((whole, number), (merged, merged_links[holder]))
+        ]
         assert np.allclose(poses[0], poses[1] @ holder_from_link, atol=1e-5), name
-    assert mass(client, merged) == pytest.approx(mass(client, whole) + 3, abs=0.01)  # 1 kg for each joint of the base
-    assert set(BASE_JOINTS) | {name for name, info in joints.items() if info[2] != pybullet.JOINT_FIXED} == set(
-        merged_joints)
+    # 1 kg for each joint of the base
+    assert mass(client, merged) == pytest.approx(mass(client, whole) + 3, abs=0.01)
+    assert set(BASE_JOINTS) | {
+        name
+        for name, info in joints.items() if info[2] != pybullet.JOINT_FIXED
+    } == set(merged_joints)
 
 
 def test_the_sum_of_the_jaws_is_the_gap_between_the_tips(client):
@@ -118,7 +132,10 @@ def test_the_sum_of_the_jaws_is_the_gap_between_the_tips(client):
 
 
 def test_pairs_that_may_touch_are_pairs_of_its_links():
-    links = {link.get('name') for link in ElementTree.parse(str(pr2_files().urdf)).getroot().findall('link')}
+    links = {
+        link.get('name')
+        for link in ElementTree.parse(str(pr2_files().urdf)).getroot().findall('link')
+    }
     pairs = srdf_pairs()
     assert frozenset(('r_elbow_flex_link', 'r_upper_arm_link')) in pairs
     assert sum(pair <= links for pair in pairs) > 500

@@ -2,8 +2,8 @@
 import pytest
 import rospy
 
-from smach_oracle.simulation.robot.kitchen import Kitchen
-from smach_oracle.simulation.robot.perception_node import kitchen_at, snapshot_service
+from smach_oracle.pr2.kitchen import Kitchen
+from smach_oracle.pr2.nodes.perception_node import kitchen_at, snapshot_service
 
 
 @pytest.fixture

@@ -1,15 +1,17 @@
-"""Detection of drinks in what the simulated PR2's camera sees of its refrigerator, against the physical truth."""
+"""Detection of drinks in what the simulated PR2's camera sees of its refrigerator, against the
+physical truth.
+"""
 import numpy as np
 import pytest
 
 from smach_oracle.geometry.transforms import inverse
-from smach_oracle.simulation.robot.clusters import NotSeen
-from smach_oracle.simulation.robot.drink import find_drink
-from smach_oracle.simulation.robot.kitchen import Kitchen, base_from_fridge, look_point
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.fridge import DOOR_JOINT
-from smach_oracle.simulation.world.kitchen_scene import draw
-from smach_oracle.simulation.world.physics import World
+from smach_oracle.pr2.kitchen import Kitchen, base_from_fridge, look_point
+from smach_oracle.pr2.perception.clusters import NotSeen
+from smach_oracle.pr2.perception.drink import find_drink
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
+from smach_oracle.simulation.scenes.kitchen_scene import draw
 from smach_oracle.tasks.drink_retrieval import IN_THE_FRIDGE, TORSO_HEIGHT
 
 
@@ -21,12 +23,16 @@ def _world():
 
 
 def seen(world, seed, degrees, **sensor):
-    """What is found with the robot before the open fridge, and m from it to the nearest drink's true place and size."""
+    """What is found with the robot before the open fridge, and m from it to the nearest drink's
+    true place and size.
+    """
     scene = draw(seed, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(degrees)),))
-    world.reset(scene._replace(bodies=(fridge,) + scene.bodies[1:], sensor=scene.sensor._replace(**sensor),
-                               robot=scene.robot._replace(base=IN_THE_FRIDGE,
-                                                          joints=(('torso_lift_joint', TORSO_HEIGHT),))))
+    world.reset(
+        scene._replace(
+            bodies=(fridge,) + scene.bodies[1:], camera=scene.camera._replace(**sensor),
+            robot=scene.robot._replace(base=IN_THE_FRIDGE,
+                                       joints=(('torso_lift_joint', TORSO_HEIGHT),))))
     robot = DirectRobot(world)
     believed = base_from_fridge(Kitchen(), robot.odom_from_base())
     robot.look_at(look_point(Kitchen(), believed))

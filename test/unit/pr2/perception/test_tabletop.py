@@ -7,26 +7,27 @@ from pr2_world import TABLE, extents, places, thing
 from ray_camera import INTRINSICS, WIDTH, camera_at, see
 
 from smach_oracle.geometry.depth import pixels_of
-from smach_oracle.simulation.robot.clusters import Capsule, NotSeen
-from smach_oracle.simulation.robot.tabletop import find_tabletop
-from smach_oracle.simulation.world.scene import Body
+from smach_oracle.pr2.perception.clusters import Capsule, NotSeen
+from smach_oracle.pr2.perception.tabletop import find_tabletop
+from smach_oracle.simulation.scenes.scene import Body
 
 CAMERA = camera_at((0.05, 0.03, 1.38), (0.75, 0.0, 0.75))
 FLOOR = Body('floor', 'box', (3.0, 4.0, 0.02), (2.0, 0.0, -0.01), colour=(0.6, 0.6, 0.6))
 ARM = Capsule('right arm', np.array([0.3, -0.25, 0.95]), np.array([0.62, 0.0, 0.95]), 0.08)
 
 
-def frame_of(bodies, seed=0, noise=1.0, camera=CAMERA):
-    return see([FLOOR] + list(bodies), camera, np.random.default_rng(seed), noise).frame
+def image_of(bodies, seed=0, noise=1.0, camera=CAMERA):
+    return see([FLOOR] + list(bodies), camera, np.random.default_rng(seed), noise).image
 
 
 def can(x, y, radius=0.03, colour=(0.1, 0.3, 0.8), height=0.12):
-    return Body('can', 'cylinder', (radius, radius, height), (x, y, 0.72 + height / 2), colour=colour)
+    return Body('can', 'cylinder', (radius, radius, height), (x, y, 0.72 + height / 2),
+                colour=colour)
 
 
-def reason(frame, **given):
+def reason(image, **given):
     with pytest.raises(NotSeen) as error:
-        find_tabletop(frame, **given)
+        find_tabletop(image, **given)
     return str(error.value)
 
 
@@ -36,67 +37,76 @@ def test_centres_and_sizes_are_right_to_millimetres(noise, limit):
     for seed in range(3):
         generator = np.random.default_rng(seed)
         bodies = [thing(generator, 'thing', *place) for place in places(generator, 3)]
-        found = find_tabletop(frame_of([TABLE] + bodies, seed, noise))
+        found = find_tabletop(image_of([TABLE] + bodies, seed, noise))
         assert len(found.objects) == 3
         for body in bodies:
             box = min(found.objects, key=lambda each: np.linalg.norm(each.centre - body.position))
             errors.append(np.linalg.norm(box.centre - body.position))
-            assert np.allclose(np.r_[sorted(box.size[:2])[::-1], box.size[2]], extents(body), atol=0.01 + noise * 0.005)
+            assert np.allclose(np.r_[sorted(box.size[:2])[::-1], box.size[2]], extents(body),
+                               atol=0.01 + noise * 0.005)
     assert np.median(errors) < limit
     assert max(errors) < 0.02
 
 
 def test_objects_come_nearest_first_and_the_table_is_where_it_is():
-    found = find_tabletop(frame_of([TABLE, can(0.9, 0.2), can(0.65, -0.1), can(0.8, 0.1)]))
+    found = find_tabletop(image_of([TABLE, can(0.9, 0.2), can(0.65, -0.1), can(0.8, 0.1)]))
     assert [round(float(box.centre[0]), 1) for box in found.objects] == [0.6, 0.8, 0.9]
     assert abs(found.table.centre[2] - 0.72) < 0.005
     assert found.table.size[2] == 0
-    assert np.allclose(sorted(found.table.size[:2]), [0.7, 1.2], atol=0.05), 'as far as it is in view'
+    assert np.allclose(sorted(found.table.size[:2]), [0.7, 1.2],
+                       atol=0.05), 'as far as it is in view'
 
 
 def test_the_box_turns_with_the_object():
-    brick = Body('brick', 'box', (0.075, 0.04, 0.1), (0.75, 0.0, 0.77), yaw=0.7, colour=(0.8, 0.2, 0.2))
-    box = find_tabletop(frame_of([TABLE, brick])).objects[0]
+    brick = Body('brick', 'box', (0.075, 0.04, 0.1), (0.75, 0.0, 0.77), yaw=0.7,
+                 colour=(0.8, 0.2, 0.2))
+    box = find_tabletop(image_of([TABLE, brick])).objects[0]
     assert abs(box.yaw - 0.7) < 0.1
     assert box.size[0] > box.size[1]
 
 
 def test_the_same_frame_is_always_understood_the_same_way():
-    frame = frame_of([TABLE, can(0.7, 0.0), can(0.8, 0.2)])
-    one, other = find_tabletop(frame), find_tabletop(frame)
-    assert all(np.array_equal(a.centre, b.centre) and a.yaw == b.yaw for a, b in zip(one.objects, other.objects))
+    image = image_of([TABLE, can(0.7, 0.0), can(0.8, 0.2)])
+    one, other = find_tabletop(image), find_tabletop(image)
+    assert all(
+        np.array_equal(a.centre, b.centre) and a.yaw == b.yaw
+        for a, b in zip(one.objects, other.objects))
 
 
 def test_an_empty_table_is_said_to_be_empty():
-    assert 'nothing on the table' in reason(frame_of([TABLE]))
-    assert 'nothing on the table that stands higher than 15 cm' in reason(frame_of([TABLE, can(0.7, 0.0)]),
-                                                                           min_height=0.15)
+    assert 'nothing on the table' in reason(image_of([TABLE]))
+    assert 'nothing on the table that stands higher than 15 cm' in reason(
+        image_of([TABLE, can(0.7, 0.0)]), min_height=0.15)
 
 
 def test_no_table_is_said_and_so_is_missing_depth():
-    assert reason(frame_of([])) == 'no table in view'
-    frame = frame_of([TABLE, can(0.7, 0.0)])
-    lost = frame.depth.copy()
+    assert reason(image_of([])) == 'no table in view'
+    image = image_of([TABLE, can(0.7, 0.0)])
+    lost = image.depth.copy()
     lost[np.random.default_rng(1).random(lost.shape) < 0.99] = np.nan
-    assert 'depth is missing for 99% of the image' in reason(frame._replace(depth=lost))
-    assert 'depth is missing for 100% of the image' in reason(frame._replace(depth=np.full_like(lost, np.nan)))
+    assert 'depth is missing for 99% of the image' in reason(image._replace(depth=lost))
+    assert 'depth is missing for 100% of the image' in reason(
+        image._replace(depth=np.full_like(lost, np.nan)))
 
 
 def test_half_the_depth_is_enough():
-    frame = frame_of([TABLE, can(0.7, 0.0)])
-    frame.depth[np.random.default_rng(1).random(frame.depth.shape) < 0.5] = np.nan
-    assert np.linalg.norm(find_tabletop(frame).objects[0].centre - (0.7, 0.0, 0.78)) < 0.01
+    image = image_of([TABLE, can(0.7, 0.0)])
+    image.depth[np.random.default_rng(1).random(image.depth.shape) < 0.5] = np.nan
+    assert np.linalg.norm(find_tabletop(image).objects[0].centre - (0.7, 0.0, 0.78)) < 0.01
 
 
 @pytest.mark.parametrize('gap', [0.0, 0.01])
-@pytest.mark.parametrize('colours', [((0.1, 0.3, 0.8), (0.1, 0.3, 0.8)), ((0.8, 0.2, 0.1), (0.2, 0.7, 0.2))])
+@pytest.mark.parametrize('colours', [((0.1, 0.3, 0.8), (0.1, 0.3, 0.8)),
+                                     ((0.8, 0.2, 0.1), (0.2, 0.7, 0.2))])
 def test_neighbours_that_merge_are_not_taken_for_one_object(gap, colours):
     for seed, angle in enumerate((0.3, 1.2, 2.0)):
         distance = 0.06 + gap
         beside = (0.7 + distance * np.cos(angle), distance * np.sin(angle))
-        frame = frame_of([TABLE, can(0.7, 0.0, colour=colours[0]), can(*beside, colour=colours[1])], seed)
+        image = image_of(
+            [TABLE, can(0.7, 0.0, colour=colours[0]),
+             can(*beside, colour=colours[1])], seed)
         try:
-            assert len(find_tabletop(frame).objects) == 2, 'told apart'
+            assert len(find_tabletop(image).objects) == 2, 'told apart'
         except NotSeen as err:
             assert 'several things that touch' in str(err)
 
@@ -104,19 +114,21 @@ def test_neighbours_that_merge_are_not_taken_for_one_object(gap, colours):
 def test_boxes_side_by_side_are_told_by_their_colours():
     bricks = [Body('brick', 'box', (0.05, 0.05, 0.1), (0.7, y, 0.77), colour=colour)
               for y, colour in ((0.0, (0.8, 0.2, 0.2)), (0.05, (0.2, 0.3, 0.8)))]
-    assert 'two colours' in reason(frame_of([TABLE] + bricks))
+    assert 'two colours' in reason(image_of([TABLE] + bricks))
 
 
 def test_what_is_too_large_for_the_gripper_is_said_with_its_size():
     drum = Body('drum', 'cylinder', (0.07, 0.07, 0.1), (0.7, 0.0, 0.77))
-    assert re.search('too large for the gripper, 1[34] x 1[34] x 10 cm', reason(frame_of([TABLE, drum])))
+    assert re.search('too large for the gripper, 1[34] x 1[34] x 10 cm',
+                     reason(image_of([TABLE, drum])))
     behind = drum._replace(position=(0.95, 0.2, 0.77))
-    assert len(find_tabletop(frame_of([TABLE, can(0.65, 0.0), behind])).objects) == 2, 'only the nearest must fit'
+    assert len(find_tabletop(image_of([TABLE, can(0.65, 0.0),
+                                       behind])).objects) == 2, 'only the nearest must fit'
 
 
 def test_an_arm_that_is_not_known_of_is_no_object():
     beam = Body('beam', 'box', (0.5, 0.1, 0.1), (0.7, 0.0, 0.95), yaw=0.6)
-    assert 'is an arm in the view?' in reason(frame_of([TABLE, can(0.9, 0.25), beam]))
+    assert 'is an arm in the view?' in reason(image_of([TABLE, can(0.9, 0.25), beam]))
 
 
 def arm_body():
@@ -126,19 +138,22 @@ def arm_body():
 
 
 def test_the_robot_takes_its_own_arm_out_of_what_it_sees():
-    found = find_tabletop(frame_of([TABLE, can(0.85, 0.28), arm_body()]), limbs=[ARM])
+    found = find_tabletop(image_of([TABLE, can(0.85, 0.28), arm_body()]), limbs=[ARM])
     assert len(found.objects) == 1
     assert np.linalg.norm(found.objects[0].centre - (0.85, 0.28, 0.78)) < 0.01
 
 
 def test_what_an_arm_hides_in_part_is_not_measured():
-    text = reason(frame_of([TABLE, can(0.78, -0.03), arm_body()]), limbs=[ARM])
-    assert text in ('the right arm hides part of the nearest object', 'there is nothing on the table that stands '
-                    'higher than 2 cm; the right arm covers {}'.format(text.rpartition('covers ')[2]))
+    text = reason(image_of([TABLE, can(0.78, -0.03), arm_body()]), limbs=[ARM])
+    assert text in ('the right arm hides part of the nearest object',
+                    'there is nothing on the table that stands '
+                    'higher than 2 cm; the right arm covers {}'.format(
+                        text.rpartition('covers ')[2]))
 
 
 def test_what_the_edge_of_the_image_cuts_off_is_not_measured():
     body = can(0.78, 0.0)
     cameras = (camera_at((0.05, 0.03, 1.38), (0.75, y, 0.75)) for y in np.arange(0.3, 1.0, 0.01))
-    aside = next(camera for camera in cameras if pixels_of([body.position], INTRINSICS, camera)[0, 0] > WIDTH - 8)
-    assert 'cut off by the edge' in reason(frame_of([TABLE, body], camera=aside))
+    aside = next(camera for camera in cameras
+                 if pixels_of([body.position], INTRINSICS, camera)[0, 0] > WIDTH - 8)
+    assert 'cut off by the edge' in reason(image_of([TABLE, body], camera=aside))

@@ -7,12 +7,13 @@ import pytest
 from arms import REST, box, clutter, deepest, model, right_arm
 
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.simulation.robot.arm import READY, Arm, Means, SkillError
-from smach_oracle.simulation.robot.arms_aside import ASIDE
-from smach_oracle.simulation.robot.collision import CollisionWorld, model_from
-from smach_oracle.simulation.robot.planner import ACCELERATION, PlanningError, plan, straight, timed
+from smach_oracle.pr2.planning.arm import READY, Arm, SkillContext, SkillError
+from smach_oracle.pr2.planning.collision import CollisionWorld, model_from
+from smach_oracle.pr2.planning.planner import ACCELERATION, PlanningError, plan, straight, timed
+from smach_oracle.pr2.skills.arms_aside import ASIDE
 
-WALL = box(0.62, -0.45, 1.05, 0.2, 0.02, 0.3)  # stands in the way from the robot's side to its front
+# stands in the way from the robot's side to its front
+WALL = box(0.62, -0.45, 1.05, 0.2, 0.02, 0.3)
 
 
 def in_front(space: CollisionWorld, seed: int) -> np.ndarray:
@@ -43,7 +44,8 @@ def test_the_other_check_would_see_a_way_that_is_not():
         goal = in_front(space, 1)
         through = np.array([ASIDE['right'], goal])
         assert deepest(through[:1], boxes) < 0.004 and deepest(through[1:], boxes) < 0.004
-        assert deepest(through, boxes) > 0.02  # both ends are free, the straight way between them is not
+        # both ends are free, the straight way between them is not
+        assert deepest(through, boxes) > 0.02
 
 
 def test_a_way_around_something_repeats_exactly_and_depends_on_its_seed():
@@ -61,15 +63,19 @@ def test_the_budget_is_kept_and_named():
     with right_arm(dict(clutter(2), wall=WALL)) as space:
         goal = in_front(space, 2)
         before = space.checks
-        with pytest.raises(PlanningError, match='no way around the obstacles was found within 40 collision checks'):
+        with pytest.raises(
+                PlanningError,
+                match='no way around the obstacles was found within 40 collision checks'):
             plan(space, ASIDE['right'], goal, 1, budget=40)
         assert space.checks - before < 400
 
 
 def test_a_goal_in_collision_says_what_touches_what():
     with right_arm(clutter(1)) as space:
-        goal = space.chain.inverse(from_rpy((0.7, 0.0, 0.70)), READY['right'], np.random.default_rng(1))
-        with pytest.raises(PlanningError, match='the goal is in collision: .*r_gripper.* touches table'):
+        goal = space.chain.inverse(from_rpy((0.7, 0.0, 0.70)), READY['right'],
+                                   np.random.default_rng(1))
+        with pytest.raises(PlanningError,
+                           match='the goal is in collision: .*r_gripper.* touches table'):
             plan(space, ASIDE['right'], goal, 1)
 
 
@@ -86,7 +92,8 @@ def test_an_arm_that_touches_something_steps_out_of_it():
 
 def test_a_straight_way_keeps_the_tool_on_its_line_and_heading():
     with right_arm({}) as space:
-        start = space.chain.inverse(from_rpy((0.5, -0.2, 0.9)), READY['right'], np.random.default_rng(1))
+        start = space.chain.inverse(from_rpy((0.5, -0.2, 0.9)), READY['right'],
+                                    np.random.default_rng(1))
         way = straight(space, start, from_rpy((0.65, -0.2, 0.9)))
         tools = [space.chain.forward(q) for q in way]
         assert max(np.abs(tool[1:3, 3] - [-0.2, 0.9]).max() for tool in tools) < 0.003
@@ -116,7 +123,8 @@ def test_timing_keeps_the_limits_of_speed_and_acceleration():
 
 def test_what_the_hand_holds_is_part_of_it():
     with right_arm({}) as space:
-        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'], np.random.default_rng(1))
+        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'],
+                                np.random.default_rng(1))
         space.add_box('below', box(0.6, -0.2, 0.70, 0.05, 0.05, 0.02))
         assert space.is_free(q)
         space.attach((0.03, 0.03, 0.19), np.eye(4))
@@ -129,7 +137,8 @@ def test_what_the_hand_holds_is_part_of_it():
 
 def test_distance_is_that_to_the_nearest_thing():
     with right_arm({}) as space:
-        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'], np.random.default_rng(1))
+        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'],
+                                np.random.default_rng(1))
         assert space.distance(q, reach=0.02) == 0.02
         tip = space.chain.forward(q)[:3, 3]
         space.add_box('ahead', box(tip[0] + 0.1, tip[1], tip[2], 0.04, 0.3, 0.3))
@@ -139,9 +148,11 @@ def test_distance_is_that_to_the_nearest_thing():
 
 
 def test_the_other_arm_is_in_the_way():
-    crossed = dict(REST, l_shoulder_pan_joint=0.0, l_upper_arm_roll_joint=0.0, l_elbow_flex_joint=-0.3)
+    crossed = dict(REST, l_shoulder_pan_joint=0.0, l_upper_arm_roll_joint=0.0,
+                   l_elbow_flex_joint=-0.3)
     with CollisionWorld(model(), 'right', crossed) as space:
-        q = space.chain.inverse(from_rpy((0.6, 0.12, 0.95), yaw=0.8), READY['right'], np.random.default_rng(2))
+        q = space.chain.inverse(from_rpy((0.6, 0.12, 0.95), yaw=0.8), READY['right'],
+                                np.random.default_rng(2))
         touched = space.why_not(q) if q is not None else ''
     with CollisionWorld(model(), 'right', REST) as space:
         assert q is not None and space.is_free(q)
@@ -164,12 +175,13 @@ def test_what_cannot_be_built_leaves_no_physics_client_behind(monkeypatch):
     robot = SimpleNamespace(joints=lambda: REST)
     before = clients()
     with pytest.raises(ValueError):
-        Arm(Means(robot, model()), 'right', {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])}, 1)
+        Arm(SkillContext(robot, model()), 'right',
+            {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])}, 1)
     assert clients() == before
 
     def broken(*_, **__):
         raise pybullet.error('Cannot load URDF file.')
     monkeypatch.setattr(pybullet, 'loadURDF', broken)
     with pytest.raises(SkillError, match='robot description: Cannot load'):
-        Arm(Means(robot, model()), 'right', {}, 1)
+        Arm(SkillContext(robot, model()), 'right', {}, 1)
     assert clients() == before

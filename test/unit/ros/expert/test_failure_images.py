@@ -1,13 +1,18 @@
-"""What cameras saw at a failure: the newest frame of each that is still heard, and nothing from long before."""
+"""What cameras saw at a failure: the newest frame of each that is still heard, and nothing from
+long before.
+"""
+import threading
+from types import SimpleNamespace
+
 import pytest
+import rosgraph
 import rospy
 from expert_fixtures import make_question
 from sensor_msgs.msg import CompressedImage
 from waiting import wait_for
 
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.ros import failure_frames
-from smach_oracle.ros.failure_frames import OLDEST_S, FailureCameras
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.ros.expert.failure_images import OLDEST_S, FailureCameras
 
 
 @pytest.fixture(name='clock')
@@ -22,35 +27,55 @@ def make_clock(monkeypatch):
             self.publish = clock.sent.append
 
     clock = Clock()
-    clock.sent = []
+    clock.sent, clock.heard = [], {}
+    types = [[name, CompressedImage._type] for name in ('/dead', '/alive', '/never')]
+    master = SimpleNamespace(getTopicTypes=lambda: types)
+
+    def subscriber(topic, kind, keep, callback_args, **_):
+        clock.heard[topic] = lambda data: keep(
+            CompressedImage(format='jpeg', data=data), callback_args)
+        return SimpleNamespace(unregister=lambda: None)
+    monkeypatch.setattr(rosgraph, 'Master', lambda name: master)
+    monkeypatch.setattr(rospy, 'Subscriber', subscriber)
+    monkeypatch.setattr(rospy, 'get_name', lambda: '/robot')
+    monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     monkeypatch.setattr(rospy, 'get_rostime', lambda: rospy.Time.from_sec(clock.now_s))
     monkeypatch.setattr(rospy, 'resolve_name', lambda name: name)
     monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
-    monkeypatch.setattr(FailureCameras, '_listen', lambda self: None)
     return clock
 
 
+def listening(clock, *topics):
+    """Cameras that are listened to."""
+    cameras = FailureCameras(topics)
+    assert wait_for(lambda: set(clock.heard) == set(topics))
+    return cameras
+
+
 def test_a_camera_that_fell_silent_long_before_is_left_out(clock):
-    cameras = FailureCameras(['/dead', '/alive', '/never'])
-    cameras._keep(CompressedImage(format='jpeg', data=b'old'), '/dead')
+    cameras = listening(clock, '/dead', '/alive', '/never')
+    clock.heard['/dead'](b'old')
     clock.now_s += OLDEST_S + 1.0
-    cameras._keep(CompressedImage(format='jpeg', data=b'older'), '/alive')
-    cameras._keep(CompressedImage(format='jpeg', data=b'new'), '/alive')
-    cameras.tell(make_question('q7'))
+    clock.heard['/alive'](b'older')
+    clock.heard['/alive'](b'new')
+    cameras.publish_for(make_question('q7'))
     assert wait_for(lambda: clock.sent)
     told, = clock.sent
-    assert (told.query_id, told.topics, [image.data for image in told.images]) == ('q7', ['/alive'], [b'new'])
+    assert (told.query_id, told.topics, [image.data
+                                         for image in told.images]) == ('q7', ['/alive'], [b'new'])
 
 
-def test_where_no_camera_is_heard_nothing_is_told(clock, monkeypatch):
-    cameras = FailureCameras(['/dead'])
-    cameras._keep(CompressedImage(), '/dead')
+def test_where_no_camera_is_heard_nothing_is_told(clock):
+    cameras = listening(clock, '/dead')
+    clock.heard['/dead'](b'old')
     clock.now_s += OLDEST_S + 1.0
-    monkeypatch.setattr(failure_frames.threading, 'Thread', None)
-    cameras.tell(make_question())
+    before = threading.enumerate()
+    cameras.publish_for(make_question())
+    assert wait_for(lambda: not set(threading.enumerate()) - set(before))
+    assert clock.sent == []
 
 
 @pytest.mark.parametrize('topics', [['/a', ''], ['/a', 3], ['/a', '/b', '/c', '/d', '/e']])
 def test_what_is_no_list_of_four_cameras_is_named(clock, topics):
-    with pytest.raises(ConfigError, match='failure_cameras'):
+    with pytest.raises(SettingsError, match='failure_cameras'):
         FailureCameras(topics)

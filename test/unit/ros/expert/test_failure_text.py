@@ -1,7 +1,7 @@
 """What the expert is told about a failed action."""
 import pytest
 
-from smach_oracle.ros.failure_text import describe_failure
+from smach_oracle.ros.expert.failure_text import describe_failure
 
 
 class FakeState:
@@ -29,7 +29,8 @@ class FakeResult:
 
 @pytest.mark.parametrize('state, text', [
     (FakeState(_goal_status_text='no grasp', _goal_result=FakeResult(reason='other')), 'no grasp'),
-    (FakeState(_goal_status_text='', _goal_result=FakeResult(reason='out of reach')), 'out of reach'),
+    (FakeState(_goal_status_text='',
+               _goal_result=FakeResult(reason='out of reach')), 'out of reach'),
     (FakeState(_action_client=FakeClient('no grasp')), 'no grasp'),
     (FakeState(_action_client=FakeClient('ERROR: no goal', gh=None)), ''),
     (FakeState(_goal_result=FakeResult(error_string='joint limit')), 'joint limit'),

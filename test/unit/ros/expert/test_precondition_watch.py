@@ -1,22 +1,27 @@
-"""Preconditions are looked at while somebody listens; what raises or hangs is told, and nobody waits for it."""
+"""Preconditions are looked at while somebody listens; what raises or hangs is told, and nobody
+waits for it.
+"""
 import sys
 import threading
 import time
 
 import pytest
 import rospy
-from waiting import wait_for
+from waiting import stays, wait_for
 
 from smach_oracle.msg import PreconditionCheck
-from smach_oracle.oracle.question import Look, Standing
-from smach_oracle.ros import precondition_watch
-from smach_oracle.ros.precondition_watch import PreconditionWatch
+from smach_oracle.oracle.asking.question import PreconditionProbe, PreconditionStatus
+from smach_oracle.ros.expert import precondition_watch
+from smach_oracle.ros.expert.precondition_watch import PreconditionWatch
 
 
 class FakePublisher:
     """Keeps what is published; listeners as a test wants them."""
 
+    made = None  # the last
+
     def __init__(self, *_, **__):
+        FakePublisher.made = self
         self.sent = []
         self.listeners = 1
 
@@ -27,7 +32,7 @@ class FakePublisher:
         return self.listeners
 
 
-class FakeLook(Look):
+class FakeLook(PreconditionProbe):
     """Calls functions by their names."""
 
     def __init__(self, **functions):
@@ -35,7 +40,7 @@ class FakeLook(Look):
         self.called = []
         self._functions = list(functions.values())
 
-    def look(self, number):
+    def status(self, number):
         self.called.append(number)
         return self._functions[number]()
 
@@ -54,41 +59,41 @@ def watch(monkeypatch):
     monkeypatch.setattr(precondition_watch.rospy, 'get_rostime', lambda: rospy.Time(1))
     for name in ('PERIOD_S', 'LISTENER_PERIOD_S'):
         monkeypatch.setattr(precondition_watch, name, 0.05)
-    monkeypatch.setattr(precondition_watch, 'PATIENCE_S', 60.0)  # so that nobody is given up for slow
+    # so that nobody is given up for slow
+    monkeypatch.setattr(precondition_watch, 'PATIENCE_S', 60.0)
     return PreconditionWatch()
 
 
 def sent(watch):
-    return watch._publisher.sent
+    return FakePublisher.made.sent
 
 
 def holds():
-    return Standing(True, 'it does')
+    return PreconditionStatus(True, 'it does')
 
 
 def test_they_are_looked_at_again_and_again_until_the_question_is_over(watch):
-    found = [Standing(False, 'not yet')]
+    found = [PreconditionStatus(False, 'not yet')]
     look = FakeLook(free=lambda: found[-1])
-    with watch.over(FakeQuestion(look)):
+    before = threading.enumerate()
+    with watch.while_open(FakeQuestion(look)):
         assert wait_for(lambda: sent(watch))
-        assert [(each.state, each.name, each.result, each.text) for each in sent(watch)[0].checks] == [
-            ('PICK', 'free', PreconditionCheck.DOES_NOT_HOLD, 'not yet')]
+        assert [(each.state, each.name, each.result, each.text) for each in sent(watch)[0].checks
+                ] == [('PICK', 'free', PreconditionCheck.DOES_NOT_HOLD, 'not yet')]
         assert sent(watch)[0].query_id == 'q1' and 0.0 <= sent(watch)[0].checks[0].age < 10.0
         found.append(holds())
         assert wait_for(lambda: sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)
-    time.sleep(0.2)
+    assert wait_for(lambda: not set(threading.enumerate()) - set(before))
     told = len(sent(watch))
-    time.sleep(0.2)
-    assert len(sent(watch)) == told
+    assert stays(lambda: len(sent(watch)) == told, 0.2)
 
 
 def test_nobody_looks_where_nobody_listens(watch):
-    watch._publisher.listeners = 0
+    FakePublisher.made.listeners = 0
     look = FakeLook(free=holds)
-    with watch.over(FakeQuestion(look)):
-        time.sleep(0.2)
-        assert not look.called
-        watch._publisher.listeners = 1
+    with watch.while_open(FakeQuestion(look)):
+        assert stays(lambda: not look.called, 0.2)
+        FakePublisher.made.listeners = 1
         assert wait_for(lambda: sent(watch))
 
 
@@ -98,10 +103,15 @@ def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(monkeypatch, wa
     look = FakeLook(door=never.wait, free=holds)
 
     def told():
-        """A machine that is busy may be too slow for so little patience with the other, too, now and then."""
+        """A machine that is busy may be too slow for so little patience with the other, too, now
+        and then.
+        """
         wanted = [PreconditionCheck.UNKNOWN, PreconditionCheck.HOLDS]
-        return [each.checks for each in sent(watch)[2:] if [check.result for check in each.checks] == wanted]
-    with watch.over(FakeQuestion(look)):
+        return [
+            each.checks for each in sent(watch)[2:]
+            if [check.result for check in each.checks] == wanted
+        ]
+    with watch.while_open(FakeQuestion(look)):
         assert wait_for(told)
         door, _ = told()[-1]
         assert 'has not come back for' in door.text and door.age == -1.0
@@ -112,7 +122,7 @@ def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(monkeypatch, wa
 
 
 def test_what_leaves_the_program_does_not(watch):
-    with watch.over(FakeQuestion(FakeLook(quits=lambda: sys.exit(3), free=holds))):
+    with watch.while_open(FakeQuestion(FakeLook(quits=lambda: sys.exit(3), free=holds))):
         assert wait_for(lambda: sent(watch))
         assert 'raised SystemExit(3)' in sent(watch)[0].checks[0].text
         assert sent(watch)[0].checks[1].result == PreconditionCheck.HOLDS
@@ -121,7 +131,7 @@ def test_what_leaves_the_program_does_not(watch):
 @pytest.mark.parametrize('look', [None, FakeLook()])
 def test_a_question_without_any_starts_nothing(watch, look):
     before = threading.enumerate()
-    with watch.over(FakeQuestion(look)):
+    with watch.while_open(FakeQuestion(look)):
         assert not set(threading.enumerate()) - set(before)
 
 
@@ -134,13 +144,18 @@ def test_looks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatch
         never.wait()
 
     def all_left_out():
-        return {check.text for check in sent(watch)[-1].checks} == {'not looked at: 32 looks have not come back'}
+        return {check.text
+                for check in sent(watch)[-1].checks
+                } == {'not looked at: 32 looks have not come back'}
     for told in (lambda: sent(watch), all_left_out):
-        look = FakeLook(**{'door_{}'.format(number): door for number in range(precondition_watch.MOST_HANGING)})
-        with watch.over(FakeQuestion(look)):
+        look = FakeLook(
+            **{'door_{}'.format(number): door
+               for number in range(precondition_watch.MOST_HANGING)})
+        with watch.while_open(FakeQuestion(look)):
             assert wait_for(told)
     assert wait_for(lambda: len(calls) >= precondition_watch.MOST_HANGING)
     assert len(calls) == precondition_watch.MOST_HANGING
     never.set()
-    with watch.over(FakeQuestion(FakeLook(free=holds))):
-        assert wait_for(lambda: sent(watch) and sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)
+    with watch.while_open(FakeQuestion(FakeLook(free=holds))):
+        assert wait_for(
+            lambda: sent(watch) and sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)

@@ -1,12 +1,15 @@
-"""A question gets onto the wire, whatever the robot's state has said and whatever its userdata holds."""
+"""A question gets onto the wire, whatever the robot's state has said and whatever its userdata
+holds.
+"""
 import io
 
 import genpy
 from expert_fixtures import make_question
 
 from smach_oracle.msg import ExpertQueryGoal, SharedAutonomyGoal, UserdataItem
-from smach_oracle.oracle.question import InterfaceOffer, Visit, VisitResult
-from smach_oracle.ros.question_messages import to_goal, to_interface_goal
+from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.oracle.settings.interfaces import InterfaceOffer
+from smach_oracle.ros.expert.question_messages import to_goal, to_interface_goal
 
 HALF = 'no file caf\udce9.png'  # as Python names a file whose name is no UTF-8
 NOW = genpy.Time(1)
@@ -19,7 +22,8 @@ def over_the_wire(message):
 
 
 def test_a_text_that_utf_8_cannot_say_is_written_out():
-    question = make_question(text=HALF, tried=(HALF,), history=(Visit('PICK', HALF, VisitResult.FAILURE),),
+    question = make_question(text=HALF, tried=(HALF,), history=(Visit('PICK', HALF,
+                                                                      VisitResult.FAILURE),),
                              userdata={HALF: 1})
     goal = over_the_wire(to_goal(question, 'robot', NOW))
     written = 'no file caf\\udce9.png'
@@ -29,12 +33,16 @@ def test_a_text_that_utf_8_cannot_say_is_written_out():
 
 
 def test_other_languages_arrive_as_they_are():
-    assert over_the_wire(to_goal(make_question(text='Tür klemmt: 門 ✗'), 'robot', NOW)).text == 'Tür klemmt: 門 ✗'
+    assert over_the_wire(to_goal(make_question(text='Tür klemmt: 門 ✗'), 'robot',
+                                 NOW)).text == 'Tür klemmt: 門 ✗'
 
 
 def test_a_userdata_key_that_is_no_string_is_named_and_keeps_nothing_else_back():
     question = make_question(userdata={5: 'five', 'a': 1}, input_userdata={5: 'five', HALF: 1})
-    items = {item.key: item.encoding for item in over_the_wire(to_goal(question, 'robot', NOW)).userdata}
+    items = {
+        item.key: item.encoding
+        for item in over_the_wire(to_goal(question, 'robot', NOW)).userdata
+    }
     assert items == {'5': UserdataItem.UNSENT, 'a': UserdataItem.JSON}
     goal = over_the_wire(to_interface_goal(InterfaceOffer('assist', '/assist'), question))
     assert isinstance(goal, SharedAutonomyGoal) and len(goal.userdata) == 2

@@ -5,7 +5,7 @@ from typing import Any, List
 
 import rosbag
 
-from smach_oracle.ros.bag_writer import MessageType
+from smach_oracle.ros.recording.bag_writer import MessageType
 
 STRING = MessageType('std_msgs/String', '992ce8a1687cec8c8bd883ec73ca41d1', 'string data\n')
 

@@ -10,10 +10,10 @@ import rosbag
 from recorded import STRING, messages, string_data
 from rosbags.rosbag1 import Reader
 
-from smach_oracle.ros import bag_format, bag_repair, bag_writer
-from smach_oracle.ros.bag_format import BAG_HEADER_END, BagFormatError
-from smach_oracle.ros.bag_repair import recover_folder, repair
-from smach_oracle.ros.bag_writer import BagWriter
+from smach_oracle.ros.recording import bag_format, bag_repair, bag_writer
+from smach_oracle.ros.recording.bag_format import BAG_HEADER_END, BagFormatError
+from smach_oracle.ros.recording.bag_repair import recover_folder, repair
+from smach_oracle.ros.recording.bag_writer import BagWriter
 
 
 def write(path, texts, chunks=1, topic='/talk'):
@@ -38,9 +38,11 @@ def test_rosbag_and_rosbags_read_the_same_messages_at_the_same_times(tmp_path):
     path = tmp_path / 'a.bag'
     write(path, ['one', 'two', 'drei'], chunks=2).close()
     with rosbag.Bag(str(path)) as bag:
-        by_rosbag = [(topic, message.data, stamp.to_nsec()) for topic, message, stamp in bag.read_messages()]
+        by_rosbag = [(topic, message.data, stamp.to_nsec())
+                     for topic, message, stamp in bag.read_messages()]
     with Reader(path) as reader:
-        by_rosbags = [(item.topic, data[4:].decode(), stamp) for item, stamp, data in reader.messages()]
+        by_rosbags = [(item.topic, data[4:].decode(), stamp)
+                      for item, stamp, data in reader.messages()]
     assert by_rosbag == by_rosbags
     assert by_rosbag == [('/talk', text, (100 + number) * 10 ** 9 + 5)
                          for number, text in enumerate(['one', 'two', 'drei'])]
@@ -154,7 +156,8 @@ def test_a_chunk_whose_second_index_is_missing_is_not_half_read(tmp_path):
     writer.add('/other', STRING, (200, 0), string_data('torn'))
     writer.flush()
     writer.abandon()
-    os.truncate(str(path), os.path.getsize(str(path)) - 67)  # the size of an index record with one entry
+    # the size of an index record with one entry
+    os.truncate(str(path), os.path.getsize(str(path)) - 67)
     with open(str(path), 'r+b') as bag:
         repair(bag)
     assert texts_in(path) == ['whole']
@@ -170,7 +173,8 @@ def test_rosbag_reindex_mends_a_bag_too(tmp_path):
 def test_a_damaged_index_is_made_anew(tmp_path):
     path = tmp_path / 'a.bag'
     write(path, ['one', 'two'], chunks=2).close()
-    os.truncate(str(path), os.path.getsize(str(path)) - 10)  # a power cut while the index was written
+    # a power cut while the index was written
+    os.truncate(str(path), os.path.getsize(str(path)) - 10)
     with open(str(path), 'r+b') as bag:
         repair(bag)
     assert texts_in(path) == ['one', 'two']
@@ -203,7 +207,8 @@ def test_an_index_without_entries_is_damage_and_not_a_reason_to_start_no_recorde
 
 def test_what_is_no_bag_is_refused(tmp_path):
     (tmp_path / 'a.bag').write_bytes(b'#ROSBAG V1.2\n' + b'x' * 9000)
-    with open(str(tmp_path / 'a.bag'), 'r+b') as bag, pytest.raises(BagFormatError, match='version 2.0'):
+    with open(str(tmp_path / 'a.bag'), 'r+b') as bag, pytest.raises(BagFormatError,
+                                                                    match='version 2.0'):
         repair(bag)
 
 
@@ -264,7 +269,10 @@ def test_a_file_whose_writer_was_killed_before_its_first_message_is_removed(tmp_
 
 
 def test_an_empty_file_is_removed_only_if_it_is_ours_and_not_just_made(tmp_path):
-    names = ['20150401T101112.345Z_old.bag.active', '20150401T101112.345Z_new.bag.active', 'theirs.bag.active']
+    names = [
+        '20150401T101112.345Z_old.bag.active', '20150401T101112.345Z_new.bag.active',
+        'theirs.bag.active'
+    ]
     for name in names:
         (tmp_path / name).touch()
     for name in (names[0], names[2]):

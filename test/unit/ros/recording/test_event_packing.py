@@ -4,9 +4,9 @@ import random
 import pytest
 
 from smach_oracle.msg import OracleEvent
-from smach_oracle.oracle.events import Event, EventKind, FailureKind
-from smach_oracle.ros import recorder_packing
+from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.ros.event_messages import to_msg
+from smach_oracle.ros.recording import event_packing as recorder_packing
 
 TEXTS = ('', 'PICK', 'caf\xe9 \u2713 \U0001f916', 'half a pair \ud83e', 'two\nlines\0', 'x' * 5000)
 
@@ -15,14 +15,17 @@ def random_event(rng):
     def text():
         return rng.choice(TEXTS)
 
-    return Event(rng.choice(list(EventKind)), text(), rng.randrange(2 ** 63), rng.uniform(0, 2e9), text(), text(),
-                 text(), text(), rng.choice(list(FailureKind)), rng.randrange(4), rng.choice([0.0, 0.75, float('nan')]),
-                 rng.choice([True, False]), text(), text(), text(),
-                 rng.choice([None, {}, {'missing_keys': ['a', 'b'], 'userdata': 'keep'}, {'odd': {1, 2}}]))
+    return Event(
+        rng.choice(list(EventKind)), text(), rng.randrange(2**63), rng.uniform(0, 2e9), text(),
+        text(), text(), text(), rng.choice(list(FailureKind)), rng.randrange(4),
+        rng.choice([0.0, 0.75, float('nan')]), rng.choice([True, False]), text(), text(), text(),
+        rng.choice([None, {}, {'missing_keys': ['a', 'b'], 'userdata': 'keep'}, {'odd': {1, 2}}]))
 
 
 def test_it_is_used():
-    """Where this fails, OracleEvent.msg was changed: change `_pack_directly` and PACKED_MD5 with it."""
+    """Where this fails, OracleEvent.msg was changed: change `_pack_directly` and PACKED_MD5 with
+    it.
+    """
     assert recorder_packing.pack_event is recorder_packing._pack_directly
     assert OracleEvent._md5sum == recorder_packing.PACKED_MD5
 
@@ -39,10 +42,12 @@ def test_every_event_is_packed_as_its_message_is():
 
 
 def test_another_definition_goes_through_the_message():
-    assert recorder_packing.choose_packing('of another release') is recorder_packing._pack_through_message
+    assert recorder_packing.choose_packing(
+        'of another release') is recorder_packing._pack_through_message
 
 
 @pytest.mark.parametrize('field', ['state', 'outcome', 'target'])
 def test_what_is_no_text_is_recorded_as_text(field):
     event = Event(EventKind.TRANSITION, 't', 0, 1.0, 'TOP')._replace(**{field: 7})
-    assert getattr(OracleEvent().deserialize(recorder_packing.pack_event(event, (0, 0))), field) == '7'
+    assert getattr(OracleEvent().deserialize(recorder_packing.pack_event(event, (0, 0))),
+                   field) == '7'

@@ -1,4 +1,6 @@
-"""A disk that is full, gone or hung: the robot goes on, the operator is told, and what was lost is counted."""
+"""A disk that is full, gone or hung: the robot goes on, the operator is told, and what was lost is
+counted.
+"""
 import multiprocessing
 import os
 import resource
@@ -12,11 +14,10 @@ import pytest
 from recorded import active, events, finished, messages, numbers
 from waiting import wait_for
 
-from smach_oracle.oracle.events import EventKind, EventSource
-from smach_oracle.ros import bag_writer
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
-from smach_oracle.ros.recorder_status import RecorderState
-
+from smach_oracle.ros.recording import bag_writer
+from smach_oracle.ros.recording.recorder_status import RecorderState
 
 TEXT = 'x' * 200  # of every event
 
@@ -48,19 +49,16 @@ class Watched:
         self.emit(EventKind.TRIAL_END)
 
     def wait_for(self, state):
-        deadline = time.monotonic() + 40.0
-        while not any(status.state == state for status in self.statuses):
-            assert time.monotonic() < deadline, 'the operator was never told {}'.format(state)
-            time.sleep(0.02)
+        assert wait_for(lambda: any(status.state == state for status in self.statuses)), (
+            'the operator was never told {}'.format(state))
         self.statuses.clear()
 
     def wait_for_disk(self, trial_id, count):
         """Until so many events of the trial can be read from its file."""
-        deadline = time.monotonic() + 20.0
-        while sum(Path(path).read_bytes().count(TEXT.encode()) for path in active(self.folder)
-                  if trial_id in path) < count:
-            assert time.monotonic() < deadline, 'the events never reach the disk'
-            time.sleep(0.05)
+        def written():
+            return sum(Path(path).read_bytes().count(TEXT.encode()) for path in active(self.folder)
+                       if trial_id in path)
+        assert wait_for(lambda: written() >= count), 'the events never reach the disk'
 
     def close(self):
         assert self.recorder.close(20.0)
@@ -135,7 +133,8 @@ def test_the_robot_goes_on_when_files_may_not_grow(tmp_path):
 def small_disk(tmp_path):
     folder = tmp_path / 'disk'
     folder.mkdir()
-    mount = subprocess.run(['mount', '-t', 'tmpfs', '-o', 'size=400k', 'tmpfs', str(folder)], stderr=subprocess.PIPE)
+    mount = subprocess.run(['mount', '-t', 'tmpfs', '-o', 'size=400k', 'tmpfs',
+                            str(folder)], stderr=subprocess.PIPE)
     if mount.returncode:
         pytest.skip('nothing may be mounted here: {}'.format(mount.stderr.decode().strip()))
     yield folder
@@ -168,10 +167,8 @@ def test_a_trial_goes_on_in_a_new_bag_when_the_disk_works_again(tmp_path, monkey
     watched.emit(EventKind.STATE_START, 20)
     watched.wait_for(RecorderState.DROPPING)
     monkeypatch.setattr(bag_writer.os, 'pwrite', real)
-    deadline = time.monotonic() + 20.0
-    while len(active(tmp_path)) + len(finished(tmp_path)) < 2 and time.monotonic() < deadline:
-        watched.emit(EventKind.STATE_START)
-        time.sleep(0.05)
+    assert wait_for(lambda: watched.emit(EventKind.STATE_START)
+                    or len(active(tmp_path)) + len(finished(tmp_path)) == 2)
     watched.emit(EventKind.TRIAL_END)
     watched.close()
     watched.check_that_nothing_is_unaccounted_for()
@@ -191,10 +188,7 @@ def test_the_robot_goes_on_when_the_folder_vanishes(tmp_path):
     watched.emit(EventKind.TRIAL_END)
     watched.wait_for(RecorderState.DROPPING)
     watched.trial('dropped', 10)
-    deadline = time.monotonic() + 20.0
-    while watched.recorder.losses.events < 24:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    assert wait_for(lambda: watched.recorder.losses.events >= 24)
     folder.mkdir()
     watched.trial('recorded', 10)
     watched.close()
@@ -210,11 +204,8 @@ def test_a_vanished_folder_is_noticed_in_mid_trial(tmp_path):
     watched.start('vanished')
     watched.wait_for(RecorderState.RECORDING)
     shutil.rmtree(str(folder))
-    deadline = time.monotonic() + 20.0
-    while not any(status.state == RecorderState.DROPPING for status in watched.statuses):
-        assert time.monotonic() < deadline
-        watched.emit(EventKind.STATE_START)
-        time.sleep(0.1)
+    assert wait_for(lambda: watched.emit(EventKind.STATE_START) or any(
+        status.state == RecorderState.DROPPING for status in watched.statuses))
     watched.close()
     watched.check_that_nothing_is_unaccounted_for()
 

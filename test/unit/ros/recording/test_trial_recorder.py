@@ -5,20 +5,21 @@ import re
 import signal
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from fake_trials import FakeMachine, play
 from recorded import STRING, active, events, finished, messages, numbers, string_data
+from waiting import wait_for
 
 from smach_msgs.msg import SmachContainerStructure
-
 from smach_oracle.msg import OracleRates
-from smach_oracle.oracle.events import EventKind, EventSource
-from smach_oracle.ros import recorder_bag
-from smach_oracle.ros.bag_writer import MessageType
+from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
-from smach_oracle.ros.recorder_packing import serialise
-from smach_oracle.ros.recorder_queue import MessageItem, RecorderQueue, When
+from smach_oracle.ros.recording import trial_bag as recorder_bag
+from smach_oracle.ros.recording.bag_writer import MessageType
+from smach_oracle.ros.recording.event_packing import serialise
+from smach_oracle.ros.recording.recorder_queue import MessageItem, Moment, RecorderQueue
 
 
 @pytest.fixture
@@ -56,20 +57,23 @@ def test_each_trial_has_a_bag_named_by_its_time_and_its_id(recorder, source, tmp
 def test_a_bag_holds_every_event_as_it_was_told(recorder, source, tmp_path):
     source.begin_trial('t')
     source.emit(EventKind.TRIAL_START, 'TOP', data={'initial': ['A'], 'recovers': False})
-    source.emit(EventKind.FAILURE, 'TOP/SUB', state='PICK', outcome='aborted', failure_kind=2, failure_class=1,
-                rate=0.25, continuous=True, text='caf\xe9 \u2713')
+    source.emit(EventKind.FAILURE, 'TOP/SUB', state='PICK', outcome='aborted', failure_kind=2,
+                failure_class=1, rate=0.25, continuous=True, text='caf\xe9 \u2713')
     source.emit(EventKind.TRIAL_END, 'TOP', outcome='aborted')
     recorder.close(10.0)
     start, failure, end = events(finished(tmp_path)[0])
-    assert (start.kind, start.data) == (EventKind.TRIAL_START, '{"initial": ["A"], "recovers": false}')
-    assert (failure.path, failure.state, failure.rate, failure.continuous) == ('TOP/SUB', 'PICK', 0.25, True)
+    assert (start.kind, start.data) == (EventKind.TRIAL_START,
+                                        '{"initial": ["A"], "recovers": false}')
+    assert (failure.path, failure.state, failure.rate, failure.continuous) == ('TOP/SUB', 'PICK',
+                                                                               0.25, True)
     assert failure.text == 'caf\xe9 \u2713'
     assert (end.outcome, end.trial_id, end.seq) == ('aborted', 't', 2)
     assert abs(end.wall_time - time.time()) < 60
 
 
 def test_no_event_is_lost_at_full_speed(tmp_path, source):
-    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail, max_events=50)  # so that the machine must wait
+    # so that the machine must wait
+    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail, max_events=50)
     recorder.attach(source)
     trial(source, 'fast', steps=20_000)
     assert recorder.close(60.0)
@@ -131,9 +135,7 @@ def test_closing_in_mid_trial_leaves_a_whole_bag(recorder, source, tmp_path):
 def test_a_trial_that_never_said_it_ended_is_closed_by_the_next(recorder, source, tmp_path):
     trial(source, 'silent', end=False)
     trial(source, 'next', end=False)
-    deadline = time.monotonic() + 10.0
-    while not finished(tmp_path) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    assert wait_for(lambda: finished(tmp_path))
     assert [events(path)[0].trial_id for path in finished(tmp_path)] == ['silent']
 
 
@@ -144,12 +146,13 @@ def test_closing_twice_is_closing_once_and_later_events_do_no_harm(recorder, sou
     assert len(finished(tmp_path)) == 1
 
 
-def test_events_reach_the_disk_within_a_second_also_when_nothing_follows(recorder, source, tmp_path):
+def test_events_reach_the_disk_within_a_second_also_when_nothing_follows(
+        recorder, source, tmp_path):
     trial(source, 'slow', end=False)
-    written = time.monotonic()
-    while b'/oracle/events' not in b''.join(open(path, 'rb').read() for path in active(tmp_path)):
-        assert time.monotonic() - written < 5.0  # 0.3 s on an idle machine
-        time.sleep(0.02)
+
+    def written():
+        return any(b'/oracle/events' in Path(path).read_bytes() for path in active(tmp_path))
+    assert wait_for(written, 5.0), '0.3 s on an idle machine'
 
 
 def test_one_event_that_cannot_be_converted_costs_only_itself(tmp_path, source):
@@ -175,7 +178,8 @@ def test_rates_are_recorded_at_the_start_and_at_the_end_of_a_trial(tmp_path, sou
     recorder.attach(source, {'~oracle/rates': rates})
     trial(source, 't')
     recorder.close(10.0)
-    assert [item.trial_id for item in messages(finished(tmp_path)[0], '/oracle/rates')] == ['take 1', 'take 2']
+    assert [item.trial_id
+            for item in messages(finished(tmp_path)[0], '/oracle/rates')] == ['take 1', 'take 2']
     assert taken == [threading.current_thread()] * 2
 
 
@@ -220,7 +224,8 @@ def test_two_recorders_share_a_folder(tmp_path):
     machine = FakeMachine(first)
     machine._trial_id = 'half'
     machine.emit(EventKind.TRIAL_START)
-    third = TrialRecorder(str(tmp_path), warn=pytest.fail)  # must not take the first one's bag for a dead one's
+    # must not take the first one's bag for a dead one's
+    third = TrialRecorder(str(tmp_path), warn=pytest.fail)
     play(second, 3)
     machine.emit(EventKind.TRIAL_END)
     for recorder in (first, second, third):
@@ -234,8 +239,8 @@ def message(text, when, latching=False, topic='/talk'):
 
 
 def test_latched_messages_from_before_a_trial_are_in_its_bag(recorder, source, tmp_path):
-    recorder._take_message(message('the map', When(None, 5.0), latching=True, topic='/map'))
-    recorder._take_message(message('passing', When(None, 5.0)))
+    recorder._take_message(message('the map', Moment(None, 5.0), latching=True, topic='/map'))
+    recorder._take_message(message('passing', Moment(None, 5.0)))
     trial(source, 'a')
     trial(source, 'b')
     recorder.close(10.0)
@@ -248,7 +253,8 @@ def structure(path, *children):
     item = SmachContainerStructure(path=path, children=children)
     item.header.frame_id = 'any'
     kind = MessageType(item._type, item._md5sum, item._full_text)
-    return MessageItem('/robot/smach/container_structure', kind, serialise(item), When(None, 5.0), False, '/robot')
+    return MessageItem('/robot/smach/container_structure', kind, serialise(item), Moment(None, 5.0),
+                       False, '/robot')
 
 
 def test_every_bag_knows_the_latest_structure_of_each_container(recorder, source, tmp_path):
@@ -258,24 +264,29 @@ def test_every_bag_knows_the_latest_structure_of_each_container(recorder, source
     trial(source, 'b')
     recorder.close(10.0)
     for path in finished(tmp_path):
-        found = {item.path: item.children for item in messages(path, '/robot/smach/container_structure')}
+        found = {
+            item.path: item.children
+            for item in messages(path, '/robot/smach/container_structure')
+        }
         assert found == {'TOP': ['A', 'B'], 'TOP/SUB': ['X']}
 
 
 def test_other_topics_are_dropped_and_counted_before_an_event_is(tmp_path):
     queue = RecorderQueue(max_events=10, max_message_bytes=25)
-    accepted = [queue.put_message(message('x' * 6, When(None, 0.0))) for _ in range(4)]
+    accepted = [queue.put_message(message('x' * 6, Moment(None, 0.0))) for _ in range(4)]
     assert accepted == [True, True, False, False]
     assert queue.put_event('event', lambda: False)
-    assert [getattr(item, 'topic', item) for item in queue.take(0.0)[0]] == ['/talk', '/talk', 'event']
+    assert [getattr(item, 'topic', item)
+            for item in queue.take(0.0)[0]] == ['/talk', '/talk', 'event']
 
 
 def test_a_bag_keeps_to_the_clock_with_which_it_began(tmp_path):
     how = (recorder_bag.DiskWatch(5.0), recorder_bag.SyncBudget())
-    simulated = recorder_bag.TrialBag(str(tmp_path), 'sim', When((12, 5), 1e9), *how)
-    assert [simulated.stamp(When((13, 0), 2e9)), simulated.stamp(When(None, 3e9))] == [(13, 0), (13, 0)]
-    wall = recorder_bag.TrialBag(str(tmp_path), 'wall', When(None, 1e9), *how)
-    assert wall.stamp(When((13, 0), 1e9 + 0.5)) == (10 ** 9, 500_000_000)
+    simulated = recorder_bag.TrialBag(str(tmp_path), 'sim', Moment((12, 5), 1e9), *how)
+    assert [simulated.stamp(Moment((13, 0), 2e9)),
+            simulated.stamp(Moment(None, 3e9))] == [(13, 0), (13, 0)]
+    wall = recorder_bag.TrialBag(str(tmp_path), 'wall', Moment(None, 1e9), *how)
+    assert wall.stamp(Moment((13, 0), 1e9 + 0.5)) == (10 ** 9, 500_000_000)
     simulated.close()
     wall.close()
 
@@ -284,25 +295,26 @@ def test_waiting_for_the_disk_takes_a_tenth_of_the_time():
     budget = recorder_bag.SyncBudget(share=0.1)
     assert budget.affordable()
     began = time.monotonic()
-    budget.spend(lambda: time.sleep(0.05))
+    budget.spend(lambda: time.sleep(0.02))  # a disk that takes its time
     assert not budget.affordable()
-    while not budget.affordable():
-        time.sleep(0.005)
-    assert time.monotonic() - began >= 0.5
+    assert wait_for(budget.affordable)
+    assert time.monotonic() - began >= 0.2
 
 
 def test_a_waiting_machine_goes_on_when_the_recorder_is_closed():
     queue = RecorderQueue(max_events=1, max_message_bytes=0)
     assert queue.put_event('first', lambda: True)
     results = []
-    machine = threading.Thread(target=lambda: results.append(queue.put_event('second', lambda: True)))
+    machine = threading.Thread(
+        target=lambda: results.append(queue.put_event('second', lambda: True)))
     machine.start()
     queue.close(0.0)
     machine.join(10.0)
     assert results == [False]
 
 
-def test_a_signal_handler_that_strikes_inside_the_queue_can_close_the_recorder(recorder, source, tmp_path):
+def test_a_signal_handler_that_strikes_inside_the_queue_can_close_the_recorder(
+        recorder, source, tmp_path):
     trial(source, 't', end=False)
     with recorder._queue._changed:
         assert recorder.close(10.0)
@@ -318,13 +330,11 @@ def record_until_told_to_stop(folder):
 
 @pytest.mark.parametrize('after_s', [0.2, 0.35, 0.5, 0.65])
 def test_sigterm_at_full_speed_leaves_a_closed_bag(tmp_path, after_s):
-    child = multiprocessing.get_context('fork').Process(target=record_until_told_to_stop, args=(str(tmp_path),))
+    child = multiprocessing.get_context('fork').Process(target=record_until_told_to_stop,
+                                                        args=(str(tmp_path),))
     child.start()
-    deadline = time.monotonic() + 20.0
-    while not active(tmp_path):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    time.sleep(after_s)
+    assert wait_for(lambda: active(tmp_path))
+    time.sleep(after_s)  # any moment will do: it is what this test is about
     os.kill(child.pid, signal.SIGTERM)
     child.join(30.0)
     assert child.exitcode == 0 and active(tmp_path) == []

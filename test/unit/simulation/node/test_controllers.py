@@ -6,15 +6,17 @@ from typing import Any, List
 import pytest
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalID, GoalStatus
-from control_msgs.msg import GripperCommandAction, GripperCommandActionGoal
 
-from smach_oracle.simulation.world.node import controllers
-from smach_oracle.simulation.world.node.motion_table import MotionTable
-from smach_oracle.simulation.world.trajectory import Result
+from control_msgs.msg import GripperCommandAction, GripperCommandActionGoal
+from smach_oracle.simulation.node import controllers
+from smach_oracle.simulation.node.motion_table import MotionTable
+from smach_oracle.simulation.physics.trajectory import MotionResult
 
 
 class Handle(ServerGoalHandle):
-    """actionlib's own, so that comparing is as there; it notes how it ends instead of telling a server."""
+    """actionlib's own, so that comparing is as there; it notes how it ends instead of telling a
+    server.
+    """
 
     def __init__(self, name: str) -> None:
         goal = GripperCommandActionGoal(goal_id=GoalID(id=name))
@@ -44,7 +46,7 @@ class Step:
 
     def tick(self, world: Any) -> Any:
         self._ticks += 1
-        return Result(True) if self._ticks > 1 else None
+        return MotionResult(True) if self._ticks > 1 else None
 
     def events(self) -> tuple:
         return ()
@@ -55,36 +57,44 @@ class Step:
 
 @pytest.fixture(name='table')
 def _table():
-    return MotionTable(SimpleNamespace(step=lambda: None, happened=lambda *events: None, unrest=False))
+    return MotionTable(
+        SimpleNamespace(step=lambda: None, happened=lambda *events: None, disturbed=False))
 
 
-@pytest.fixture(name='controller')
-def _controller(table, monkeypatch):
-    monkeypatch.setattr(controllers.actionlib, 'ActionServer',
-                        lambda *_, **__: SimpleNamespace(start=lambda: None))
+@pytest.fixture(name='server')
+def _server(table, monkeypatch):
+    """What a controller gives its action server to call: `begin` and `cancel`."""
+    server = SimpleNamespace(start=lambda: None)
+
+    def make_server(name, spec, begin, cancel, **_):
+        server.begin, server.cancel = begin, cancel
+        return server
+    monkeypatch.setattr(controllers.actionlib, 'ActionServer', make_server)
 
     def make(goal: Any) -> Step:
         if goal.command.position < 0:
             raise ValueError('no such gap')
         return Step()
-    return controllers.Controller('gripper', GripperCommandAction, 'right_gripper', SimpleNamespace(tell=None), table,
-                                  make, lambda motion, ending: None, lambda motion: None)
+    loop = SimpleNamespace(post=lambda call: call())
+    controllers.Controller('gripper', GripperCommandAction, 'right_gripper', loop, table, make,
+                           lambda motion, ending: None, lambda motion: None)
+    return server
 
 
-def test_a_goal_that_is_cancelled_stops(controller, table):
+def test_a_goal_that_is_cancelled_stops(server, table):
     handle = Handle('one')
-    controller._begin(handle)
-    controller._cancel(handle)
+    server.begin(handle)
+    server.cancel(handle)
     assert handle.ends == ['canceled'] and not table
 
 
-def test_a_cancel_that_comes_when_its_goal_has_ended_is_no_matter(controller, table):
+def test_a_cancel_that_comes_when_its_goal_has_ended_is_no_matter(server, table):
     handle, refused = Handle('one'), Handle('two')
-    controller._begin(handle)
+    server.begin(handle)
     table.tick()
     table.tick()
-    controller._cancel(handle)  # it was on its way when the motion ended
+    server.cancel(handle)  # it was on its way when the motion ended
     refused.goal.goal.command.position = -1.0
-    controller._begin(refused)
-    controller._cancel(refused)
+    server.begin(refused)
+    server.cancel(refused)
     assert handle.ends == ['succeeded'] and refused.ends == ['rejected']

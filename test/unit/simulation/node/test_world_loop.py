@@ -4,12 +4,13 @@ import time
 from typing import NamedTuple
 
 import pytest
+from waiting import wait_for
 
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.simulation.world.node.loop import WorldLoop, WorldStopped
-from smach_oracle.simulation.world.node.motion_table import MotionTable
-from smach_oracle.simulation.world.node.settings import WorldSettings, read_settings
-from smach_oracle.simulation.world.node.sim_clock import SimClock
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.simulation.node.loop import WorldLoop, WorldStopped
+from smach_oracle.simulation.node.motion_table import MotionTable
+from smach_oracle.simulation.node.settings import WorldSettings, read_settings
+from smach_oracle.simulation.node.sim_clock import SimClock
 
 LIMIT_S = 20.0
 
@@ -34,7 +35,7 @@ class FakeWorld:
         self.events += events
 
     @property
-    def unrest(self):
+    def disturbed(self):
         return self.periods < self.unrest_until
 
 
@@ -69,7 +70,8 @@ def table(world):
 def test_motions_of_several_parts_go_on_together_and_end_each_in_its_time(world, table):
     log, ends = [], []
     for part, periods in (('torso', 2), ('base', 1)):
-        table.start(part, Moves(periods, part, log), lambda ending, part=part: ends.append((part, world.periods)))
+        table.start(part, Moves(periods, part, log), lambda ending, part=part: ends.append(
+            (part, world.periods)))
     while table:
         table.tick()
     assert log == [('base', 0), ('torso', 0), ('base', 1), ('torso', 1), ('torso', 2)]
@@ -108,21 +110,19 @@ class Running:
 
     def __init__(self, world, **settings):
         self.times, self.world, self.table = [], world, MotionTable(world)
-        self.loop = WorldLoop(self.table, SimClock(self.times.append), WorldSettings(**settings), lambda: None)
+        self.loop = WorldLoop(self.table, SimClock(self.times.append), WorldSettings(**settings),
+                              lambda: None)
         self.closed = threading.Event()
         self.thread = threading.Thread(target=self.loop.run, args=(self.closed.set,), daemon=True)
         self.thread.start()
 
     def move(self, periods):
         ended = threading.Event()
-        self.loop.tell(lambda: self.table.start('head', Moves(periods), lambda ending: ended.set()))
+        self.loop.post(lambda: self.table.start('head', Moves(periods), lambda ending: ended.set()))
         assert ended.wait(LIMIT_S)
 
     def wait(self, condition):
-        until = time.monotonic() + LIMIT_S
-        while not condition() and time.monotonic() < until:
-            time.sleep(0.005)
-        assert condition()
+        assert wait_for(condition, LIMIT_S)
 
     def stop(self):
         self.loop.stop(LIMIT_S)
@@ -146,7 +146,8 @@ def test_in_lock_step_physics_goes_on_only_while_something_moves(running):
     at_rest, told = running.world.periods, len(running.times)
     running.wait(lambda: len(running.times) > told + 3)
     assert running.world.periods == at_rest == 30
-    assert running.times[-1] - running.times[-2] == 500_000_000  # 0.05 s of the wall's, ten times as fast
+    # 0.05 s of the wall's, ten times as fast
+    assert running.times[-1] - running.times[-2] == 500_000_000
 
 
 @pytest.mark.parametrize('running', [dict(LOCK_STEP, idle_speed=0.0)], indirect=True)
@@ -166,20 +167,20 @@ def test_a_paced_world_goes_on_by_itself_at_its_pace(running):
 
 @pytest.mark.parametrize('running', [LOCK_STEP, PACED], indirect=True)
 def test_questions_are_answered_in_the_worlds_thread_and_errors_go_to_who_asked(running):
-    assert running.loop.ask(threading.current_thread) is running.thread
+    assert running.loop.call(threading.current_thread) is running.thread
 
     def wrong():
         raise ValueError('wrong')
     with pytest.raises(ValueError, match='wrong'):
-        running.loop.ask(wrong)
-    assert running.loop.ask(lambda: 3) == 3
+        running.loop.call(wrong)
+    assert running.loop.call(lambda: 3) == 3
 
 
 def test_who_asks_a_world_that_ends_is_not_left_waiting(world):
     running = Running(world)
     running.stop()
     with pytest.raises(WorldStopped):
-        running.loop.ask(lambda: 3)
+        running.loop.call(lambda: 3)
 
 
 def test_a_clock_never_gives_a_stamp_twice():
@@ -193,12 +194,15 @@ def test_a_clock_never_gives_a_stamp_twice():
 
 def test_the_settings_of_a_world_without_limit_differ_from_those_of_a_paced_one():
     assert read_settings(lambda name, default: default).camera_rate == 0.0
-    assert read_settings(lambda name, default: 1 if 'factor' in name else default).camera_rate == 2.0
+    assert read_settings(lambda name, default: 1
+                         if 'factor' in name else default).camera_rate == 2.0
 
 
-@pytest.mark.parametrize('name, value', [('~task', 'dance'), ('~real_time_factor', -1), ('~real_time_factor', 'fast'),
-                                         ('~seed', -1), ('~seed', 1.5), ('~benign', 'yes'), ('~truth_file', ''),
-                                         ('~state_rate', 0), ('~idle_speed', float('nan')), ('~camera_rate', True)])
+@pytest.mark.parametrize('name, value', [('~task', 'dance'), ('~real_time_factor', -1),
+                                         ('~real_time_factor', 'fast'), ('~seed', -1),
+                                         ('~seed', 1.5), ('~benign', 'yes'), ('~truth_file', ''),
+                                         ('~state_rate', 0), ('~idle_speed', float('nan')),
+                                         ('~camera_rate', True)])
 def test_a_bad_parameter_is_named(name, value):
-    with pytest.raises(ConfigError, match=name):
+    with pytest.raises(SettingsError, match=name):
         read_settings(lambda asked, default: value if asked == name else default)

@@ -1,4 +1,6 @@
-"""What the world node tells: transforms as the physics has them, streams of targets, what an expert sees, the truth."""
+"""What the world node tells: transforms as the physics has them, streams of targets, what an expert
+sees, the truth.
+"""
 import json
 
 import numpy as np
@@ -6,30 +8,33 @@ import pytest
 from rospy import Time
 from std_msgs.msg import Header
 
+from smach_oracle.geometry.transform_tree import TransformTree
 from smach_oracle.geometry.transforms import from_quaternion, from_rpy, inverse
-from smach_oracle.simulation.robot.interface import ARM_JOINTS, BASE_FRAME, CAMERA_FRAME, TOOL_FRAME
-from smach_oracle.simulation.robot.kitchen import Kitchen
-from smach_oracle.simulation.robot.pr2_model import pr2_urdf
-from smach_oracle.simulation.world.camera import INTRINSICS
-from smach_oracle.simulation.world.fridge import DOOR_JOINT, fridge_urdf
-from smach_oracle.simulation.world.node.camera_publisher import camera_info
-from smach_oracle.simulation.world.node.reveal import reveal
-from smach_oracle.simulation.world.node.state_publisher import odometry, transforms
-from smach_oracle.simulation.world.node.streamed import Streamed
-from smach_oracle.simulation.world.node.transform_tree import TransformTree
-from smach_oracle.simulation.world.node.trial import Trial, append_line
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Body, Cause, Goal, RobotStart, Scene
+from smach_oracle.pr2.kitchen import Kitchen
+from smach_oracle.pr2.model.pr2_model import pr2_urdf
+from smach_oracle.pr2.robot import ARM_JOINTS, BASE_FRAME, CAMERA_FRAME, TOOL_FRAME
+from smach_oracle.simulation.node.camera_publisher import camera_info
+from smach_oracle.simulation.node.reveal import reveal
+from smach_oracle.simulation.node.state_publisher import odometry, transforms
+from smach_oracle.simulation.node.streamed_target import StreamedTarget
+from smach_oracle.simulation.node.truth import TrialTruth, append_line
+from smach_oracle.simulation.physics.camera import INTRINSICS
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
+from smach_oracle.simulation.scenes.scene import Body, Goal, RobotStart, Scene, SceneCause
+
 TABLE = Body('table', 'box', (0.6, 1.2, 0.04), (0.9, 0.0, 0.70))
 CAN = Body('can', 'cylinder', (0.03, 0.03, 0.12), (0.8, 0.0, 0.781), mass=0.3)
 WALL = Body('wall', 'box', (0.02, 0.2, 0.09), (0.72, 0.0, 0.766))
 FRIDGE = Body('fridge', 'urdf', (0.0, 0.0, 0.0), (3.0, 3.0, 0.0), urdf=fridge_urdf(Kitchen()),
               joints=((DOOR_JOINT, 0.5),), joint_friction=((DOOR_JOINT, 3.0),))
-HEAD = RobotStart((('head_tilt_joint', 0.6), ('torso_lift_joint', 0.2), ('r_elbow_flex_joint', -1.2)))
+HEAD = RobotStart(
+    (('head_tilt_joint', 0.6), ('torso_lift_joint', 0.2), ('r_elbow_flex_joint', -1.2)))
 
 
 def scene(*bodies):
-    return Scene('test', 7, bodies, Goal('stands_at', ''), HEAD, causes=(Cause('crowded', 'by much'),))
+    return Scene('test', 7, bodies, Goal('stands_at', ''), HEAD,
+                 causes=(SceneCause('crowded', 'by much'),))
 
 
 @pytest.fixture(scope='module')
@@ -42,7 +47,10 @@ def world():
 def test_the_transforms_take_every_link_to_where_the_physics_has_it(world):
     tree = TransformTree(pr2_urdf().read_text(encoding='utf-8'), list(world.joints()))
     message = transforms(tree, world.joints(), world.odom_from_base(), Time(1))
-    links = {each.child_frame_id: (each.header.frame_id, each.transform) for each in message.transforms}
+    links = {
+        each.child_frame_id: (each.header.frame_id, each.transform)
+        for each in message.transforms
+    }
     assert sorted(set(world.joints())) == sorted(tree.names)
 
     def base_from(link):
@@ -51,18 +59,24 @@ def test_the_transforms_take_every_link_to_where_the_physics_has_it(world):
         if link in links:
             parent, found = links[link]
             place, turn = found.translation, found.rotation
-            return base_from(parent) @ from_quaternion((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+            return base_from(parent) @ from_quaternion((place.x, place.y, place.z),
+                                                       (turn.x, turn.y, turn.z, turn.w))
         fixed = next(each for each in tree.fixed if each.child == link)
         return base_from(fixed.parent) @ from_quaternion(fixed.position, fixed.turn)
-    for link in (*TOOL_FRAME.values(), CAMERA_FRAME, 'base_link', 'l_gripper_l_finger_tip_link', 'laser_tilt_link'):
-        assert np.allclose(base_from(link), inverse(world.true_base()) @ world.link_pose(link), atol=2e-4), link
+
+    for link in (*TOOL_FRAME.values(), CAMERA_FRAME, 'base_link', 'l_gripper_l_finger_tip_link',
+                 'laser_tilt_link'):
+        assert np.allclose(base_from(link),
+                           inverse(world.true_base()) @ world.link_pose(link), atol=2e-4), link
 
 
 def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_its_own_axes():
-    driving = World(Scene('test', 7, (), Goal('stands_at', ''), RobotStart((), (0.5, -0.2, np.pi / 2))))
+    driving = World(
+        Scene('test', 7, (), Goal('stands_at', ''), RobotStart((), (0.5, -0.2, np.pi / 2))))
     driving.belief_error = from_rpy((0.1, 0.0, 0.0))
     for _ in range(30):  # forward, which is along y of the world, and turning
-        y, turn = driving.robot.target('base_y') + 0.3 / 60, driving.robot.target('base_theta') + 0.1 / 60
+        y, turn = driving.robot.target('base_y') + 0.3 / 60, driving.robot.target(
+            'base_theta') + 0.1 / 60
         driving.robot.set_target('base_y', y, 0.3, None)
         driving.robot.set_target('base_theta', turn, 0.1, None)
         driving.step()
@@ -71,7 +85,8 @@ def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_it
     place, true = said.pose.pose.position, driving.true_base()[:3, 3]
     assert np.hypot(place.x - true[0], place.y - true[1]) == pytest.approx(0.1, abs=1e-6)
     moves = said.twist.twist
-    assert (moves.linear.x, moves.linear.y) == pytest.approx((0.3, -0.015), abs=0.005)  # a little to the right
+    # a little to the right
+    assert (moves.linear.x, moves.linear.y) == pytest.approx((0.3, -0.015), abs=0.005)
     assert moves.angular.z == pytest.approx(0.1, abs=0.02)
     assert len(said.pose.covariance) == len(said.twist.covariance) == 36
     driving.close()
@@ -80,19 +95,21 @@ def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_it
 def test_camera_info_is_that_of_the_camera():
     info = camera_info(INTRINSICS, (480, 640, 3), Header(frame_id=CAMERA_FRAME))
     assert (info.width, info.height, len(info.D), len(info.R)) == (640, 480, 5, 9)
-    assert info.K == INTRINSICS.ravel().tolist() and info.P[2] == info.K[2] and info.P[5] == info.K[4]
+    assert info.K == INTRINSICS.ravel().tolist(
+    ) and info.P[2] == info.K[2] and info.P[5] == info.K[4]
 
 
-def test_a_target_of_a_stream_is_reached_at_the_end_of_its_period_and_what_is_too_fast_is_cut_off(world):
+def test_a_target_of_a_stream_is_reached_at_the_end_of_its_period_and_what_is_too_fast_is_cut_off(
+        world):
     name = ARM_JOINTS['right'][0]
     start = world.robot.position(name)
     for target, periods in ((start + 0.02, 3), (start + 0.04, 3)):
-        motion, begun = Streamed({name: target}, periods / 60), world.periods
+        motion, begun = StreamedTarget({name: target}, periods / 60), world.periods
         while motion.tick(world) is None:
             world.step()
         assert world.periods - begun == periods
         assert world.robot.target(name) == pytest.approx(target)
-    motion = Streamed({name: start - 1.0}, 1 / 60)
+    motion = StreamedTarget({name: start - 1.0}, 1 / 60)
     assert motion.tick(world) is None
     assert abs(world.robot.target(name) - target) <= 1.11 * world.robot.speeds[name] / 60
 
@@ -133,7 +150,8 @@ def test_what_is_not_there_is_named(world):
 def test_the_truth_is_a_line_for_each_trial(tmp_path):
     path = tmp_path / 'truth.jsonl'
     for seconds in (12.0, 14.0):
-        append_line(str(path), Trial(scene(), 10.0).record(True, 'stands', seconds, {'physics': 0.5}))
+        append_line(str(path),
+                    TrialTruth(scene(), 10.0).record(True, 'stands', seconds, {'physics': 0.5}))
     lines = [json.loads(line) for line in path.read_text(encoding='utf-8').splitlines()]
     assert [line['sim_s'] for line in lines] == [2.0, 4.0]
     assert lines[0]['causes'] == [{'kind': 'crowded', 'text': 'by much'}]

@@ -1,8 +1,10 @@
-"""The world's parameters: what cannot be used is refused by its name before anything is simulated."""
+"""The world's parameters: what cannot be used is refused by its name before anything is
+simulated.
+"""
 import pytest
 
-from smach_oracle.oracle.errors import ConfigError
-from smach_oracle.simulation.world.node.settings import read_settings
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.simulation.node.settings import read_settings
 
 
 def settings_with(name, value):
@@ -10,11 +12,13 @@ def settings_with(name, value):
 
 
 @pytest.mark.parametrize('name, words', [('nowhere/truth.jsonl', 'there is no folder .*nowhere'),
-                                         ('.', 'it is a folder'), ('file/truth.jsonl', 'there is no folder')])
-def test_a_truth_file_that_cannot_be_written_is_told_at_the_start(tmp_path, monkeypatch, name, words):
+                                         ('.', 'it is a folder'),
+                                         ('file/truth.jsonl', 'there is no folder')])
+def test_a_truth_file_that_cannot_be_written_is_told_at_the_start(tmp_path, monkeypatch, name,
+                                                                  words):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'file').write_text('')
-    with pytest.raises(ConfigError, match='~truth_file: .*' + words):
+    with pytest.raises(SettingsError, match='~truth_file: .*' + words):
         settings_with('~truth_file', name)
 
 
@@ -22,5 +26,6 @@ def test_a_truth_file_may_be_there_or_in_the_home_folder(tmp_path, monkeypatch):
     monkeypatch.setenv('HOME', str(tmp_path))
     assert settings_with('~truth_file', '~/truth.jsonl').truth_file == str(tmp_path / 'truth.jsonl')
     (tmp_path / 'truth.jsonl').write_text('')
-    assert settings_with('~truth_file', str(tmp_path / 'truth.jsonl')).truth_file == str(tmp_path / 'truth.jsonl')
+    assert settings_with('~truth_file',
+                         str(tmp_path / 'truth.jsonl')).truth_file == str(tmp_path / 'truth.jsonl')
     assert settings_with('~truth_file', 'none').truth_file == 'none'

@@ -5,13 +5,20 @@ from worlds import CAN, CARTON, TABLE, scene
 
 from smach_oracle.geometry.depth import pixels_of, points_of
 from smach_oracle.geometry.transforms import apply, inverse
-from smach_oracle.simulation.robot.interface import CAMERA_FRAME
-from smach_oracle.simulation.world import camera
-from smach_oracle.simulation.world.camera import HEIGHT, INTRINSICS, WIDTH, View, noisy_colour, noisy_depth
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.portrait import portrait
-from smach_oracle.simulation.world.scene import Body, Disturbance, RobotStart, Sensor
+from smach_oracle.pr2.robot import CAMERA_FRAME
+from smach_oracle.simulation.physics import camera
+from smach_oracle.simulation.physics.camera import (
+    HEIGHT,
+    INTRINSICS,
+    WIDTH,
+    RenderedView,
+    noisy_colour,
+    noisy_depth,
+)
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.rehearsal.portrait import portrait
+from smach_oracle.simulation.scenes.scene import Body, CameraQuality, Disturbance, RobotStart
 
 BOWED = RobotStart((('head_tilt_joint', 0.9),))
 
@@ -33,62 +40,70 @@ def robot(world):
 
 def pixels_seen(world):
     """Rows and columns of what the head camera sees now, by the name of the body."""
-    bodies = View(world, world.link_pose(CAMERA_FRAME)).bodies
-    return {world.seen_as(int(index)): np.nonzero(bodies == index) for index in np.unique(bodies[bodies >= 0])}
+    bodies = RenderedView(world, world.link_pose(CAMERA_FRAME)).bodies
+    return {
+        world.seen_as(int(index)): np.nonzero(bodies == index)
+        for index in np.unique(bodies[bodies >= 0])
+    }
 
 
 def test_a_noise_free_view_puts_things_where_they_are():
     world = World(scene(Body('box', 'box', (0.2, 0.2, 0.2), (1.5, 0.1, 1.2))))
     pose = world.link_pose(CAMERA_FRAME)
-    view = View(world, pose)
+    view = RenderedView(world, pose)
     on_box = np.vectorize(world.seen_as)(view.bodies) == 'box'
     points = points_of(view.depth, INTRINSICS, pose)[on_box]
     front = points[np.abs(points[:, 0] - 1.4) < 0.005]
     assert len(front) > 1000
     for axis, middle in ((1, 0.1), (2, 1.2)):
-        assert [front[:, axis].min(), front[:, axis].max()] == pytest.approx([middle - 0.1, middle + 0.1], abs=2e-3)
+        assert [front[:, axis].min(),
+                front[:, axis].max()] == pytest.approx([middle - 0.1, middle + 0.1], abs=2e-3)
     rows, columns = np.nonzero(on_box)
     corners = pixels_of(np.array([[1.4, 0.2, 1.1], [1.4, 0.0, 1.1]]), INTRINSICS, pose)
-    assert [columns.min() - 0.5, columns.max() + 0.5] == pytest.approx(sorted(corners[:, 0]), abs=0.6)
+    assert [columns.min() - 0.5,
+            columns.max() + 0.5] == pytest.approx(sorted(corners[:, 0]), abs=0.6)
     assert rows.max() + 0.5 == pytest.approx(corners[0, 1], abs=0.6)
     world.close()
 
 
 def test_a_frame_is_in_the_frame_of_the_base(world, robot):
     before = world.time
-    frame = robot.see()
-    assert frame.stamp == pytest.approx(before + 1 / 30, abs=1e-6) and frame.stamp == world.time
-    assert frame.colour.shape == (HEIGHT, WIDTH, 3) and frame.colour.dtype == np.uint8
-    assert frame.depth.shape == (HEIGHT, WIDTH) and frame.depth.dtype == np.float32
-    points = points_of(frame.depth, frame.intrinsics, frame.base_from_camera)
+    image = robot.see()
+    assert image.stamp == pytest.approx(before + 1 / 30, abs=1e-6) and image.stamp == world.time
+    assert image.colour.shape == (HEIGHT, WIDTH, 3) and image.colour.dtype == np.uint8
+    assert image.depth.shape == (HEIGHT, WIDTH) and image.depth.dtype == np.float32
+    points = points_of(image.depth, image.intrinsics, image.base_from_camera)
     rows, columns = pixels_seen(world)['can']
     can = points[(rows.min() + rows.max() + 1) // 2, (columns.min() + columns.max() + 1) // 2]
     assert np.hypot(*(can[:2] - CAN.position[:2])) == pytest.approx(0.031, abs=0.01)
     table = points[np.abs(points[..., 2] - 0.72) < 0.02]
     assert len(table) > 0.2 * WIDTH * HEIGHT and abs(np.median(table[:, 2]) - 0.72) < 2e-3
     assert apply(inverse(world.true_base()), world.link_pose(CAMERA_FRAME)[:3, 3]) == pytest.approx(
-        frame.base_from_camera[:3, 3])
+        image.base_from_camera[:3, 3])
 
 
 def test_noise_repeats_with_the_trial_and_differs_between_frames(world):
-    def frames():
+    def images():
         world.reset(scene())
         robot = DirectRobot(world)
         return [robot.see(), robot.see()]
-    first, again = frames(), frames()
+    first, again = images(), images()
     for one, other in zip(first, again):
-        assert np.array_equal(one.colour, other.colour) and np.array_equal(one.depth, other.depth, equal_nan=True)
+        assert np.array_equal(one.colour, other.colour) and np.array_equal(
+            one.depth, other.depth, equal_nan=True)
     assert not np.array_equal(first[0].colour, first[1].colour)
 
 
 def test_noise_is_as_large_as_it_is_said_to_be():
     depth, generator = np.full((200, 200), 1.0, np.float32), np.random.default_rng(0)
-    usual, none, fourfold = (noisy_depth(depth, Sensor(noise=noise), generator) for noise in (1.0, 0.0, 4.0))
+    usual, none, fourfold = (noisy_depth(depth, CameraQuality(noise=noise), generator)
+                             for noise in (1.0, 0.0, 4.0))
     assert np.nanstd(usual) == pytest.approx(0.0012 + 0.0019 * 0.36, rel=0.1)
     assert np.nanstd(fourfold) > 3.5 * np.nanstd(usual) and np.nanstd(none) < 1e-6
     assert np.isnan(usual).mean() == pytest.approx(0.005, abs=0.002)
-    assert np.isnan(noisy_depth(depth, Sensor(dropout=1.0), generator)).all()
-    colour = noisy_colour(np.full((200, 200, 3), 128, np.uint8), Sensor(colour_noise=6.0), generator)
+    assert np.isnan(noisy_depth(depth, CameraQuality(dropout=1.0), generator)).all()
+    colour = noisy_colour(np.full((200, 200, 3), 128, np.uint8), CameraQuality(colour_noise=6.0),
+                          generator)
     assert colour.std() == pytest.approx(6.0, abs=0.3)
 
 
@@ -96,7 +111,7 @@ def test_edges_and_what_is_too_far_are_lost():
     depth = np.full((100, 100), 1.0, np.float32)
     depth[:, 50:] = 1.5
     depth[:10] = camera.FAR
-    found = noisy_depth(depth, Sensor(), np.random.default_rng(0))
+    found = noisy_depth(depth, CameraQuality(), np.random.default_rng(0))
     assert np.isnan(found[:10]).all()
     assert np.isnan(found[20:, 49:51]).mean() > 0.5 > 0.1 > np.isnan(found[20:, 60:]).mean()
 
@@ -104,20 +119,23 @@ def test_edges_and_what_is_too_far_are_lost():
 def test_dim_light_darkens_the_picture_and_costs_depth(world):
     shares, brightness = [], []
     for level in (1.0, 0.15):
-        world.reset(scene(sensor=Sensor(brightness=level), robot=BOWED))
-        frame = DirectRobot(world).see()
-        shares.append(np.isnan(frame.depth).mean())
-        brightness.append(frame.colour.mean())
+        world.reset(scene(camera=CameraQuality(brightness=level), robot=BOWED))
+        image = DirectRobot(world).see()
+        shares.append(np.isnan(image.depth).mean())
+        brightness.append(image.colour.mean())
     assert brightness[1] < 0.3 * brightness[0] and shares[1] > shares[0] + 0.3
 
 
 def test_glare_and_dim_light_last_as_many_frames_as_they_should(world):
-    world.reset(scene(disturbances=(Disturbance('glare', 'see', (('frames', 1), ('dropout', 0.8))),
-                                    Disturbance('dim', 'see:3', (('frames', 2), ('brightness', 0.2)))), robot=BOWED))
+    world.reset(
+        scene(
+            disturbances=(Disturbance('glare', 'see', (('frames', 1), ('dropout', 0.8))),
+                          Disturbance('dim', 'see:3', (('frames', 2), ('brightness', 0.2)))),
+            robot=BOWED))
     robot = DirectRobot(world)
-    frames = [robot.see() for _ in range(6)]
-    lost = [np.isnan(frame.depth).mean() for frame in frames]
-    light = [frame.colour.mean() for frame in frames]
+    images = [robot.see() for _ in range(6)]
+    lost = [np.isnan(image.depth).mean() for image in images]
+    light = [image.colour.mean() for image in images]
     assert lost[1] > 0.75 and max(lost[0], lost[2], lost[5]) < 0.2
     assert max(light[3:5]) < 0.4 * min(light[:3] + light[5:])
 

@@ -3,15 +3,17 @@ import numpy as np
 import pytest
 from worlds import scene
 
-from smach_oracle.simulation.robot.interface import RobotError
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.fridge import DOOR_JOINT
-from smach_oracle.simulation.world.kitchen_scene import draw as draw_kitchen
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Disturbance
+from smach_oracle.pr2.robot import RobotError
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
+from smach_oracle.simulation.scenes.kitchen_scene import draw as draw_kitchen
+from smach_oracle.simulation.scenes.scene import Disturbance
 
-IN_VIEW = {'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
-           'l_elbow_flex_joint': -1.2}
+IN_VIEW = {
+    'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
+    'l_elbow_flex_joint': -1.2
+}
 LOOK = (0.72, -0.05, 0.75)
 
 
@@ -30,10 +32,11 @@ def test_a_pushed_arm_is_in_the_view_when_the_head_has_turned(world):
     assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=2e-3)
     robot = DirectRobot(world)
     robot.look_at(LOOK)
-    assert not world.unrest
+    assert not world.disturbed
     for name, position in IN_VIEW.items():
         assert world.joints()[name] == pytest.approx(position, abs=0.02)
-    robot.follow(['l_shoulder_pan_joint'], np.array([[before]]), np.array([2.0]))  # it can be taken out again
+    # it can be taken out again
+    robot.follow(['l_shoulder_pan_joint'], np.array([[before]]), np.array([2.0]))
     robot.look_at(LOOK)
     assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=0.02)
 
@@ -77,8 +80,9 @@ def test_a_door_swings_to_its_angle_and_is_then_left_to_itself(world):
     fridge = next(body for body in kitchen.bodies if body.name == 'fridge')
     ajar = fridge._replace(joints=((DOOR_JOINT, 1.8),))
     swing = Disturbance('swing:fridge', 'torso', (('angle', 0.7), ('duration', 1.0)))
-    world.reset(kitchen._replace(bodies=tuple(ajar if body is fridge else body for body in kitchen.bodies),
-                                 disturbances=(swing,)))
+    world.reset(
+        kitchen._replace(bodies=tuple(ajar if body is fridge else body for body in kitchen.bodies),
+                         disturbances=(swing,)))
     assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(1.8, abs=0.02)
     robot = DirectRobot(world)
     robot.torso(0.2)

@@ -5,10 +5,10 @@ import pybullet
 import pytest
 from worlds import CAN, GOAL, TABLE, Hand, scene
 
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.judge import judge
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Body, Goal
+from smach_oracle.simulation.physics.judge import judge
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.scene import Body, Goal
 
 PALM = Body('palm', 'box', (0.2, 0.2, 0.03), (0.7, -0.2, 0.705), colour=(0.8, 0.6, 0.5))
 IN_HAND = Goal('in_hand', '', (0.7, -0.2, 0.72), 0.08)
@@ -49,7 +49,8 @@ def test_any_body_that_was_carried_will_do_where_the_goal_names_none(world):
     world.reset(scene(TABLE, elsewhere, goal=goal))
     assert not judge(world, goal).success
     number = next(index for index in range(20) if world.seen_as(index) == 'can')
-    pybullet.resetBasePositionAndOrientation(number, CAN.position, (0.0, 0.0, 0.0, 1.0), physicsClientId=world.client)
+    pybullet.resetBasePositionAndOrientation(number, CAN.position, (0.0, 0.0, 0.0, 1.0),
+                                             physicsClientId=world.client)
     world.step(60)
     assert judge(world, goal).success
     assert not verdict(world, TABLE, goal=goal).success

@@ -7,13 +7,13 @@ from worlds import CAN, TABLE, empty, scene
 
 from smach_oracle.geometry.depth import pixels_of
 from smach_oracle.geometry.transforms import from_rpy, inverse
-from smach_oracle.simulation.robot.interface import ARM_JOINTS, CAMERA_FRAME, RobotError
-from smach_oracle.simulation.world.camera import INTRINSICS
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.motions import Gripper, Torso
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Body, RobotStart
-from smach_oracle.simulation.world.trajectory import Trajectory
+from smach_oracle.pr2.robot import ARM_JOINTS, CAMERA_FRAME, RobotError
+from smach_oracle.simulation.physics.camera import INTRINSICS
+from smach_oracle.simulation.physics.motions import GripperMotion, TorsoMotion
+from smach_oracle.simulation.physics.trajectory import Trajectory
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.scene import Body, RobotStart
 
 RIGHT = ARM_JOINTS['right']
 AHEAD = RobotStart(tuple((name, 0.0) for name in RIGHT[:6]))  # the arm is stretched out
@@ -39,13 +39,15 @@ def arm(world):
 
 def test_a_trajectory_is_followed_through_its_points(world, robot):
     start = arm(world)
-    points = start + np.array([[0.3, 0.2, 0.1, 0.4, -0.5, -0.3, 0.5], [0.1, 0.4, 0.3, 0.2, -0.2, -0.1, 1.0]])
+    points = start + np.array([[0.3, 0.2, 0.1, 0.4, -0.5, -0.3, 0.5],
+                               [0.1, 0.4, 0.3, 0.2, -0.2, -0.1, 1.0]])
     motion, seen, begun = Trajectory(RIGHT, points, np.array([1.0, 2.0])), [], world.time
     while motion.tick(world) is None:
         world.step()
         seen.append(arm(world))
     assert np.abs(arm(world) - points[1]).max() < 5e-3
-    assert min(np.abs(each - points[0]).max() for each in seen) < 0.03  # corners are rounded off a little
+    # corners are rounded off a little
+    assert min(np.abs(each - points[0]).max() for each in seen) < 0.03
     assert world.time - begun < 2.4
     steps = np.diff(seen, axis=0) * 60
     assert np.abs(np.diff(steps, axis=0)).max() * 60 < 15  # rad/s2: nothing jerks
@@ -53,7 +55,8 @@ def test_a_trajectory_is_followed_through_its_points(world, robot):
 
 def test_velocities_make_it_smooth(world, robot):
     start, way = arm(world), 0.6
-    motion, seen = Trajectory([RIGHT[0]], np.array([[start[0] + way]]), np.array([2.0]), np.array([[0.0]])), []
+    motion, seen = Trajectory([RIGHT[0]], np.array([[start[0] + way]]), np.array([2.0]),
+                              np.array([[0.0]])), []
     while motion.tick(world) is None:
         world.step()
         seen.append(arm(world)[0] - start[0])
@@ -85,7 +88,8 @@ def test_a_first_point_at_time_zero_is_where_it_is(world, robot):
     ([RIGHT[3]], [[0.5]], [9.0], 'r_elbow_flex_joint cannot be at 0.5; allowed: -2.321 to 0'),
     ([RIGHT[3]], [[-0.1]], [0.1], 'r_elbow_flex_joint would go 1.4 in 0.1 s; its limit is 3.3/s'),
 ])
-def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, positions, times, text):
+def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, positions, times,
+                                                         text):
     before, time = arm(world), world.time
     with pytest.raises(RobotError, match=text):
         robot.follow(joints, np.array(positions), np.array(times))
@@ -93,7 +97,8 @@ def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, p
 
 
 def test_a_trajectory_that_would_pass_a_point_too_fast_is_refused(world, robot):
-    motion = Trajectory(RIGHT[:1], np.array([[-1.0], [-1.1]]), np.array([2.0, 4.0]), np.array([[1e300], [0.0]]))
+    motion = Trajectory(RIGHT[:1], np.array([[-1.0], [-1.1]]), np.array([2.0, 4.0]),
+                        np.array([[1e300], [0.0]]))
     assert 'r_shoulder_pan_joint would pass a point at 1e+300/s' in motion.refusal(world)
 
 
@@ -103,7 +108,9 @@ def test_an_arm_that_meets_a_wall_stops_and_says_so(world):
     world.reset(scene(wall, robot=RobotStart(tuple(zip(RIGHT, ahead)))))
     robot, into = DirectRobot(world), arm(world)
     into[0] = -1.6
-    with pytest.raises(RobotError, match=r'r_\w+ is \d.\d\d off its path after \d.\d s: something is in its way'):
+    with pytest.raises(
+            RobotError,
+            match=r'r_\w+ is \d.\d\d off its path after \d.\d s: something is in its way'):
         robot.follow(RIGHT, into[None], np.array([3.0]))
     assert 'robot' in {contact.other for contact in world.contacts('wall')}
     assert arm(world)[0] > -1.3
@@ -133,8 +140,9 @@ def test_a_hand_that_closes_again_does_not_loosen_what_it_holds(world):
     tool = world.tool_pose('right')
     aside = CAN._replace(position=tuple((tool @ [0.0, 0.002, 0.0, 1.0])[:3]), mass=0.0)
     world.reset(scene(aside, robot=AHEAD))
-    assert DirectRobot(world).gripper('right', 0.0, 15.0).stalled and world.holding('can') == 'right'
-    again, forces = Gripper('right', 0.0, 15.0), []
+    assert DirectRobot(world).gripper('right', 0.0,
+                                      15.0).stalled and world.holding('can') == 'right'
+    again, forces = GripperMotion('right', 0.0, 15.0), []
     while again.tick(world) is None:
         world.step()
         forces.append(world.robot.finger_force('right'))
@@ -165,7 +173,7 @@ def test_the_torso_takes_a_real_ones_time(world, robot):
     for height, text in ((0.5, 'allowed: 0 to 0.31'), (math.nan, 'height is nan')):
         with pytest.raises(RobotError, match=text):
             robot.torso(height)
-    assert Torso(world, 0.2).events() == ['torso']
+    assert TorsoMotion(world, 0.2).events() == ['torso']
 
 
 @pytest.mark.parametrize('point', [(0.7, -0.3, 0.7), (1.5, 1.0, 1.2), (0.6, 0.0, 0.0)])
@@ -176,8 +184,8 @@ def test_the_camera_looks_at_the_point(world, robot, point):
     assert depth > 0 and abs(column - INTRINSICS[0, 2]) < 3 and abs(row - INTRINSICS[1, 2]) < 3
 
 
-@pytest.mark.parametrize('point, text', [
-    ((1.0, 0.0, 4.0), 'head_tilt_joint cannot be at'), ((0.5, math.nan, 1.0), 'finite'), ((0.5, 1.0), 'three')])
+@pytest.mark.parametrize('point, text', [((1.0, 0.0, 4.0), 'head_tilt_joint cannot be at'),
+                                         ((0.5, math.nan, 1.0), 'finite'), ((0.5, 1.0), 'three')])
 def test_the_head_refuses_where_it_cannot_look(robot, point, text):
     with pytest.raises(RobotError, match=text):
         robot.look_at(point)

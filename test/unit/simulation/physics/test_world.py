@@ -1,4 +1,6 @@
-"""The world: it repeats to the bit, stands still, holds what is held, and refuses nonsense by name."""
+"""The world: it repeats to the bit, stands still, holds what is held, and refuses nonsense by
+name.
+"""
 import math
 
 import numpy as np
@@ -6,11 +8,11 @@ import pytest
 from worlds import CAN, CARTON, TABLE, Hand, empty, scene
 
 from smach_oracle.geometry.transforms import from_rpy, inverse, yaw_of
-from smach_oracle.simulation.robot.interface import ARM_JOINTS
-from smach_oracle.simulation.world.bodies import SceneError
-from smach_oracle.simulation.world.direct import DirectRobot
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.scene import Disturbance, RobotStart, Sensor
+from smach_oracle.pr2.robot import ARM_JOINTS
+from smach_oracle.simulation.physics.bodies import SceneBuildError
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
+from smach_oracle.simulation.scenes.scene import CameraQuality, Disturbance, RobotStart
 
 
 @pytest.fixture(scope='module')
@@ -36,8 +38,8 @@ def eventful(world):
     Hand(world, robot).take('can')
     states.append(state(world))
     robot.drive(from_rpy((-0.1, 0.0, 0.0), yaw=0.1))
-    frame = robot.see()
-    return states + [state(world), frame.colour.tobytes(), frame.depth.tobytes()]
+    image = robot.see()
+    return states + [state(world), image.colour.tobytes(), image.depth.tobytes()]
 
 
 def test_the_same_scene_and_calls_give_the_same_states_to_the_last_bit(world):
@@ -67,7 +69,9 @@ def test_things_stand_still_from_the_start(world):
 
 
 def test_the_robot_stands_as_the_scene_says_and_holds_itself(world):
-    world.reset(empty(robot=RobotStart((('torso_lift_joint', 0.1), ('r_elbow_flex_joint', -1.0)), (1.0, -0.5, 0.3))))
+    world.reset(
+        empty(robot=RobotStart((('torso_lift_joint', 0.1),
+                                ('r_elbow_flex_joint', -1.0)), (1.0, -0.5, 0.3))))
     world.step(60)
     assert world.joints()['torso_lift_joint'] == pytest.approx(0.1, abs=1e-3)
     assert world.joints()['r_elbow_flex_joint'] == pytest.approx(-1.0, abs=2e-3)
@@ -105,7 +109,8 @@ def test_each_drive_errs_anew_and_the_same_way_for_the_same_trial(world):
             assert np.abs(world.odom_from_base() - goal).max() < 5e-3  # it believes to be there
             misses.append(world.true_base()[:2, 3] - goal[:2, 3])
     assert np.array_equal(misses[:2], misses[2:])
-    assert 0.005 < np.linalg.norm(misses[0]) < 0.25 and np.linalg.norm(misses[1] - misses[0]) > 0.005
+    assert 0.005 < np.linalg.norm(misses[0]) < 0.25 and np.linalg.norm(misses[1] -
+                                                                       misses[0]) > 0.005
 
 
 def test_a_short_drive_keeps_most_of_the_error_that_there_was(world):
@@ -115,7 +120,8 @@ def test_a_short_drive_keeps_most_of_the_error_that_there_was(world):
     before = world.belief_error.copy()
     robot.drive(from_rpy((0.98, 0, 0)))
     after = world.belief_error
-    assert 0.0 < np.linalg.norm(after[:2, 3] - before[:2, 3]) < 0.04 * 3 * 0.05 + 0.04 * np.linalg.norm(before[:2, 3])
+    assert 0.0 < np.linalg.norm(
+        after[:2, 3] - before[:2, 3]) < 0.04 * 3 * 0.05 + 0.04 * np.linalg.norm(before[:2, 3])
     assert np.linalg.norm(before[:2, 3]) > 0.01
 
 
@@ -130,27 +136,34 @@ def test_clients_are_given_back(world):
 @pytest.mark.parametrize('wrong, text', [
     (scene(TABLE, TABLE), "'table'.*taken"),
     (scene(TABLE._replace(name='robot')), "'robot'"),
-    (scene(CAN._replace(shape='sphere')), "'can': shape is 'sphere'; allowed: box, cylinder, round, urdf"),
+    (scene(CAN._replace(shape='sphere')),
+     "'can': shape is 'sphere'; allowed: box, cylinder, round, urdf"),
     (scene(CAN._replace(size=(0.03, 0.03, 0.0))), "'can': size"),
     (scene(CAN._replace(mass=math.nan)), "'can': mass nan"),
     (scene(CAN._replace(position=(0.0, math.inf, 0.0))), "'can': position"),
     (scene(CAN._replace(shape='urdf', urdf='<robot')), "'can': its urdf cannot be read"),
-    (scene(CAN._replace(shape='urdf', urdf='<robot name="a"><link name="b"/></robot>', joints=(('hinge', 0.0),))),
-     "'can': no joint 'hinge'"),
-    (scene(CAN._replace(shape='urdf', joints=(('hinge', math.nan),))), "'can': joint 'hinge' is given nan"),
+    (scene(
+        CAN._replace(shape='urdf', urdf='<robot name="a"><link name="b"/></robot>',
+                     joints=(('hinge', 0.0),))), "'can': no joint 'hinge'"),
+    (scene(CAN._replace(shape='urdf',
+                        joints=(('hinge', math.nan),))), "'can': joint 'hinge' is given nan"),
     (scene()._replace(goal=scene().goal._replace(body='cup')), "'cup'.*can, carton"),
-    (scene(sensor=Sensor(dropout=1.5)), 'dropout'),
+    (scene(camera=CameraQuality(dropout=1.5)), 'dropout'),
     (scene(robot=RobotStart((('r_elbow_joint', 0.0),))), "no joint 'r_elbow_joint'"),
-    (scene(robot=RobotStart((('r_elbow_flex_joint', 1.0),))), 'r_elbow_flex_joint .* at 1; allowed: -2.321 to 0'),
-    (scene(disturbances=(Disturbance('earthquake', 'see'),)), "'earthquake': unknown kind; allowed: arm, dim"),
-    (scene(disturbances=(Disturbance('dim', 'lunch'),)), "'dim': unknown event 'lunch'; allowed: start, follow"),
+    (scene(robot=RobotStart((('r_elbow_flex_joint', 1.0),))),
+     'r_elbow_flex_joint .* at 1; allowed: -2.321 to 0'),
+    (scene(disturbances=(Disturbance('earthquake', 'see'),)),
+     "'earthquake': unknown kind; allowed: arm, dim"),
+    (scene(disturbances=(Disturbance('dim', 'lunch'),)),
+     "'dim': unknown event 'lunch'; allowed: start, follow"),
     (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
-    (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)), "no joint 'l_elbow_joint'"),
+    (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
+     "no joint 'l_elbow_joint'"),
     (scene(disturbances=(Disturbance('glare', 'see', (('dropout', -1.0),)),)), 'dropout is -1'),
 ])
 def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wrong, text):
     world.reset(scene())
-    with pytest.raises(SceneError, match=text):
+    with pytest.raises(SceneBuildError, match=text):
         world.reset(wrong)
     world.step()
     assert world.body_names == ['table', 'can', 'carton']
@@ -158,15 +171,20 @@ def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wr
 
 def test_unknown_names_and_values_are_refused_with_those_that_are_allowed(world):
     world.reset(scene())
-    for call, text in ((lambda: world.body_pose('cup'), "no body 'cup'.*can"),
-                       (lambda: world.body_joint('can', 'lid'), "no joint 'lid' in 'can'"),
-                       (lambda: world.body_pose('can', 'lid'), "no link 'lid' in 'can'"),
-                       (lambda: world.link_pose('nose'), "no link 'nose'.*base_link"),
-                       (lambda: world.gap('middle'), "'middle'; allowed: left, right"),
-                       (lambda: world.set_target('nose', 0.0), "no joint 'nose'"),
-                       (lambda: world.set_target('r_elbow_flex_joint', math.nan), 'cannot be at nan'),
-                       (lambda: world.set_target('r_elbow_flex_joint', -1.0, math.inf), 'velocity is inf'),
-                       (lambda: world.set_gripper('left', math.nan, 5.0), 'gap nan'),
+    for call, text in ((lambda: world.body_pose('cup'),
+                        "no body 'cup'.*can"), (lambda: world.body_joint('can', 'lid'),
+                                                "no joint 'lid' in 'can'"),
+                       (lambda: world.body_pose('can', 'lid'),
+                        "no link 'lid' in 'can'"), (lambda: world.link_pose('nose'),
+                                                    "no link 'nose'.*base_link"),
+                       (lambda: world.gap('middle'),
+                        "'middle'; allowed: left, right"), (lambda: world.set_target('nose', 0.0),
+                                                            "no joint 'nose'"),
+                       (lambda: world.set_target('r_elbow_flex_joint', math.nan),
+                        'cannot be at nan'),
+                       (lambda: world.set_target('r_elbow_flex_joint', -1.0, math.inf),
+                        'velocity is inf'), (lambda: world.set_gripper('left', math.nan, 5.0),
+                                             'gap nan'),
                        (lambda: world.set_gripper('left', 0.0, -5.0), '-5.0 N')):
         with pytest.raises(ValueError, match=text):
             call()

@@ -3,9 +3,9 @@ import cv2
 import numpy as np
 import pytest
 
-from smach_oracle.simulation.world import film
-from smach_oracle.simulation.world.film import TASKS, main, write_video
-from smach_oracle.simulation.world.rehearsal import Rehearsed
+from smach_oracle.simulation.rehearsal import film
+from smach_oracle.simulation.rehearsal.film import TASKS, main, write_video
+from smach_oracle.simulation.rehearsal.pick_and_place import RehearsalResult
 
 
 def test_a_video_has_the_frames_it_was_given(tmp_path):
@@ -25,13 +25,15 @@ def test_wrong_arguments_are_named(argv, capsys):
     assert 'usage' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('argv, words', [
-    (['robot'], 'robot: what kind of file? Its name may end in .png, .jpg, .jpeg'),
-    (['robot.gif'], 'robot.gif: what kind of file?'),
-    (['robot.png', '--video', 'robot'], 'robot: what kind of file? Its name may end in .mp4'),
-    (['nowhere/robot.png'], 'there is no folder'),
-    (['robot.png', '--video', 'nowhere/robot.mp4'], 'nowhere/robot.mp4: there is no folder')])
-def test_a_file_that_cannot_be_written_is_told_before_anything_is_filmed(argv, words, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    'argv, words',
+    [(['robot'], 'robot: what kind of file? Its name may end in .png, .jpg, .jpeg'),
+     (['robot.gif'], 'robot.gif: what kind of file?'),
+     (['robot.png', '--video', 'robot'], 'robot: what kind of file? Its name may end in .mp4'),
+     (['nowhere/robot.png'], 'there is no folder'),
+     (['robot.png', '--video', 'nowhere/robot.mp4'], 'nowhere/robot.mp4: there is no folder')])
+def test_a_file_that_cannot_be_written_is_told_before_anything_is_filmed(
+        argv, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, 'film', lambda *args: pytest.fail('filmed'))
     with pytest.raises(SystemExit) as caught:
@@ -40,8 +42,9 @@ def test_a_file_that_cannot_be_written_is_told_before_anything_is_filmed(argv, w
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('failed, reason, words', [('', '', 'seed 5: nothing was held for 2 s'),
-                                                   ('PICK', 'out of reach', 'seed 5: PICK failed: out of reach')])
+@pytest.mark.parametrize('failed, reason, words',
+                         [('', '', 'seed 5: nothing was held for 2 s'),
+                          ('PICK', 'out of reach', 'seed 5: PICK failed: out of reach')])
 def test_why_there_is_no_picture_is_told(failed, reason, words, monkeypatch, tmp_path, capsys):
     class Empty:
         def __init__(self, *args):
@@ -51,10 +54,11 @@ def test_why_there_is_no_picture_is_told(failed, reason, words, monkeypatch, tmp
             pass
     monkeypatch.setattr(film, 'FilmedWorld', Empty)
     monkeypatch.setattr(film, 'rehearse', lambda scene, world, steps: film_result(failed, reason))
-    monkeypatch.setitem(TASKS, 'pick_and_place', TASKS['pick_and_place']._replace(draw=lambda seed, benign: None))
+    monkeypatch.setitem(TASKS, 'pick_and_place',
+                        TASKS['pick_and_place']._replace(draw=lambda seed, benign: None))
     assert main([str(tmp_path / 'robot.png'), '--seed', '5']) == 1
     assert words in capsys.readouterr().err
 
 
 def film_result(failed, reason):
-    return Rehearsed(5, failed, reason, False, '', (), {}, 0.0)
+    return RehearsalResult(5, failed, reason, False, '', (), {}, 0.0)

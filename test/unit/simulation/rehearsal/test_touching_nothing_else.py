@@ -1,14 +1,18 @@
-"""Whole tasks watched by physics: of all that stands around, the robot touches what it takes, and nothing else."""
+"""Whole tasks watched by physics: of all that stands around, the robot touches what it takes, and
+nothing else.
+"""
 import pytest
 
-from smach_oracle.simulation.world import kitchen_scene, tabletop_scene
-from smach_oracle.simulation.world.drink_rehearsal import DrinkTrial
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.rehearsal import Trial, rehearse
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.drink_retrieval import DrinkRetrievalRehearsal
+from smach_oracle.simulation.rehearsal.pick_and_place import PickAndPlaceRehearsal, rehearse
+from smach_oracle.simulation.scenes import kitchen_scene, tabletop_scene
 
 
 class WatchedWorld(World):
-    """Remembers what pressed against the robot in any control period; no planner has a say in it."""
+    """Remembers what pressed against the robot in any control period; no planner has a say in
+    it.
+    """
 
     def __init__(self):
         self.touched = set()
@@ -17,12 +21,16 @@ class WatchedWorld(World):
     def step(self, count=1):
         for _ in range(count):
             super().step(1)
-            self.touched |= {contact.other for contact in self.contacts('robot') if contact.force > 0}
+            self.touched |= {
+                contact.other
+                for contact in self.contacts('robot') if contact.force > 0
+            }
 
 
-@pytest.mark.parametrize('task, draw, seed, expected', [
-    (Trial, tabletop_scene.draw, 4, {'object_0'}), (Trial, tabletop_scene.draw, 9, {'object_0'}),
-    (DrinkTrial, kitchen_scene.draw, 3, {'fridge', 'drink_0'})])
+@pytest.mark.parametrize('task, draw, seed, expected',
+                         [(PickAndPlaceRehearsal, tabletop_scene.draw, 4, {'object_0'}),
+                          (PickAndPlaceRehearsal, tabletop_scene.draw, 9, {'object_0'}),
+                          (DrinkRetrievalRehearsal, kitchen_scene.draw, 3, {'fridge', 'drink_0'})])
 def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expected):
     world = WatchedWorld()
     done = rehearse(draw(seed, benign=True), world, task)

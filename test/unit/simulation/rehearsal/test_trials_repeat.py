@@ -1,10 +1,12 @@
-"""The same seed gives the same trial: to the last bit, with the failure that its cause leads to, in any company."""
+"""The same seed gives the same trial: to the last bit, with the failure that its cause leads to, in
+any company.
+"""
 import pytest
 
-from smach_oracle.simulation.world import kitchen_scene, tabletop_scene
-from smach_oracle.simulation.world.drink_rehearsal import DrinkTrial
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.rehearsal import Trial, rehearse
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.drink_retrieval import DrinkRetrievalRehearsal
+from smach_oracle.simulation.rehearsal.pick_and_place import PickAndPlaceRehearsal, rehearse
+from smach_oracle.simulation.scenes import kitchen_scene, tabletop_scene
 
 
 def course(world, scene, task):
@@ -16,19 +18,20 @@ def course(world, scene, task):
 
 def seed_with(draw, kind):
     """The first seed of which this is the only cause to fail."""
-    return next(seed for seed in range(1000) if [cause.kind for cause in draw(seed).causes] == [kind])
+    return next(seed for seed in range(1000)
+                if [cause.kind for cause in draw(seed).causes] == [kind])
 
 
 @pytest.mark.parametrize('task, draw, kind, failed', [
-    (Trial, tabletop_scene.draw, 'object_moved', 'PICK'),
-    (DrinkTrial, kitchen_scene.draw, 'glare', 'DETECT_DRINK')])
+    (PickAndPlaceRehearsal, tabletop_scene.draw, 'object_moved', 'PICK'),
+    (DrinkRetrievalRehearsal, kitchen_scene.draw, 'glare', 'DETECT_DRINK')])
 def test_the_same_seed_gives_the_same_trial_also_after_another_one(task, draw, kind, failed):
     scene = draw(seed_with(draw, kind))
     world = World()
     first = course(world, scene, task)
     world.close()
     world = World()
-    other = course(world, tabletop_scene.draw(1, benign=True), Trial)
+    other = course(world, tabletop_scene.draw(1, benign=True), PickAndPlaceRehearsal)
     again = course(world, scene, task)
     world.close()
     assert first[0].failed == failed and first[0].reason

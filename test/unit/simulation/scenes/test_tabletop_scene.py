@@ -4,11 +4,11 @@ import collections
 import numpy as np
 import pybullet
 
-from smach_oracle.simulation.world.judge import judge
-from smach_oracle.simulation.world.physics import World
-from smach_oracle.simulation.world.rehearsal import rehearse
-from smach_oracle.simulation.world.tabletop_causes import CHANCE
-from smach_oracle.simulation.world.tabletop_scene import GOAL, draw
+from smach_oracle.simulation.physics.judge import judge
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.pick_and_place import rehearse
+from smach_oracle.simulation.scenes.tabletop_causes import CHANCE
+from smach_oracle.simulation.scenes.tabletop_scene import GOAL, draw
 
 
 def test_the_same_seed_gives_the_same_scene_and_another_another():

@@ -1,17 +1,19 @@
-"""Claims of people whose pages are there are renewed, whichever robot hangs; of closed questions they are forgotten."""
+"""Claims of people whose pages are there are renewed, whichever robot hangs; of closed questions
+they are forgotten.
+"""
 import threading
 
 import pytest
 import rospy
 from expert_fixtures import make_question
 
-from smach_oracle.expert.console import desk
-from smach_oracle.expert.console.audit import Person
-from smach_oracle.expert.console.commands import Command
-from smach_oracle.expert.console.desk import Desk
-from smach_oracle.expert.followed_server import Listed
+from smach_oracle.expert.claims import MOST_MISSED, ClaimKeeper
+from smach_oracle.expert.console.answering.question_commands import QuestionCommands
+from smach_oracle.expert.console.commands.commands import Command
+from smach_oracle.expert.console.web.audit import Person
+from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import OpenQuery
-from smach_oracle.ros.question_messages import to_goal
+from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.srv import ClaimQueryRequest, ClaimQueryResponse
 
 ANN = Person('10.0.0.7', 'abc', 'operator', 'ann')
@@ -36,8 +38,11 @@ class Front:
 
     def __init__(self, robots):
         self.servers = {robot: Server() for robot in robots}
-        self.open = {robot: Listed(robot, to_goal(make_question('q'), robot, asked=rospy.Time(1)),
-                                   OpenQuery.PENDING, '', 0.0, 1e9) for robot in robots}
+        self.open = {
+            robot: ListedQuestion(robot, to_goal(make_question('q'), robot, asked=rospy.Time(1)),
+                                  OpenQuery.PENDING, '', 0.0, 1e9)
+            for robot in robots
+        }
 
     def find(self, key):
         return next((listed for listed in self.open.values() if listed.key == key), None)
@@ -48,16 +53,18 @@ class Front:
 
 class Silent:
 
-    def tell(self, *_):
+    def record(self, *_):
         """Nobody listens."""
 
 
-@pytest.fixture(name='office')
-def make_office(monkeypatch):
-    """A desk where page 1 has claimed a question of each of three robots; it renews when it is told."""
-    monkeypatch.setattr(Desk, '_keep_claims', lambda self: None)
+@pytest.fixture(name='commands')
+def make_commands(monkeypatch):
+    """A desk where page 1 has claimed a question of each of three robots; it renews when it is
+    told.
+    """
+    monkeypatch.setattr(ClaimKeeper, '_run', lambda self: None)
     front = Front(['/a', '/b', '/c'])
-    made = Desk(front, Silent(), {})
+    made = QuestionCommands(front, Silent(), {})
     for listed in front.open.values():
         assert made.carry_out(Command(1, 'claim', {'question': listed.key}), ANN, 1).ok
     return made, front
@@ -67,14 +74,14 @@ def renewals(front, robot):
     return front.servers[robot].actions.count(ClaimQueryRequest.RENEW)
 
 
-def test_robots_that_hang_cost_no_claim_of_the_others(office):
-    made, front = office
+def test_robots_that_hang_cost_no_claim_of_the_others(commands):
+    made, front = commands
     renewed = threading.Event()
     for robot in ('/a', '/b'):
         front.servers[robot].answers.clear()
     claim = front.servers['/c'].claim
     front.servers['/c'].claim = lambda *given: (claim(*given), renewed.set())[0]
-    thread = threading.Thread(target=made.renew)
+    thread = threading.Thread(target=made.claims.renew)
     thread.start()
     assert renewed.wait(10.0), 'while the others hang'
     for server in front.servers.values():
@@ -83,19 +90,20 @@ def test_robots_that_hang_cost_no_claim_of_the_others(office):
     assert [renewals(front, robot) for robot in ('/a', '/b', '/c')] == [1, 1, 1]
 
 
-def test_a_question_that_is_closed_is_forgotten_and_one_whose_server_is_restarted_is_not(office):
-    made, front = office
+def test_a_question_that_is_closed_is_forgotten_and_one_whose_server_is_restarted_is_not(commands):
+    made, front = commands
     closed, restarted = front.open.pop('/a'), front.open.pop('/b')
-    made.renew()
+    made.claims.renew()
     front.open['/b'] = restarted
-    for _ in range(desk._MOST_MISSED + 1):
-        made.renew()
-    assert [renewals(front, robot) for robot in ('/a', '/b', '/c')] == [0, desk._MOST_MISSED + 1, desk._MOST_MISSED + 2]
-    assert (closed.key, 'ann') not in made._held and len(made._held) == 2
+    for _ in range(MOST_MISSED + 1):
+        made.claims.renew()
+    assert [renewals(front, robot)
+            for robot in ('/a', '/b', '/c')] == [0, MOST_MISSED + 1, MOST_MISSED + 2]
+    assert (closed.key, 'ann') not in made.claims.held and len(made.claims.held) == 2
 
 
-def test_a_page_that_is_gone_renews_nothing(office):
-    made, front = office
+def test_a_page_that_is_gone_renews_nothing(commands):
+    made, front = commands
     made.leave(1)
-    made.renew()
+    made.claims.renew()
     assert [renewals(front, robot) for robot in ('/a', '/b', '/c')] == [0, 0, 0]

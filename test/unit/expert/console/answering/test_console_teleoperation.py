@@ -1,32 +1,39 @@
-"""A hand as the console drives it: arms, frames, and no more commands than a world in lock-step can take."""
+"""A hand as the console drives it: arms, frames, and no more commands than a world in lock-step can
+take.
+"""
 import time
 
 import pytest
 import rospy
 
-from smach_oracle.expert.console import hands
-from smach_oracle.expert.console.audit import Person
-from smach_oracle.expert.console.commands import Command
-from smach_oracle.expert.console.sections import Sections
-from smach_oracle.expert.console.wheel import SILENT_S, Drive
-from smach_oracle.expert.teleoperation import GRIPPER_OPEN
+from smach_oracle.expert.console.answering import teleop_client, teleoperation
+from smach_oracle.expert.console.answering.driving_control import SILENT_S, DrivingSession
+from smach_oracle.expert.console.commands.commands import Command
+from smach_oracle.expert.console.web.audit import Person
+from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.interfaces.manipulation.cartesian_drive import GRIPPER_OPEN
 from smach_oracle.msg import TeleopState
 
 ARMS = {'left': {'tool': 'l_tool'}, 'right': {'tool': 'r_tool'}}
-SAID = {'question': 'q', 'held': True, 'frame': 'tool', 'linear': (1.0, 0.0, 0.0), 'angular': (0.0, 0.0, 0.0),
-        'gripper': '', 'arm': ''}
+SAID = {
+    'question': 'q', 'held': True, 'frame': 'tool', 'linear': (1.0, 0.0, 0.0),
+    'angular': (0.0, 0.0, 0.0), 'gripper': '', 'arm': ''
+}
 
 
 class FakePublisher:
 
+    made = None  # the last
+
     def __init__(self, *_, **__):
+        FakePublisher.made = self
         self.sent = []
         self.publish = self.sent.append
 
 
 class Silent:
 
-    def tell(self, *_):
+    def record(self, *_):
         """Nobody listens."""
 
 
@@ -47,18 +54,19 @@ def make_hands(monkeypatch):
         monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
         monkeypatch.setattr(rospy, 'get_name', lambda: '/console')
         monkeypatch.setattr(rospy.Time, 'now', lambda: rospy.Time(7))
-        made = hands.Hands(None, None, Silent())
-        hand = made._hands['q'] = hands.Hand('/hand')
-        hand.state = TeleopState(arm='right')
-        hand.wheel.take(Drive('q', 1, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
-        return made, hand, hand._publisher.sent
+        made = teleoperation.Teleoperation(PageSections(), NoQuestions(), Silent())
+        client = made._clients['q'] = teleop_client.TeleopClient('/hand')
+        client.state = TeleopState(arm='right')
+        client.control.take(
+            DrivingSession('q', 1, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
+        return made, client, FakePublisher.made.sent
     return make
 
 
-def drive(made, sent_s=None, browser=1, **more):
+def drive(made, sent_s=None, page=1, **more):
     """As a page says it; `sent_s` by its own clock, now where it is not told."""
     sent_s = time.monotonic() if sent_s is None else sent_s
-    return made.drive(Command(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), browser)
+    return made.drive(Command(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), page)
 
 
 def test_the_arm_is_the_interface_s_own_choice_until_another_is_named(make):
@@ -84,20 +92,23 @@ def test_an_arm_that_is_not_there_stops_the_hand(make):
 
 def test_another_page_drives_nothing(make):
     made, _, sent = make()
-    assert drive(made, browser=2).message == hands.TAKE_FIRST and sent == []
+    assert drive(made, page=2).message == teleoperation.TAKE_FIRST and sent == []
 
 
-def test_a_world_in_lock_step_gets_the_next_command_when_it_has_carried_out_the_last(make):
-    made, hand, sent = make(lock_step=True)
+def test_a_world_in_lock_step_gets_the_next_command_when_it_has_carried_out_the_last(
+        make, monkeypatch):
+    made, client, sent = make(lock_step=True)
     for _ in range(5):
         drive(made)
     assert [each.seq for each in sent] == [1]
-    hand.state = TeleopState(arm='right', seq=1, sender=sent[0].operator)
+    client.state = TeleopState(arm='right', seq=1, sender=sent[0].operator)
     drive(made)
     drive(made)
     drive(made, held=False)
-    assert [(each.seq, each.dead_man) for each in sent] == [(1, True), (2, True), (3, False)], 'a release never waits'
-    hand._sent_s -= hands.ANSWER_S
+    assert [(each.seq, each.dead_man) for each in sent] == [(1, True), (2, True),
+                                                            (3, False)], 'a release never waits'
+    later_s = time.monotonic() + teleop_client.ANSWER_S
+    monkeypatch.setattr(time, 'monotonic', lambda: later_s)
     drive(made)
     assert sent[-1].seq == 4, 'an answer may get lost'
 
@@ -110,24 +121,23 @@ def test_a_world_of_its_own_pace_gets_them_all(make):
 
 
 def test_a_page_that_has_fallen_silent_loses_the_wheel_and_the_hand_stands(make, monkeypatch):
-    made, hand, sent = make()
+    made, client, sent = make()
     drive(made)
-    made._sections, made._front_end = Sections(), NoQuestions()
-    made.draw()
-    assert hand.wheel.drive is not None, 'it has just been heard'
+    made.write_sections()
+    assert client.control.session is not None, 'it has just been heard'
     begun_s = time.monotonic()
     monkeypatch.setattr(time, 'monotonic', lambda: begun_s + SILENT_S + 0.1)
-    made.draw()
-    assert hand.wheel.drive is None and not sent[-1].dead_man
-    assert drive(made).message == hands.TAKE_FIRST
+    made.write_sections()
+    assert client.control.session is None and not sent[-1].dead_man
+    assert drive(made).message == teleoperation.TAKE_FIRST
 
 
 def test_settings_that_are_none_take_nobody_else_s_hand_away(make, monkeypatch):
-    made, hand, _ = make()
+    made, client, _ = make()
     monkeypatch.setattr(rospy, 'logerr_throttle', lambda *_: None)
     known = rospy.get_param
     monkeypatch.setattr(rospy, 'get_param', lambda name, default=None: (
         'no arms' if name == '/evil/arms' else known(name, default)))
     made._begin('e', '/evil')
     made._begin('r', '/hand')
-    assert sorted(made._hands) == ['q', 'r'] and made._hands['q'] is hand
+    assert sorted(made._clients) == ['q', 'r'] and made._clients['q'] is client

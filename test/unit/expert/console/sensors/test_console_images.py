@@ -1,4 +1,6 @@
-"""Images, clouds and joints as a browser gets them: what is shown, and what a hostile or broken message does."""
+"""Images, clouds and joints as a browser gets them: what is shown, and what a hostile or broken
+message does.
+"""
 import struct
 
 import cv2
@@ -7,8 +9,13 @@ import pytest
 from sensor_msgs.msg import CompressedImage, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
-from smach_oracle.expert.console.clouds import CloudError, encode_cloud, encode_joints, thinned
-from smach_oracle.expert.console.images import MOST_BYTES, encode_image, false_colours
+from smach_oracle.expert.console.sensors.clouds import (
+    CloudError,
+    encode_cloud,
+    encode_joints,
+    thinned,
+)
+from smach_oracle.expert.console.sensors.images import MOST_BYTES, encode_image, false_colours
 from smach_oracle.ros.images import ImageError, cloud_message, colour_image, depth_image
 
 HEADER = Header(frame_id='camera')
@@ -42,7 +49,8 @@ def test_depth_tells_its_range_and_shows_near_in_red_and_far_in_blue():
     depth[:, :20], depth[:5] = 0.5, np.nan
     encoded = encode_image(depth_image(depth, HEADER), 320)
     assert encoded.content_type == 'image/png' and encoded.facts['range'] == [0.5, 3.0]
-    near, far, nothing = (shown(encoded)[row, column].astype(int) for row, column in ((20, 5), (20, 50), (2, 30)))
+    near, far, nothing = (shown(encoded)[row, column].astype(int)
+                          for row, column in ((20, 5), (20, 50), (2, 30)))
     assert near[0] > near[2] + 50 and far[2] > far[0] + 50 and set(nothing) == {40}
 
 
@@ -56,17 +64,20 @@ def test_a_depth_image_without_any_depth_is_shown_all_the_same():
 def test_a_compressed_image_is_made_anew_and_not_passed_on(suffix):
     data = bytes(cv2.imencode(suffix, blue()[:, :, ::-1].copy())[1]) + b'<script>'
     encoded = encode_image(CompressedImage(format='jpeg', data=data), 640)
-    assert np.abs(shown(encoded).astype(int) - blue()).max() < 10 and b'<script>' not in encoded.body
+    assert np.abs(shown(encoded).astype(int) -
+                  blue()).max() < 10 and b'<script>' not in encoded.body
 
 
-@pytest.mark.parametrize('kind, header, stored, metres', [
-    ('16UC1; compressedDepth', (0, 0.0, 0.0), 1500, 1.5), ('32FC1; compressedDepth png', (0, 100.0, 50.0), 100, 2.0)])
+@pytest.mark.parametrize('kind, header, stored, metres',
+                         [('16UC1; compressedDepth', (0, 0.0, 0.0), 1500, 1.5),
+                          ('32FC1; compressedDepth png', (0, 100.0, 50.0), 100, 2.0)])
 def test_compressed_depth_is_unpacked(kind, header, stored, metres):
     values = np.full((10, 12), stored, np.uint16)
     values[0] = 0
     data = struct.pack('<iff', *header) + bytes(cv2.imencode('.png', values)[1])
     encoded = encode_image(CompressedImage(format=kind, data=data), 640)
-    assert encoded.facts['kind'] == 'depth' and encoded.facts['range'] == pytest.approx([metres, metres])
+    assert encoded.facts['kind'] == 'depth' and encoded.facts['range'] == pytest.approx(
+        [metres, metres])
 
 
 def test_a_bayer_mosaic_is_shown_in_colours():
@@ -84,12 +95,17 @@ def huge_png():
 
 
 @pytest.mark.parametrize('message', [
-    Image(), Image(height=2 ** 30, width=2 ** 30, encoding='rgb8', step=3, data=b'xxx'),
+    Image(),
+    Image(height=2**30, width=2**30, encoding='rgb8', step=3, data=b'xxx'),
     Image(height=2, width=2, encoding='rgb8', step=6, data=b'short'),
     Image(height=2, width=2, encoding='<b>', step=6, data=b'x' * 12),
-    CompressedImage(), CompressedImage(format='png', data=b'GIF89a'), CompressedImage(format='png', data=huge_png()),
-    CompressedImage(format='compressedDepth', data=b'x'), CompressedImage(format='compressedDepth', data=b'x' * 40),
-    CompressedImage(format='jpeg', data=bytes(MOST_BYTES + 1))])
+    CompressedImage(),
+    CompressedImage(format='png', data=b'GIF89a'),
+    CompressedImage(format='png', data=huge_png()),
+    CompressedImage(format='compressedDepth', data=b'x'),
+    CompressedImage(format='compressedDepth', data=b'x' * 40),
+    CompressedImage(format='jpeg', data=bytes(MOST_BYTES + 1))
+])
 def test_what_is_no_image_is_refused_with_a_reason(message):
     with pytest.raises(ImageError) as error:
         encode_image(message, 640)
@@ -114,7 +130,8 @@ def test_a_large_organised_cloud_is_thinned_and_its_holes_are_left_out():
     points = np.random.default_rng(3).uniform(-1, 1, (480, 640, 3))
     points[::2] = np.nan
     encoded = encode_cloud(cloud_message(points, HEADER))
-    assert encoded.facts['count'] == 20000 and encoded.facts['of'] == 480 * 640 and len(encoded.body) == 9 * 20000
+    assert encoded.facts['count'] == 20000 and encoded.facts['of'] == 480 * 640 and len(
+        encoded.body) == 9 * 20000
     assert np.isfinite(unpacked(encoded)[0]).all()
 
 
@@ -146,5 +163,6 @@ def test_what_is_no_cloud_is_refused(message):
 
 
 def test_joints_are_told_with_what_there_is_of_them():
-    joints = encode_joints(JointState(name=['a', 'b'], position=[1.0, float('nan')], velocity=[2.0])).facts['joints']
+    joints = encode_joints(JointState(name=['a', 'b'], position=[1.0, float('nan')],
+                                      velocity=[2.0])).facts['joints']
     assert joints == [['a', 1.0, 2.0, None], ['b', None, None, None]]

@@ -1,40 +1,48 @@
-"""What cameras saw when questions were put, and how preconditions stand: kept, bounded, of whom they are."""
+"""What cameras saw when questions were put, and how preconditions stand: kept, bounded, of whom
+they are.
+"""
 import numpy as np
 import pytest
-import rospy
 from expert_fixtures import make_question
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from smach_oracle.expert.console import conditions, stills
-from smach_oracle.expert.console.conditions import Conditions
-from smach_oracle.expert.console.images import Encoded
-from smach_oracle.expert.console.sections import Sections
-from smach_oracle.expert.console.sensors import Sensors
-from smach_oracle.expert.console.stills import StillFiles, Stills, cameras_of
-from smach_oracle.expert.followed_server import Listed
+from smach_oracle.expert import robot_topics
+from smach_oracle.expert.console.answering import precondition_status as conditions
+from smach_oracle.expert.console.answering.precondition_status import PreconditionStatuses
+from smach_oracle.expert.console.sensors import question_images
+from smach_oracle.expert.console.sensors.images import BrowserFile
+from smach_oracle.expert.console.sensors.question_images import (
+    ImageStore,
+    QuestionImages,
+    cameras_of,
+)
+from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
+from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import FailureFrames, OpenQuery, PreconditionCheck, PreconditionChecks
-from smach_oracle.ros.failure_frames import compressed
+from smach_oracle.ros.expert.failure_images import compressed
+from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.images import colour_image
-from smach_oracle.ros.question_messages import to_goal
 
 
-class NoSubscriber:
-    """Hears nothing."""
+class NoTopic:
+    """Hears nothing, and leaves no thread that waits for a master."""
 
-    def __init__(self, *_, **__):
+    def __init__(self, *_):
         pass
 
 
 @pytest.fixture(autouse=True)
 def no_master(monkeypatch):
-    monkeypatch.setattr(rospy, 'Subscriber', NoSubscriber)
+    monkeypatch.setattr(robot_topics, 'RobotTopic', NoTopic)
 
 
 def listed(monkeypatch, robot='/alpha', asked_s=100.0, query_id='q1'):
-    monkeypatch.setattr(stills.time, 'monotonic', lambda: 100.5)
-    goal = to_goal(make_question(query_id), robot, asked=stills.rospy.Time(1))
-    return Listed(robot + '/expert_query', goal, OpenQuery.PENDING, '', asked_s, float('inf'))
+    monkeypatch.setattr(question_images.time, 'monotonic', lambda: 100.5)
+    goal = to_goal(make_question(query_id), robot, asked=question_images.rospy.Time(1))
+    return ListedQuestion(robot + '/expert_query', goal, OpenQuery.PENDING, '', asked_s,
+                          float('inf'))
 
 
 def picture(level=100):
@@ -42,24 +50,25 @@ def picture(level=100):
 
 
 def seen(*topics):
-    found = Sensors()
+    found = SensorStreams()
     found.follow([[topic, 'sensor_msgs/Image'] for topic in topics])
     return found
 
 
 def shown(board, question):
-    sections = Sections()
-    board.draw(sections, [question])
+    sections = PageSections()
+    board.write_sections(sections, [question])
     return sections.get('stills').get(question.key, [])
 
 
 def test_the_console_takes_the_first_frame_after_the_question(monkeypatch):
     found = seen('/head/rgb/image_raw', '/head/depth/image_raw')
-    board, question = Stills(StillFiles(), found), listed(monkeypatch)
+    board, question = QuestionImages(ImageStore(), found), listed(monkeypatch)
     assert shown(board, question) == []
     found.on('/head/rgb/image_raw').take(picture())
     first = shown(board, question)
-    assert [(each['topic'], each['late'], each['size']) for each in first] == [('/head/rgb/image_raw', 0.5, [64, 48])]
+    assert [(each['topic'], each['late'], each['size'])
+            for each in first] == [('/head/rgb/image_raw', 0.5, [64, 48])]
     found.on('/head/rgb/image_raw').take(picture(200))
     assert shown(board, question) == first, 'one frame, and it stays'
 
@@ -67,15 +76,15 @@ def test_the_console_takes_the_first_frame_after_the_question(monkeypatch):
 def test_a_console_that_comes_late_shows_nothing_for_the_failure(monkeypatch):
     found = seen('/head/rgb/image_raw')
     found.on('/head/rgb/image_raw').take(picture())
-    assert shown(Stills(StillFiles(), found), listed(monkeypatch, asked_s=50.0)) == []
+    assert shown(QuestionImages(ImageStore(), found), listed(monkeypatch, asked_s=50.0)) == []
 
 
 def test_the_last_frame_of_a_camera_that_died_before_is_none_of_the_question(monkeypatch):
     found = seen('/head/rgb/image_raw')
-    board, question = Stills(StillFiles(), found), listed(monkeypatch)
-    monkeypatch.setattr(stills.time, 'monotonic', lambda: 97.0)
+    board, question = QuestionImages(ImageStore(), found), listed(monkeypatch)
+    monkeypatch.setattr(question_images.time, 'monotonic', lambda: 97.0)
     found.on('/head/rgb/image_raw').take(picture())
-    monkeypatch.setattr(stills.time, 'monotonic', lambda: 100.5)
+    monkeypatch.setattr(question_images.time, 'monotonic', lambda: 100.5)
     assert shown(board, question) == []
     found.on('/head/rgb/image_raw').take(picture())
     assert [each['late'] for each in shown(board, question)] == [0.5]
@@ -84,21 +93,22 @@ def test_the_last_frame_of_a_camera_that_died_before_is_none_of_the_question(mon
 def test_the_robot_is_believed_first_and_about_its_own_question_alone(monkeypatch):
     found = seen('/head/rgb/image_raw')
     found.on('/head/rgb/image_raw').take(picture())
-    board, question = Stills(StillFiles(), found), listed(monkeypatch)
-    told = FailureFrames(query_id='q1', topics=['/wrist'], images=[compressed(picture())])
-    board.taker('/beta')(told)
+    board, question = QuestionImages(ImageStore(), found), listed(monkeypatch)
+    message = FailureFrames(query_id='q1', topics=['/wrist'], images=[compressed(picture())])
+    board.taker('/beta')(message)
     assert [each['topic'] for each in shown(board, question)] == ['/head/rgb/image_raw']
-    board.taker('/alpha')(told)
+    board.taker('/alpha')(message)
     assert [(each['topic'], each['late']) for each in shown(board, question)] == [('/wrist', None)]
 
 
 def test_bytes_of_a_robot_reach_nobody_as_they_came(monkeypatch):
-    files = StillFiles()
-    board = Stills(files, Sensors())
+    files = ImageStore()
+    board = QuestionImages(files, SensorStreams())
     evil = CompressedImage(format='jpeg', data=b'<script>window.hacked = 1</script>')
     good = compressed(picture())
     good.data = good.data + b'<script>'
-    board.taker('/alpha')(FailureFrames(query_id='q1', topics=['/evil', '/good'], images=[evil, good]))
+    board.taker('/alpha')(FailureFrames(query_id='q1', topics=['/evil', '/good'],
+                                        images=[evil, good]))
     question = listed(monkeypatch)
     assert [each['topic'] for each in shown(board, question)] == ['/good']
     kept = files.find(shown(board, question)[0]['id'])
@@ -106,32 +116,36 @@ def test_bytes_of_a_robot_reach_nobody_as_they_came(monkeypatch):
 
 
 def test_files_are_bounded_in_number_and_bytes(monkeypatch):
-    files = StillFiles()
-    numbers = [files.put(Encoded('image/jpeg', b'x' * 10, {})) for _ in range(stills.MOST_KEPT + 5)]
+    files = ImageStore()
+    numbers = [
+        files.put(BrowserFile('image/jpeg', b'x' * 10, {}))
+        for _ in range(question_images.MOST_KEPT + 5)
+    ]
     assert files.find(numbers[4]) is None and files.find(numbers[5]) is not None
-    monkeypatch.setattr(stills, 'MOST_BYTES', 100)
-    last = files.put(Encoded('image/jpeg', b'x' * 60, {}))
+    monkeypatch.setattr(question_images, 'MOST_BYTES', 100)
+    last = files.put(BrowserFile('image/jpeg', b'x' * 60, {}))
     assert files.find(last) and files.find(numbers[-1]) and files.find(numbers[-6]) is None
 
 
 def test_cameras_of_the_robots_own_namespace_come_first():
-    view = seen('/fleet/alpha/cam/image_raw', '/fleet/alpha/cam/rgb/image_raw', '/other/rgb/image_raw',
-                '/fleet/alpha/cam/depth/image_raw').view()
+    view = seen('/fleet/alpha/cam/image_raw', '/fleet/alpha/cam/rgb/image_raw',
+                '/other/rgb/image_raw', '/fleet/alpha/cam/depth/image_raw').view()
     own = [each['topic'] for each in cameras_of('/fleet/alpha/', view)]
     assert own == ['/fleet/alpha/cam/rgb/image_raw', '/fleet/alpha/cam/image_raw']
-    assert [each['topic'] for each in cameras_of('/nobody/robot', view)][0] == '/fleet/alpha/cam/rgb/image_raw'
+    assert [each['topic']
+            for each in cameras_of('/nobody/robot', view)][0] == '/fleet/alpha/cam/rgb/image_raw'
 
 
 def test_preconditions_are_kept_by_question_and_robot(monkeypatch):
-    board, sections, question = Conditions(), Sections(), listed(monkeypatch)
+    board, sections, question = PreconditionStatuses(), PageSections(), listed(monkeypatch)
     checks = [PreconditionCheck('PICK', 'free', PreconditionCheck.HOLDS, 'yes', 2.0),
               PreconditionCheck('PICK', 'door', PreconditionCheck.UNKNOWN, '', -1.0)]
     monkeypatch.setattr(conditions.time, 'time', lambda: 1000.0)
     board.taker('/beta')(PreconditionChecks(query_id='q1', checks=checks))
-    board.draw(sections, [question])
+    board.write_sections(sections, [question])
     assert sections.get('conditions') == {}
     board.taker('/alpha')(PreconditionChecks(query_id='q1', checks=checks))
-    board.draw(sections, [question])
+    board.write_sections(sections, [question])
     assert sections.get('conditions') == {question.key: {'PICK': [
         {'name': 'free', 'holds': True, 'text': 'yes', 'looked': 998.0},
         {'name': 'door', 'holds': None, 'text': '', 'looked': None}]}}

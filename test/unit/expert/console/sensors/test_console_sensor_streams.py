@@ -1,4 +1,6 @@
-"""The closed set of sensors, and paced frames over real connections: refused, forged, flooded, slow."""
+"""The closed set of sensors, and paced frames over real connections: refused, forged, flooded,
+slow.
+"""
 import json
 import time
 
@@ -9,8 +11,9 @@ import tornado.testing
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
-from smach_oracle.expert.console import frames, sensors
-from smach_oracle.expert.console.sensors import Sensors
+from smach_oracle.expert.console.sensors import sample_handlers, sensor_streams
+from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
+from smach_oracle.expert.console.web.access import ClientRateLimits
 from smach_oracle.ros.images import colour_image
 
 PUBLISHED = [['/camera/image', 'sensor_msgs/Image'], ['/joint_states', 'sensor_msgs/JointState'],
@@ -32,7 +35,7 @@ class FakeSubscriber:
 @pytest.fixture(autouse=True)
 def no_master(monkeypatch):
     FakeSubscriber.alive = 0
-    monkeypatch.setattr(sensors.rospy, 'Subscriber', FakeSubscriber)
+    monkeypatch.setattr(sensor_streams.rospy, 'Subscriber', FakeSubscriber)
 
 
 def picture(level=100):
@@ -40,7 +43,7 @@ def picture(level=100):
 
 
 def known():
-    found = Sensors()
+    found = SensorStreams()
     found.follow(PUBLISHED)
     return found
 
@@ -60,9 +63,9 @@ def test_a_topic_that_changes_its_type_is_another_sensor_and_one_that_is_gone_is
 
 
 def test_there_are_only_so_many():
-    found = Sensors()
+    found = SensorStreams()
     found.follow([['/camera{}'.format(number), 'sensor_msgs/Image'] for number in range(1000)])
-    assert len(found.view()) == sensors.MOST_SENSORS
+    assert len(found.view()) == sensor_streams.MOST_SENSORS
 
 
 def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(monkeypatch):
@@ -75,20 +78,20 @@ def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(monkeyp
     found.tend()
     assert FakeSubscriber.alive == 1
     sensor.take(picture())
-    later = time.monotonic() + sensors.IDLE_S
-    monkeypatch.setattr(sensors.time, 'monotonic', lambda: later)
+    later = time.monotonic() + sensor_streams.IDLE_S
+    monkeypatch.setattr(sensor_streams.time, 'monotonic', lambda: later)
     found.tend()
     assert FakeSubscriber.alive == 0
     assert sensor.newer(0) is None, 'what was seen long ago is not shown as new'
 
 
 def test_only_so_many_are_listened_to_at_a_time():
-    found = Sensors()
+    found = SensorStreams()
     found.follow([['/camera{}'.format(number), 'sensor_msgs/Image'] for number in range(50)])
     for each in found.view():
         found.find(each['id']).newer(0)
     found.tend()
-    assert FakeSubscriber.alive == sensors.MOST_LISTENED
+    assert FakeSubscriber.alive == sensor_streams.MOST_LISTENED
 
 
 def test_the_newest_frame_alone_is_kept_and_encoded_once_for_all():
@@ -110,10 +113,10 @@ class TestFrames(console_case.ConsoleCase):
         super().setUp()
         self.sensors.follow(PUBLISHED)
         self.camera = self.sensors.on('/camera/image')
-        self.cookie, self.said = self.sign_in('viewer')
+        self.cookie, self.info = self.sign_in('viewer')
 
     def frame(self, path=None, **headers):
-        given = dict({'Cookie': self.cookie, 'X_Xsrf': self.said['xsrf']}, **headers)
+        given = dict({'Cookie': self.cookie, 'X_Xsrf': self.info['xsrf']}, **headers)
         return self.ask(path or '/frame/{}'.format(self.camera.number), **given)
 
     def test_a_viewer_gets_the_newest_frame(self):
@@ -121,25 +124,27 @@ class TestFrames(console_case.ConsoleCase):
         self.camera.take(picture(2))
         answer = self.frame()
         assert (answer.code, answer.headers['Content-Type']) == (200, 'image/jpeg')
-        assert answer.headers['Cache-Control'] == 'no-store' and answer.headers['X-Content-Type-Options'] == 'nosniff'
+        assert answer.headers['Cache-Control'] == 'no-store' and answer.headers[
+            'X-Content-Type-Options'] == 'nosniff'
         facts = json.loads(answer.headers['X-Facts'])
         assert (facts['sequence'], facts['size'], facts['stamp']) == (2, [64, 48], '0.000000000')
 
     def test_without_a_session_its_token_or_the_page_nothing_is_told(self):
         self.camera.take(picture())
-        for headers, code in (({'Cookie': None}, 401), ({'Cookie': self.begin()[0]}, 401), ({'X_Xsrf': None}, 403),
-                              ({'X_Xsrf': '0' * 64}, 403), ({'Origin': 'http://evil.example'}, 403),
-                              ({'Host': 'evil.example'}, 421)):
+        for headers, code in (({'Cookie': None}, 401), ({'Cookie': self.begin()[0]},
+                                                        401), ({'X_Xsrf': None}, 403),
+                              ({'X_Xsrf': '0' * 64}, 403), ({'Origin': 'http://evil.example'},
+                                                            403), ({'Host': 'evil.example'}, 421)):
             answer = self.frame(**headers)
             assert answer.code == code and 'X-Facts' not in answer.headers, headers
 
     def test_no_topic_can_be_named(self):
-        for path in ('/frame/cmd_vel', '/frame//cmd_vel', '/frame/%2fsecret', '/frame/99', '/frame/-1', '/frame/0x1',
-                     '/frame/1/../2', '/frame/', '/frame/12345678901'):
+        for path in ('/frame/cmd_vel', '/frame//cmd_vel', '/frame/%2fsecret', '/frame/99',
+                     '/frame/-1', '/frame/0x1', '/frame/1/../2', '/frame/', '/frame/12345678901'):
             assert self.frame(path).code == 404, path
         path = '/frame/{}?'.format(self.camera.number)
-        for query in ('topic=/secret', 'after=-1', 'after=x', 'after=1&after=2', 'width=100000', 'width=1e3', 'width=',
-                      'after=' + '9' * 30, 'after=%c2%b2'):
+        for query in ('topic=/secret', 'after=-1', 'after=x', 'after=1&after=2', 'width=100000',
+                      'width=1e3', 'width=', 'after=' + '9' * 30, 'after=%c2%b2'):
             assert self.frame(path + query).code == 400, query
         assert FakeSubscriber.alive == 0
 
@@ -148,14 +153,15 @@ class TestFrames(console_case.ConsoleCase):
         self.io_loop.call_later(0.3, self.camera.take, picture(9))
         begun_s = time.monotonic()
         answer = self.frame('/frame/{}?after=1'.format(self.camera.number))
-        assert json.loads(answer.headers['X-Facts'])['sequence'] == 2 and time.monotonic() - begun_s >= 0.25
+        assert json.loads(
+            answer.headers['X-Facts'])['sequence'] == 2 and time.monotonic() - begun_s >= 0.25
 
     def test_where_nothing_comes_the_answer_is_empty(self):
-        frames.WAIT_S, before = 0.1, frames.WAIT_S
+        sample_handlers.WAIT_S, before = 0.1, sample_handlers.WAIT_S
         try:
             answer = self.frame()
         finally:
-            frames.WAIT_S = before
+            sample_handlers.WAIT_S = before
         assert (answer.code, answer.body) == (204, b'')
 
     def test_what_cannot_be_shown_is_told_as_text(self):
@@ -171,24 +177,26 @@ class TestFrames(console_case.ConsoleCase):
 
     def test_a_flood_is_cut_off_and_does_not_shut_out_other_requests(self):
         self.camera.take(picture())
-        self._app_room().limits._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 3.0)
+        self._app_room().limits = ClientRateLimits(rate=0.0, burst=3.0, for_all=5.0)
         assert [self.frame().code for _ in range(4)] == [200, 200, 200, 429]
         assert self.ask('/session').code == 200
 
     def test_changing_methods_do_nothing(self):
         for method in ('POST', 'PUT', 'DELETE'):
-            assert self.ask('/frame/{}'.format(self.camera.number), method, '', Origin=self.origin, Cookie=self.cookie,
-                            X_Xsrf=self.said['xsrf']).code == 405
+            assert self.ask('/frame/{}'.format(self.camera.number), method, '', Origin=self.origin,
+                            Cookie=self.cookie, X_Xsrf=self.info['xsrf']).code == 405
 
     @tornado.testing.gen_test
     async def test_only_so_many_wait_at_a_time(self):
         url = self.get_url('/frame/{}'.format(self.camera.number))
-        room = self._app_room()
-        room.waiting['127.0.0.1'] = frames.MOST_WAITING_EACH
-        answer = await self.http_client.fetch(url, headers={'Cookie': self.cookie, 'X-Xsrf': self.said['xsrf']},
-                                              raise_error=False)
-        assert answer.code == 503 and room.waiting['127.0.0.1'] == frames.MOST_WAITING_EACH
+        shared = self._app_room()
+        shared.waiting['127.0.0.1'] = sample_handlers.MOST_WAITING_EACH
+        answer = await self.http_client.fetch(
+            url, headers={'Cookie': self.cookie, 'X-Xsrf': self.info['xsrf']}, raise_error=False)
+        assert answer.code == 503 and shared.waiting[
+            '127.0.0.1'] == sample_handlers.MOST_WAITING_EACH
 
     def _app_room(self):
         rules = self._app.default_router.rules[0].target.rules
-        return next(rule.target_kwargs['room'] for rule in rules if rule.target is frames.FrameHandler)
+        return next(rule.target_kwargs['shared'] for rule in rules
+                    if rule.target is sample_handlers.SampleHandler)

@@ -1,28 +1,27 @@
-"""Bags in the console: counted as the analysis counts them, bounded, broken ones named, and served by numbers alone."""
+"""Bags in the console: counted as the analysis counts them, bounded, broken ones named, and served
+by numbers alone.
+"""
 import json
 import os
 import shutil
 import sys
 import tempfile
 import time
-from pathlib import Path
 
 import console_case
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / 'recorder'))
 from fake_trials import FakeMachine, play  # noqa: E402
 from waiting import wait_for  # noqa: E402
 
-from smach_oracle.analysis.groups import make_groups  # noqa: E402
 from smach_oracle.analysis.trials import load_trials  # noqa: E402
-from smach_oracle.expert.console import bags, recorded  # noqa: E402
-from smach_oracle.expert.console.bags import BagShelf, NotRead  # noqa: E402
-from smach_oracle.expert.console.layout import Layouter  # noqa: E402
-from smach_oracle.expert.console.recorded import RecordedTrials  # noqa: E402
-from smach_oracle.expert.console.sections import Sections  # noqa: E402
-from smach_oracle.expert.console.stills import StillFiles  # noqa: E402
-from smach_oracle.oracle.events import EventKind  # noqa: E402
+from smach_oracle.analysis.variants import count_variants  # noqa: E402
+from smach_oracle.expert.console.graphs.layout_worker import LayoutWorker  # noqa: E402
+from smach_oracle.expert.console.sensors.question_images import ImageStore  # noqa: E402
+from smach_oracle.expert.console.trials import bag_catalogue, recorded_trials  # noqa: E402
+from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue, RecordedTrialError  # noqa: E402
+from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials  # noqa: E402
+from smach_oracle.expert.console.web.sections import PageSections  # noqa: E402
+from smach_oracle.oracle.records.events import EventKind  # noqa: E402
 from smach_oracle.ros.recorder import TrialRecorder  # noqa: E402
 
 TRIALS = 12
@@ -41,25 +40,25 @@ def written(place, trials=TRIALS, **settings):
     return place
 
 
-def shelf_of(*folders):
-    sections = Sections()
-    shelf = BagShelf(folders, sections)
-    shelf._reader = bags_reader()
-    shelf.look()
-    return shelf, lambda: sections.get('bags')
+def catalogue_of(*folders):
+    sections = PageSections()
+    catalogue = BagCatalogue(folders, sections)
+    catalogue._reader = bags_reader()
+    catalogue.scan()
+    return catalogue, lambda: sections.get('bags')
 
 
 def bags_reader():
     from smach_oracle.analysis.bag_events import EventReader
-    return EventReader(bags.MOST_EVENTS)
+    return EventReader(bag_catalogue.MOST_EVENTS)
 
 
 def test_they_are_counted_as_the_analysis_counts_them(folder):
-    _, section = shelf_of(folder)
+    _, section = catalogue_of(folder)
     found = load_trials([folder]).trials
-    group = make_groups(found)[0]
+    group = count_variants(found)[0]
     row = section()['table'][0]
-    assert (row['experiment'], row['arm'], row['runs']) == (group.experiment, group.arm, TRIALS)
+    assert (row['experiment'], row['arm'], row['runs']) == (group.experiment, group.name, TRIALS)
     assert row['counts']['recoveries'] == {'trials': group.of('oracle recoveries').trials,
                                            'events': group.of('oracle recoveries').events}
     assert row['endings']['failure'] == group.of('ended in failure').trials
@@ -76,9 +75,10 @@ def test_nothing_of_where_they_lie_is_told_and_broken_ones_are_named(folder, tmp
     (tmp_path / 'old.bag.active').write_bytes(b'#ROSBAG V2.0\n')
     os.utime(str(tmp_path / 'old.bag.active'), (1, 1))
     (tmp_path / 'now.bag.active').write_bytes(b'#ROSBAG V2.0\n')
-    _, section = shelf_of(str(tmp_path), str(tmp_path / 'nowhere'))
+    _, section = catalogue_of(str(tmp_path), str(tmp_path / 'nowhere'))
     broken = {each['name']: each['reason'] for each in section()['broken']}
-    assert sorted(broken) == ['deep/torn.bag', 'empty.bag', 'old.bag.active'], 'one that is being written is not broken'
+    assert sorted(broken) == ['deep/torn.bag', 'empty.bag',
+                              'old.bag.active'], 'one that is being written is not broken'
     assert all(reason for reason in broken.values())
     assert 'no such folder' in section()['note']
     assert len(section()['trials']) == TRIALS
@@ -87,12 +87,12 @@ def test_nothing_of_where_they_lie_is_told_and_broken_ones_are_named(folder, tmp
 
 def test_one_that_is_gone_is_forgotten_and_one_that_changes_is_read_again(folder, tmp_path):
     shutil.copytree(folder, str(tmp_path / 'copy'))
-    shelf, section = shelf_of(str(tmp_path))
+    catalogue, section = catalogue_of(str(tmp_path))
     paths = sorted((tmp_path / 'copy').glob('*.bag'))
     numbers = {each['id']: each['number'] for each in section()['trials']}
     paths[0].unlink()
     paths[1].write_bytes(b'overwritten')
-    shelf.look()
+    catalogue.scan()
     assert len(section()['trials']) == TRIALS - 2
     assert [each['name'] for each in section()['broken']] == ['copy/' + paths[1].name]
     assert all(numbers[each['id']] == each['number'] for each in section()['trials'])
@@ -101,60 +101,63 @@ def test_one_that_is_gone_is_forgotten_and_one_that_changes_is_read_again(folder
 def test_a_trial_in_two_bags_is_one(folder, tmp_path):
     for name in ('one', 'two'):
         shutil.copytree(folder, str(tmp_path / name))
-    shelf, section = shelf_of(str(tmp_path))
+    catalogue, section = catalogue_of(str(tmp_path))
     assert len(section()['trials']) == TRIALS
-    trial, events = shelf.events(section()['trials'][0]['number'])
+    trial, events = catalogue.events(section()['trials'][0]['number'])
     assert len(trial.summary.bags) == 2
     assert [event.seq for event in events] == list(range(len(events)))
 
 
 def test_number_and_size_are_bounded(folder, monkeypatch):
-    monkeypatch.setattr(bags, 'MOST_BAGS', 5)
-    monkeypatch.setattr(bags, 'SHOWN_TRIALS', 3)
-    _, section = shelf_of(folder)
+    monkeypatch.setattr(bag_catalogue, 'MOST_BAGS', 5)
+    monkeypatch.setattr(bag_catalogue, 'SHOWN_TRIALS', 3)
+    _, section = catalogue_of(folder)
     assert section()['table'][0]['runs'] == 5 and len(section()['trials']) == 3
-    assert section()['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
-    monkeypatch.setattr(bags, 'MOST_BYTES', 10)
-    _, section = shelf_of(folder)
+    assert section(
+    )['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
+    monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 10)
+    _, section = catalogue_of(folder)
     assert not section()['trials'] and 'at most' in section()['broken'][0]['reason']
-    monkeypatch.setattr(bags, 'MOST_BYTES', 2 ** 30)
-    monkeypatch.setattr(bags, 'MOST_EVENTS', 10)
-    _, section = shelf_of(folder)
+    monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 2 ** 30)
+    monkeypatch.setattr(bag_catalogue, 'MOST_EVENTS', 10)
+    _, section = catalogue_of(folder)
     assert 'more than 10 events' in section()['broken'][0]['reason']
 
 
 def test_without_the_package_that_reads_bags_a_sentence_says_so(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, 'rosbags', None)
-    sections = Sections()
-    BagShelf([folder], sections).run()
+    sections = PageSections()
+    BagCatalogue([folder], sections).run()
     assert sections.get('bags')['note']
 
 
 def test_a_trial_is_read_with_its_machine_and_one_that_is_gone_says_so(folder, tmp_path):
     shutil.copytree(folder, str(tmp_path / 'copy'))
-    shelf, section = shelf_of(str(tmp_path))
-    told = RecordedTrials(shelf, Layouter(), StillFiles())
+    catalogue, section = catalogue_of(str(tmp_path))
+    shown = RecordedTrials(catalogue, LayoutWorker(), ImageStore())
     number = section()['trials'][0]['number']
-    data = json.loads(told.text(number))
+    data = json.loads(shown.text(number))
     assert data['events'][0]['kind'] == 'trial_start' and data['events'][-1]['kind'] == 'trial_end'
     graph = data['graphs']['PICK_AND_PLACE']
     assert [state['label'] for state in graph['states']][:2] == ['MOVE_ARMS_ASIDE', 'POINT_HEAD']
     assert graph['drawn'] is bool(shutil.which('dot'))
-    with pytest.raises(NotRead, match='no trial 999'):
-        told.text(999)
+    with pytest.raises(RecordedTrialError, match='no trial 999'):
+        shown.text(999)
     shutil.rmtree(str(tmp_path / 'copy'))
-    with pytest.raises(NotRead, match='damaged, or no bag'):
-        told.text(section()['trials'][-1]['number'])
+    with pytest.raises(RecordedTrialError, match='damaged, or no bag'):
+        shown.text(section()['trials'][-1]['number'])
 
 
 def test_long_trials_are_cut_and_too_large_ones_refused(folder, monkeypatch):
-    monkeypatch.setattr(recorded, 'MOST_EVENTS', 7)
-    shelf, section = shelf_of(folder)
+    monkeypatch.setattr(recorded_trials, 'MOST_EVENTS', 7)
+    catalogue, section = catalogue_of(folder)
     number = section()['trials'][0]['number']
-    assert len(json.loads(RecordedTrials(shelf, Layouter(), StillFiles()).text(number))['events']) == 7
-    monkeypatch.setattr(recorded, 'MOST_BYTES', 1000)
-    with pytest.raises(NotRead, match='too large'):
-        RecordedTrials(shelf, Layouter(), StillFiles()).text(number)
+    assert len(
+        json.loads(RecordedTrials(catalogue, LayoutWorker(),
+                                  ImageStore()).text(number))['events']) == 7
+    monkeypatch.setattr(recorded_trials, 'MOST_BYTES', 1000)
+    with pytest.raises(RecordedTrialError, match='too large'):
+        RecordedTrials(catalogue, LayoutWorker(), ImageStore()).text(number)
 
 
 def test_one_that_a_recorder_writes_is_left_alone(tmp_path):
@@ -162,10 +165,10 @@ def test_one_that_a_recorder_writes_is_left_alone(tmp_path):
     FakeMachine(recorder).emit(EventKind.TRIAL_START)
     active = wait_for(lambda: list(tmp_path.glob('*.bag.active')))
     os.utime(str(active[0]), (1, 1))
-    shelf, section = shelf_of(str(tmp_path))
+    catalogue, section = catalogue_of(str(tmp_path))
     assert not section()['broken'] and not section()['trials']
     assert recorder.close(30.0)
-    shelf.look()
+    catalogue.scan()
     assert [each['ending'] for each in section()['trials']] == ['unfinished']
 
 
@@ -177,15 +180,15 @@ class TestServed(console_case.ConsoleCase):
         return [written(self.place, 1)]
 
     def trial(self):
-        self.shelf._reader = bags_reader()
-        self.shelf.look()
+        self.catalogue._reader = bags_reader()
+        self.catalogue.scan()
         return self.sections.get('bags')['trials'][0]['number']
 
     def get(self, path, xsrf=True):
         if not hasattr(self, 'session'):
             self.session = self.sign_in('viewer')
-        cookie, said = self.session
-        return self.ask(path, Cookie=cookie, X_Xsrf=said['xsrf'] if xsrf else None)
+        cookie, info = self.session
+        return self.ask(path, Cookie=cookie, X_Xsrf=info['xsrf'] if xsrf else None)
 
     def test_a_viewer_replays_it(self):
         answer = self.get('/recorded/{}'.format(self.trial()))
@@ -199,17 +202,18 @@ class TestServed(console_case.ConsoleCase):
             assert self.get(path, xsrf=False).code == 403
 
     def test_a_browser_can_name_neither_path_nor_anything_but_a_number(self):
-        for path in ('/recorded/../{}'.format(self.place), '/recorded/' + self.place, '/recorded/1e3', '/recorded/-1',
-                     '/recorded/', '/recorded/%2e%2e%2fetc', '/recorded/12345678901', '/still/a', '/still/1/2'):
+        for path in ('/recorded/../{}'.format(self.place), '/recorded/' + self.place,
+                     '/recorded/1e3', '/recorded/-1', '/recorded/', '/recorded/%2e%2e%2fetc',
+                     '/recorded/12345678901', '/still/a', '/still/1/2'):
             assert self.get(path).code == 404, path
         assert self.get('/recorded/1?path=/etc/passwd').code == 400
         answer = self.get('/recorded/999')
         assert answer.code == 422 and self.place not in answer.body.decode()
 
     def test_they_are_limited_in_rate(self):
-        cookie, said = self.sign_in('viewer')
+        cookie, info = self.sign_in('viewer')
         began = time.monotonic()
-        codes = [self.ask('/still/1', Cookie=cookie, X_Xsrf=said['xsrf']).code for _ in range(100)]
+        codes = [self.ask('/still/1', Cookie=cookie, X_Xsrf=info['xsrf']).code for _ in range(100)]
         if time.monotonic() - began < 3.0:
             assert 429 in codes
         assert set(codes) <= {404, 429}

@@ -1,17 +1,21 @@
-"""Trials as a console counts them: as the analysis of their bags does, bounded, and with what has helped."""
+"""Trials as a console counts them: as the analysis of their bags does, bounded, and with what has
+helped.
+"""
+import itertools
 import random
 
 import pytest
-import smach
 
+import smach
+from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.analysis.trials import summarise
-from smach_oracle.expert.console import helped, trial_log
-from smach_oracle.expert.console.helped import HelpScores
-from smach_oracle.expert.console.tally import Tally, table
-from smach_oracle.expert.console.trial_log import TrialLog
+from smach_oracle.expert.console.trials import recovery_statistics, trial_log
+from smach_oracle.expert.console.trials.counts_table import counts_table, has_oracle
+from smach_oracle.expert.console.trials.recovery_statistics import RecoveryStatistics
+from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.events import Event, EventKind
-from smach_oracle.oracle.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.records.events import Event, EventKind
 
 
 class Chancy(smach.State):
@@ -33,8 +37,11 @@ class SomeExpert(Expert):
 
     def ask(self, question, cancelled, progress):
         kind = self._draw.choice(['goto', 'supersede', 'give_up', 'none'])
-        return {'goto': Answer(AnswerKind.GOTO, state='A', by='ann'), 'give_up': Answer(AnswerKind.GIVE_UP, by='ann'),
-                'supersede': Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')}.get(kind)
+        return {
+            'goto': Answer(AnswerKind.GOTO, state='A',
+                           by='ann'), 'give_up': Answer(AnswerKind.GIVE_UP, by='ann'),
+            'supersede': Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')
+        }.get(kind)
 
 
 def run_trials(count, share=0.4, seed=1, **options):
@@ -58,39 +65,69 @@ def run_trials(count, share=0.4, seed=1, **options):
     return trials
 
 
-def tally_of(events):
-    tally = Tally(events[0])
+def count(events):
+    """As the console does: each event as it comes."""
+    counter = TrialCounter()
     for event in events:
-        tally.add(event)
-    return tally
+        counter.add(event)
+    return counter
 
 
 @pytest.mark.parametrize('share', [0.0, 0.4, 1.0])
 def test_a_trial_is_counted_as_the_analysis_of_its_bag_counts_it(share):
     for events in run_trials(25, share):
-        tally, summary = tally_of(events), summarise(events)
-        for name in ('experiment', 'outcome', 'failures', 'recoveries', 'questions', 'answered'):
-            assert getattr(tally, name) == getattr(summary, name), name
-        assert (tally.ending, tally.lost, tally.recovers) == (
-            summary.ending.value, summary.lost_events, summary.recovers)
+        counter, summary = count(events), summarise(events[::-1])
+        for name in ('experiment', 'outcome', 'failures', 'recoveries', 'questions', 'answered',
+                     'ending', 'lost_events', 'recovers', 'failures_by_state', 'start_time',
+                     'duration_s', 'settings'):
+            assert getattr(counter, name) == getattr(summary, name), name
+
+
+def test_what_the_log_shows_of_a_trial_is_what_the_analysis_of_its_bag_counts():
+    log, trials = TrialLog(), run_trials(25)
+    for each in itertools.chain(*trials):
+        log.add('/robot', each)
+    for row, summary in zip(log.overview()['trials'][::-1], map(summarise, trials)):
+        assert {
+            key: row[key]
+            for key in ('id', 'experiment', 'start', 'ending', 'outcome', 'oracle', 'failures',
+                        'recoveries', 'questions', 'answered', 'lost')
+        } == {
+            'id': summary.trial_id, 'experiment': summary.experiment, 'start': summary.start_time,
+            'ending': summary.ending.value, 'outcome': summary.outcome, 'oracle': summary.recovers,
+            'failures': summary.failures, 'recoveries': summary.recoveries,
+            'questions': summary.questions, 'answered': summary.answered,
+            'lost': summary.lost_events
+        }
+        assert row['end'] == summary.start_time + summary.duration_s
 
 
 def test_the_table_counts_trials_in_which_it_happened_and_how_often():
     trials = run_trials(40)
-    row, = table(map(tally_of, trials))
+    row, = counts_table(map(count, trials))
     of_bags = [summarise(events) for events in trials]
     assert row['runs'] == 40
     for name in ('failures', 'recoveries', 'questions', 'answered'):
         numbers = [getattr(summary, name) for summary in of_bags]
-        assert row['counts'][name] == {'trials': sum(map(bool, numbers)), 'events': sum(numbers)}, name
+        assert row['counts'][name] == {'trials': sum(map(bool, numbers)),
+                                       'events': sum(numbers)}, name
     assert row['counts']['answered']['trials'] > 0
-    assert row['endings']['failure'] == sum(summary.ending.value == 'failure' for summary in of_bags) > 0
+    assert row['endings']['failure'] == sum(summary.ending.value == 'failure'
+                                            for summary in of_bags) > 0
 
 
 def test_a_trial_that_runs_is_not_in_the_table_and_one_heard_of_late_says_so():
     events = run_trials(1)[0]
-    assert table([tally_of(events[:-1])]) == []
-    assert tally_of(events[3:]).lost == 3
+    running = count(events[:-1])
+    assert running.ending is TrialEnding.UNFINISHED and counts_table([running]) == []
+    assert count(events[3:]).lost_events == 3
+
+
+def test_a_trial_whose_start_was_not_heard_counts_as_one_with_an_oracle():
+    late = count([event(EventKind.STATE_START), event(EventKind.TRIAL_END, outcome='succeeded')])
+    assert late.recovers is None and has_oracle(late)
+    row, = counts_table([late])
+    assert row['oracle'] is True and row['runs'] == 1
 
 
 def event(kind, state='PICK', trial='t', path='TASK', **fields):
@@ -98,27 +135,36 @@ def event(kind, state='PICK', trial='t', path='TASK', **fields):
 
 
 def scored(*events):
-    scores = HelpScores()
+    scores = RecoveryStatistics()
     for each in events:
         scores.add('/robot', each, each.outcome == 'aborted')
-    return scores.score(('/robot', 'TASK', 'PICK'), 'DETECT')
+    return scores.recovery_counts(('/robot', 'TASK', 'PICK'), 'DETECT')
 
 
 FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT')
 
 
-@pytest.mark.parametrize('events, score', [
-    ([FAILED, JUMPED], (0, 0)),
-    ([FAILED, JUMPED, event(EventKind.TRANSITION, 'DETECT'), event(EventKind.TRANSITION)], (1, 1)),
-    ([FAILED, JUMPED, FAILED], (0, 1)),
-    ([FAILED, JUMPED, FAILED, JUMPED, event(EventKind.TRANSITION)], (1, 2)),
-    ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
-    ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
-    ([FAILED, JUMPED, event(EventKind.TRANSITION, path='OTHER'), event(EventKind.TRANSITION, trial='u')], (0, 0)),
-    ([FAILED, event(EventKind.SUPERSEDE), JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (0, 0)),
-    ([event(EventKind.TRANSITION)], (0, 0))])
-def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, score):
-    assert scored(*events) == score
+@pytest.mark.parametrize(
+    'events, recovery_counts',
+    [([FAILED, JUMPED], (0, 0)),
+     ([FAILED, JUMPED,
+       event(EventKind.TRANSITION, 'DETECT'),
+       event(EventKind.TRANSITION)], (1, 1)), ([FAILED, JUMPED, FAILED], (0, 1)),
+     ([FAILED, JUMPED, FAILED, JUMPED, event(EventKind.TRANSITION)], (1, 2)),
+     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
+     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
+     ([
+         FAILED, JUMPED,
+         event(EventKind.TRANSITION, path='OTHER'),
+         event(EventKind.TRANSITION, trial='u')
+     ], (0, 0)),
+     ([
+         FAILED,
+         event(EventKind.SUPERSEDE), JUMPED,
+         event(EventKind.CONTAINER_END, '', outcome='succeeded')
+     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0))])
+def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, recovery_counts):
+    assert scored(*events) == recovery_counts
 
 
 def test_the_log_is_bounded_and_forgets_details_first(monkeypatch):
@@ -141,7 +187,8 @@ def test_a_trial_that_runs_keeps_its_events_longer_than_those_that_are_over(monk
     for number in range(4):
         for kind in (EventKind.STATE_START, EventKind.TRIAL_END):
             log.add('/fast', event(kind, trial=str(number), outcome='succeeded'))
-    assert [each['detailed'] for each in log.overview()['trials']] == [True, False, False, False, True]
+    assert [each['detailed']
+            for each in log.overview()['trials']] == [True, False, False, False, True]
     assert len(log.events('waits', 0).events) == 1
 
 
@@ -151,16 +198,21 @@ def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeyp
     for trial in ('long', 'short', 'long'):
         log.add('/robot', event(EventKind.STATE_START, trial=trial))
     assert log.events('long', 0).events == []
-    assert [(each['id'], each['detailed']) for each in log.overview()['trials']] == [('short', True), ('long', False)]
+    assert [(each['id'], each['detailed'])
+            for each in log.overview()['trials']] == [('short', True), ('long', False)]
 
 
 def test_scores_of_robots_that_come_and_go_are_bounded(monkeypatch):
-    monkeypatch.setattr(helped, '_MOST_SCORES', 3)
-    scores = HelpScores()
+    monkeypatch.setattr(recovery_statistics, '_MOST_PAIRS', 3)
+    scores = RecoveryStatistics()
     for number in range(6):
         for kind in (EventKind.FAILURE, EventKind.JUMP, EventKind.TRANSITION):
-            scores.add('/robot_{}'.format(number), Event(kind, 't', 0, 0.0, 'TASK', 'A', target='B'), False)
-    tried = [scores.score(('/robot_{}'.format(number), 'TASK', 'A'), 'B').tried for number in range(6)]
+            scores.add('/robot_{}'.format(number), Event(kind, 't', 0, 0.0, 'TASK', 'A',
+                                                         target='B'), False)
+    tried = [
+        scores.recovery_counts(('/robot_{}'.format(number), 'TASK', 'A'), 'B').tried
+        for number in range(6)
+    ]
     assert tried == [0, 0, 0, 1, 1, 1]
 
 

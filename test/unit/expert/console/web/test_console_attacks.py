@@ -10,25 +10,32 @@ import tornado.testing
 import tornado.web
 from console_case import TOKENS
 
-from smach_oracle.expert.console import page_socket, sessions
-from smach_oracle.expert.console.access import ROLES, TokenBook
-from smach_oracle.expert.console.commands import COMMANDS
+from smach_oracle.expert.console import page_socket
+from smach_oracle.expert.console.commands.commands import COMMANDS
+from smach_oracle.expert.console.web import sessions
+from smach_oracle.expert.console.web.access import ROLES, AccessTokens, ClientRateLimits
 
-ARGUMENTS = {'question': 'q', 'kind': 'goto', 'name': 'x', 'held': True, 'frame': 'tool', 'linear': [0, 0, 0],
-             'angular': [0, 0, 0], 'gripper': '', 'sent': 1.0, 'xsrf': 'x', 'trial': 't', 'outcome': 'succeeded',
-             'stamp': '1.000000000', 'region': [[0, 0], [9, 0], [9, 9]], 'strokes': []}
+ARGUMENTS = {
+    'question': 'q', 'kind': 'goto', 'name': 'x', 'held': True, 'frame': 'tool',
+    'linear': [0, 0, 0], 'angular': [0, 0, 0], 'gripper': '', 'sent': 1.0, 'xsrf': 'x',
+    'trial': 't', 'outcome': 'succeeded', 'stamp': '1.000000000', 'region': [[0, 0], [9, 0],
+                                                                             [9, 9]], 'strokes': []
+}
 FRAMES = {'use_frame': 'fresh', 'drive': 'tool'}
 
 
 def test_no_time_tells_how_much_of_a_token_is_right(monkeypatch):
-    book = TokenBook('\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items()), 'file')
+    tokens = AccessTokens('\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items()),
+                          'file')
     compared = []
     real = hmac.compare_digest
-    monkeypatch.setattr(hmac, 'compare_digest', lambda one, other: compared.append((one, other)) or real(one, other))
+    monkeypatch.setattr(hmac, 'compare_digest', lambda one, other: compared.append(
+        (one, other)) or real(one, other))
     right = TOKENS['operator']
-    for guess in ('', 'x', right[:-1], right + 'x', right, TOKENS['viewer'], TOKENS['teleoperator']):
+    for guess in ('', 'x', right[:-1], right + 'x', right, TOKENS['viewer'],
+                  TOKENS['teleoperator']):
         compared.clear()
-        book.identify(guess)
+        tokens.identify(guess)
         assert len(compared) == len(TOKENS), 'all of them, whichever it is'
         assert {len(each) for pair in compared for each in pair} == {32}, 'digests, and no tokens'
 
@@ -37,8 +44,8 @@ class TestOdd(console_case.ConsoleCase):
 
     def raw(self, *lines, body=b'', limit_s=40.0):
         """The status of a request written by hand, 0 where the connection is closed."""
-        answer = self.io_loop.run_sync(lambda: self.io_loop.run_in_executor(None, self._talk, lines, body),
-                                       timeout=limit_s)
+        answer = self.io_loop.run_sync(
+            lambda: self.io_loop.run_in_executor(None, self._talk, lines, body), timeout=limit_s)
         return int(answer.split()[1]) if answer else 0
 
     def _talk(self, lines, body):
@@ -55,43 +62,53 @@ class TestOdd(console_case.ConsoleCase):
         assert self.raw('GET /session HTTP/1.1', own, 'Host: evil.example') in (400, 421, 0)
         assert self.raw('GET /session HTTP/1.1', 'Host: evil.example', own) in (400, 421, 0)
         assert self.raw('GET /session HTTP/1.0') in (400, 421, 0)
-        assert self.raw('GET http://evil.example/session HTTP/1.1', 'Host: evil.example') in (400, 404, 421, 0)
+        assert self.raw('GET http://evil.example/session HTTP/1.1',
+                        'Host: evil.example') in (400, 404, 421, 0)
 
     def test_what_is_too_large_is_not_even_read(self):
         own = 'Host: 127.0.0.1:{}'.format(self.get_http_port())
-        assert self.raw('POST /session HTTP/1.1', own, 'Content-Length: 1000000000') in (400, 413, 0)
+        assert self.raw('POST /session HTTP/1.1', own,
+                        'Content-Length: 1000000000') in (400, 413, 0)
         assert self.raw('GET /session HTTP/1.1', own, 'X-Long: ' + 'x' * 70000) in (400, 431, 0)
         assert self.raw('POST /session HTTP/1.1', own, 'Transfer-Encoding: chunked',
                         body=b'fffff\r\n' + b'x' * 0xfffff) in (400, 413, 0)
         assert self.raw('GET /session HTTP/1.1', own) == 200, 'it is still there'
 
     def test_nobody_gets_another_share_by_calling_himself_somebody_else(self):
-        self.gate.requests._by_key['127.0.0.1'] = type(self.gate.sign_ins._make(1))(0.0, 2.0)
-        codes = [self.ask('/session', X_Forwarded_For='10.0.0.{}'.format(number), X_Real_Ip='10.1.0.{}'.format(number),
-                          Forwarded='for=10.2.0.{}'.format(number)).code for number in range(4)]
+        self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=5.0)
+        codes = [
+            self.ask('/session', X_Forwarded_For='10.0.0.{}'.format(number),
+                     X_Real_Ip='10.1.0.{}'.format(number),
+                     Forwarded='for=10.2.0.{}'.format(number)).code for number in range(4)
+        ]
         assert codes == [200, 200, 429, 429]
 
     def cookie_of(self, secret, clock=time.time, text=None):
-        text = text or sessions.to_text(sessions.Session('known-to-the-attacker', time.time(), 'teleoperator'))
-        value = tornado.web.create_signed_value(secret, self.gate.cookie, text, clock=clock)
-        return '{}={}'.format(self.gate.cookie, value.decode())
+        text = text or sessions.to_text(
+            sessions.BrowserSession('known-to-the-attacker', time.time(), 'teleoperator'))
+        value = tornado.web.create_signed_value(secret, self.access.cookie, text, clock=clock)
+        return '{}={}'.format(self.access.cookie, value.decode())
 
     def test_a_cookie_of_other_tokens_or_of_yesterday_is_none(self):
-        assert self.begin(Cookie=self.cookie_of(self.gate.secret))[1]['signed_in'] is True, 'as it would be made'
+        assert self.begin(Cookie=self.cookie_of(
+            self.access.secret))[1]['signed_in'] is True, 'as it would be made'
         assert self.begin(Cookie=self.cookie_of('another secret'))[1]['signed_in'] is False
-        assert self.begin(Cookie=self.cookie_of(self.gate.secret, lambda: time.time() - 13 * 3600))[1][
-            'signed_in'] is False
+        assert self.begin(Cookie=self.cookie_of(
+            self.access.secret, lambda: time.time() - 13 * 3600))[1]['signed_in'] is False
 
     def test_a_session_counts_from_its_own_beginning_and_one_that_says_none_is_none(self):
-        for text in (sessions.to_text(sessions.Session('x', time.time() - 13 * 3600, 'teleoperator')),
-                     '["x", "teleoperator", ""]'):
-            answer = self.ask('/session', Cookie=self.cookie_of(self.gate.secret, text=text))
-            assert json.loads(answer.body)['signed_in'] is False and 'Set-Cookie' in answer.headers, text
+        for text in (sessions.to_text(
+                sessions.BrowserSession('x',
+                                        time.time() - 13 * 3600,
+                                        'teleoperator')), '["x", "teleoperator", ""]'):
+            answer = self.ask('/session', Cookie=self.cookie_of(self.access.secret, text=text))
+            assert json.loads(
+                answer.body)['signed_in'] is False and 'Set-Cookie' in answer.headers, text
 
     def test_a_session_that_an_attacker_has_begun_is_not_the_one_that_is_signed_in(self):
-        planted, said = self.begin()
-        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}), Cookie=planted,
-                          Origin=self.origin, X_Xsrf=said['xsrf'])
+        planted, info = self.begin()
+        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}),
+                          Cookie=planted, Origin=self.origin, X_Xsrf=info['xsrf'])
         assert answer.code == 200
         assert self.begin(Cookie=planted)[1]['signed_in'] is False
 
@@ -105,12 +122,14 @@ class TestPages(console_case.ConsoleCase):
             for name, spec in COMMANDS.items():
                 if ROLES.index(spec.role) <= ROLES.index(role):
                     continue
-                said = {field: ARGUMENTS.get(field) for field in spec.checks if field in ARGUMENTS}
-                if 'frame' in said:
-                    said['frame'] = FRAMES[name]
-                reply = await self.say(page, 5, do=name, **said)
-                assert (reply['ok'], 'may not' in reply['message']) == (False, True), (role, name, reply)
-        assert self.desk.done == [] and self.hands.relayed == [] and not self.hands.wheels
+                info = {field: ARGUMENTS.get(field) for field in spec.checks if field in ARGUMENTS}
+                if 'frame' in info:
+                    info['frame'] = FRAMES[name]
+                reply = await self.say(page, 5, do=name, **info)
+                assert (reply['ok'], 'may not'
+                        in reply['message']) == (False, True), (role, name, reply)
+        assert self.question_commands.done == [] and self.teleoperation.relayed == []
+        assert not self.teleoperation.drivers
 
     @tornado.testing.gen_test
     async def test_nobody_shuts_the_others_out_by_opening_pages(self):
@@ -119,16 +138,18 @@ class TestPages(console_case.ConsoleCase):
         assert await self.refused(first[0]) == 503, 'also such as never say hello'
         await self.open_page(*await self.signed('operator'))
         pages[0].close()
-        while len(self.office.open) > page_socket.MOST_OF_A_SESSION:
-            await tornado.gen.sleep(0.01)
+        await self.until(lambda: len(self.pages.open) <= page_socket.MOST_OF_A_SESSION)
         await self.open_page(*first)
 
     @tornado.testing.gen_test
     async def test_many_browsers_together_are_held_to_a_number(self):
-        self.office.open |= {object.__new__(page_socket.Socket) for _ in range(page_socket.MOST_SOCKETS)}
-        for each in self.office.open:
-            each.session = None
-        assert await self.refused((await self.signed('operator'))[0]) == 503
+        cookies = [(await self.signed('operator'))[0] for _ in range(5)]
+        limit = page_socket.MOST_SOCKETS
+        pages = [await self.connect(cookies[number % 4]) for number in range(limit)]
+        assert await self.refused(cookies[4]) == 503
+        pages[0].close()
+        await self.until(lambda: len(self.pages.open) < limit)
+        await self.connect(cookies[4])
 
     @tornado.testing.gen_test
     async def test_a_page_that_never_says_hello_is_closed(self):
@@ -143,6 +164,7 @@ class TestPages(console_case.ConsoleCase):
         page = await self.open_page(*await self.signed('operator'))
         await page.write_message(b'\x00\xff' * 100, binary=True)
         await page.write_message('[' * 30000)
-        assert not (await self.say(page, 6, do='answer', question='q', kind='goto', name='x', outputs=[
-            {'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}]))['ok']
-        assert self.desk.done == []
+        assert not (await self.say(page, 6, do='answer', question='q', kind='goto', name='x',
+                                   outputs=[{'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}
+                                            ]))['ok']
+        assert self.question_commands.done == []

@@ -3,14 +3,19 @@ import time
 
 import rospy
 
-from smach_oracle.expert.console import audit
-from smach_oracle.expert.console.audit import Audit, Person, Told
+from smach_oracle.expert.console.web import audit
+from smach_oracle.expert.console.web.audit import Audit, AuditTopic, Person
 from smach_oracle.msg import ConsoleCommand
+from smach_oracle.ros.recording.recorder_topics import audit_topic
 
 
 class FakePublisher:
+    """A topic with as many listeners as a test wants; the last one of each name is kept."""
 
-    def __init__(self, *_, **__):
+    made = {}
+
+    def __init__(self, topic, *_, **__):
+        FakePublisher.made[topic] = self
         self.sent = []
         self.publish = self.sent.append
         self.listeners = 0
@@ -23,33 +28,35 @@ class FakePublisher:
         return self.listeners
 
 
-def told(monkeypatch):
+def make_topic(monkeypatch):
     monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
-    return Told('topic')
+    return AuditTopic('topic')
 
 
 def test_a_recorder_that_comes_late_misses_nothing_and_hears_nothing_twice(monkeypatch):
-    topic = told(monkeypatch)
-    topic.tell(ConsoleCommand(command='claim'))
-    topic._publisher.listeners = 1
+    topic = make_topic(monkeypatch)
+    topic.publish(ConsoleCommand(command='claim'))
+    FakePublisher.made['topic'].listeners = 1
     heard = []
     topic.peer_subscribe('topic', None, heard.append)
-    topic.tell(ConsoleCommand(command='answer'))
+    topic.publish(ConsoleCommand(command='answer'))
     topic.peer_subscribe('topic', None, heard.append)
     assert [each.command for each in heard] == ['claim']
-    assert [each.command for each in topic._publisher.sent] == ['answer']
+    assert [each.command for each in FakePublisher.made['topic'].sent] == ['answer']
 
 
 def test_what_was_said_long_before_is_not_news(monkeypatch):
-    topic = told(monkeypatch)
-    topic.tell(ConsoleCommand(command='claim'))
+    topic = make_topic(monkeypatch)
+    topic.publish(ConsoleCommand(command='claim'))
     begun_s = time.monotonic()
     monkeypatch.setattr(time, 'monotonic', lambda: begun_s + audit.LONGEST_WAIT_S + 1.0)
     heard = []
     topic.peer_subscribe('topic', None, heard.append)
+    assert heard == []
     for _ in range(2 * audit.MOST_WAITING):
-        topic.tell(ConsoleCommand(command='drive'))
-    assert heard == [] and len(topic._waiting) == audit.MOST_WAITING
+        topic.publish(ConsoleCommand(command='drive'))
+    topic.peer_subscribe('topic', None, heard.append)
+    assert len(heard) == audit.MOST_WAITING, 'no more is kept'
 
 
 def test_each_command_is_told_with_who_gave_it_and_never_at_length(monkeypatch):
@@ -57,9 +64,10 @@ def test_each_command_is_told_with_who_gave_it_and_never_at_length(monkeypatch):
     monkeypatch.setattr(rospy, 'get_name', lambda: '/console')
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     monkeypatch.setattr(audit, 'ros_now', rospy.Time)
-    book = Audit()
-    book.tell(Person('10.0.0.7', 'abc', 'viewer', 'bob'), 'answer', False, 'x' * 9000, {'why': 'y' * 9000})
-    record, = book._own.sent
+    made = Audit()
+    made.record(Person('10.0.0.7', 'abc', 'viewer', 'bob'), 'answer', False, 'x' * 9000,
+                {'why': 'y' * 9000})
+    record, = FakePublisher.made['~audit'].sent
     assert (record.client, record.session, record.role, record.expert, record.ok) == (
         '10.0.0.7', 'abc', 'viewer', 'bob', False)
     assert len(record.message) == 1000 and len(record.arguments) == audit.LONGEST_ARGUMENTS
@@ -67,11 +75,20 @@ def test_each_command_is_told_with_who_gave_it_and_never_at_length(monkeypatch):
 
 def test_beside_servers_that_are_gone_nothing_is_advertised_any_more(monkeypatch):
     monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
-    book = Audit()
-    book.prepare(['/a/expert_query', '/b/expert_query'])
-    first, second = (book._by_server[name] for name in ('/a/expert_query', '/b/expert_query'))
-    book.prepare(['/b/expert_query'])
-    assert list(book._by_server) == ['/b/expert_query'] and book._by_server['/b/expert_query'] is second
-    assert second._publisher.there and not first._publisher.there
-    first.tell(ConsoleCommand(command='answer'))
-    assert first._publisher.sent == [] and not first._waiting
+    made = Audit()
+    made.prepare(['/a/expert_query', '/b/expert_query'])
+    first, second = (FakePublisher.made[audit_topic(name)]
+                     for name in ('/a/expert_query', '/b/expert_query'))
+    made.prepare(['/b/expert_query'])
+    assert FakePublisher.made[audit_topic('/b/expert_query')] is second
+    assert second.there and not first.there
+
+
+def test_what_is_told_of_a_server_that_is_gone_reaches_nobody(monkeypatch):
+    topic = make_topic(monkeypatch)
+    topic.stop()
+    FakePublisher.made['topic'].listeners = 1
+    topic.publish(ConsoleCommand(command='answer'))
+    heard = []
+    topic.peer_subscribe('topic', None, heard.append)
+    assert FakePublisher.made['topic'].sent == [] and heard == []

@@ -1,0 +1,23 @@
+"""What the page is told of events."""
+import json
+import math
+
+import pytest
+
+from smach_oracle.expert.console.feeds.views import event_of, event_view
+from smach_oracle.msg import OracleEvent
+from smach_oracle.oracle.records.events import EventKind
+
+
+@pytest.mark.parametrize('kind', list(EventKind))
+def test_every_kind_of_event_has_words(kind):
+    message = OracleEvent(kind=int(kind), path='TASK', state='PICK', outcome='aborted',
+                          target='PLACE', by='ann', rate=math.nan)
+    shown = event_view(event_of(message))
+    assert shown['kind'] == kind.name.lower() and shown['words'].endswith(
+        '.') or kind == EventKind.WARNING
+    json.dumps(shown, allow_nan=False)
+
+
+def test_a_kind_of_a_later_release_does_no_harm():
+    assert event_view(event_of(OracleEvent(kind=99, rate=math.inf)))['kind'] == '99'

@@ -1,0 +1,79 @@
+"""Robots are found by their topics, which become sections."""
+
+
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from smach_oracle.expert.console.robots import followed_robots
+from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
+from smach_oracle.expert.console.trials.trial_log import TrialLog
+from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
+
+
+class NoLayouts:
+    def find(self, text, done):
+        return None
+
+
+def test_a_robot_s_topics_become_its_sections():
+    robot, sections = FollowedRobot('/robot'), PageSections()
+    robot.on_structure(
+        SmachContainerStructure(path='/TASK', children=['A', 'B'], outcomes_from=['A'],
+                                internal_outcomes=['ok'], outcomes_to=['B'],
+                                container_outcomes=['done']))
+    robot.on_structure(SmachContainerStructure(path='/TASK/B', children=['C']))
+    robot.on_status(SmachContainerStatus(path='/TASK', active_states=['B']))
+    robot.on_rates(OracleRates(states=[StateRate('TASK', 'A', 0.25, 1, 3, 1, 0, False),
+                                       StateRate('UNSEEN', 'X', 0.1, 1, 0, 0, 0, False)],
+                               transitions=[TransitionCount('TASK', 'A', 'ok', 'B', 3)]))
+    robot.on_event(OracleEvent(kind=OracleEvent.FAILURE, path='TASK', state='A', rate=0.25))
+    robot.write_sections(sections, NoLayouts())
+    live = sections.get('live /robot')
+    assert live['active'] == {'TASK': ['B']} and live['failed']['TASK']['state'] == 'A'
+    assert live['rates']['TASK']['A']['rate'] == 0.25 and live['counts']['TASK'] == [[
+        'A', 'ok', 'B', 3, 1.0
+    ]]
+    assert live['paths'] == ['TASK', 'TASK/B',
+                             'UNSEEN'], 'without introspection what is learned tells of a machine'
+    assert [state['nested']
+            for state in sections.get('graph /robot TASK')['states']] == [False, True]
+    robot.on_event(OracleEvent(kind=OracleEvent.JUMP, path='TASK', state='A', target='B'))
+    robot.write_sections(sections, NoLayouts())
+    assert sections.get('live /robot')['failed'] == {}
+    robot.forget(sections)
+    assert sections.since(0)[1] == []
+
+
+class FakeSubscriber:
+    made, unregistered = [], []
+
+    def __init__(self, topic, message, callback, queue_size):
+        self.topic, self.callback = topic, callback
+        self.made.append(self)
+
+    def unregister(self):
+        self.unregistered.append(self.topic)
+
+
+def test_robots_are_found_by_name_and_type_and_the_oldest_of_many_that_are_gone_are_forgotten(
+        monkeypatch):
+    monkeypatch.setattr(followed_robots.rospy, 'Subscriber', FakeSubscriber)
+    monkeypatch.setattr(followed_robots, 'MOST_ROBOTS', 2)
+    sections, log = PageSections(), TrialLog()
+    found = followed_robots.FollowedRobots(sections, log, NoLayouts())
+    events = OracleEvent._type
+    found.follow([['/a/oracle/events', events], ['/b/oracle/events', 'std_msgs/String'],
+                  ['/c/other', events], ['/oracle/events', events]])
+    found.write_sections()
+    assert sections.get('robots') == ['/a']
+    next(each for each in FakeSubscriber.made if each.topic == '/a/oracle/events').callback(
+        OracleEvent(kind=OracleEvent.STATE_START, trial_id='t', path='TASK', state='A'))
+    found.write_sections()
+    assert sections.get('live /a')['alive'] and log.overview()['trials'][0]['robot'] == '/a'
+    for name in 'defg':
+        found.follow([['/{}/oracle/events'.format(name), events]])
+    found.follow([])
+    found.follow([])
+    found.write_sections()
+    assert sections.get('robots') == ['/f', '/g'] and sections.get('live /a') is None
+    assert '/a/oracle/events' in FakeSubscriber.unregistered and not sections.get(
+        'live /g')['alive']

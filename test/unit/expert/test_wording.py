@@ -1,0 +1,22 @@
+"""Failures and events in words, and text from robots made safe."""
+from smach_oracle.expert.wording import clean, next_step_words
+from smach_oracle.msg import OracleEvent
+
+
+def test_lines_stay_lines_only_where_there_is_room_for_them():
+    assert clean('a\n\tb') == 'a  b'
+    assert clean('a\n\tb', lines=True) == 'a\n b'
+
+
+def test_what_happens_after_an_answer_is_said_in_words():
+    said = {
+        kind: next_step_words(
+            OracleEvent(kind=kind, path='P', state='PICK', target='DETECT', outcome='done',
+                        text='low battery'))
+        for kind in (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
+                     OracleEvent.WARNING)
+    }
+    assert list(said.values()) == [
+        'The machine goes to DETECT.', 'PICK counts as having ended with done.',
+        'P gives up with done.', 'The robot warns: low battery'
+    ]

@@ -1,0 +1,56 @@
+"""One name for one thing, one thing for one name."""
+import ast
+import collections
+import re
+
+from house import parse, python_files, shown
+
+PACKAGE = python_files('src/smach_oracle')
+# the one in ros/ extends the bare one of the executive, and stands for it in ROS programs
+SHARED = {'OracleContainer'}
+# names that do not say what a thing is
+VAGUE = {
+    'quicken', 'Face', 'Desk', 'Office', 'Eye', 'Hands', 'Tally', 'standing', 'course', 'settling'
+}
+
+
+def definitions():
+    """Every class and function of the package, as (file, node)."""
+    kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    return [(path, node) for path in PACKAGE for node in ast.walk(parse(path))
+            if isinstance(node, kinds)]
+
+
+def test_a_class_name_occurs_once():
+    places = collections.defaultdict(list)
+    for path, node in definitions():
+        if isinstance(node, ast.ClassDef):
+            places[node.name.lstrip('_')].append('{}:{}'.format(shown(path), node.lineno))
+    assert not {name: found for name, found in places.items()
+                if len(found) > 1 and name not in SHARED}
+
+
+def test_nothing_has_a_name_that_does_not_say_what_it_is():
+    found = ['{}:{} {}'.format(shown(path), node.lineno, node.name) for path, node in definitions()
+             if node.name.lstrip('_') in VAGUE]
+    found += [shown(path) for path in PACKAGE if path.stem in {name.lower() for name in VAGUE}]
+    assert not found
+
+
+def test_errors_are_documented_in_one_style():
+    loose = re.compile(r'(?:^|[.;] )[Rr]aises \w*(?:Error|Exception)', re.MULTILINE)
+    wrong = ['{}:{}'.format(shown(path), node.lineno) for path, node in definitions()
+             if loose.search(ast.get_docstring(node) or '')]
+    assert not wrong, 'write a line of its own, `:raises X: when`'
+
+
+def is_long(docstring):
+    """Whether a docstring has a summary of several lines; that of a constructor may have none."""
+    return not docstring.startswith(':') and '\n' in docstring.split('\n\n')[0]
+
+
+def test_the_summary_of_a_docstring_is_one_line():
+    documented = [(path, parse(path)) for path in PACKAGE] + definitions()
+    wrong = ['{}:{}'.format(shown(path), getattr(node, 'lineno', 1)) for path, node in documented
+             if is_long(ast.get_docstring(node) or '')]
+    assert not wrong

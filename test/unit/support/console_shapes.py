@@ -1,0 +1,210 @@
+"""Every shape of JSON that the console's server sends, made by the server's own code."""
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import rospy
+from expert_fixtures import make_question
+from fake_trials import play
+from geometry_msgs.msg import PointStamped, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from smach_oracle.expert.console.answering import teleoperation
+from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
+from smach_oracle.expert.console.answering.interface_commands import marked_view
+from smach_oracle.expert.console.answering.interface_outputs import interface_output_view
+from smach_oracle.expert.console.answering.precondition_status import checks_view
+from smach_oracle.expert.console.answering.question_view import question_view
+from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
+from smach_oracle.expert.console.feeds.views import event_of, event_view
+from smach_oracle.expert.console.graphs.container_graph import (
+    ContainerGraph,
+    GraphEdge,
+    GraphLayout,
+    drawing,
+)
+from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
+from smach_oracle.expert.console.sensors import sample_handlers
+from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
+from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
+from smach_oracle.expert.console.sensors.sensor_streams import SensorStream
+from smach_oracle.expert.console.trials import bag_catalogue
+from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
+from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
+from smach_oracle.expert.console.web.audit import Person
+from smach_oracle.expert.followed_server import ListedQuestion
+from smach_oracle.expert.interface_outputs import InterfaceOutputs
+from smach_oracle.msg import (
+    InterfaceOutput,
+    OpenQuery,
+    OracleEvent,
+    OracleRates,
+    PreconditionCheck,
+    PreconditionChecks,
+    StateRate,
+    TeleopState,
+    TransitionCount,
+)
+from smach_oracle.oracle.asking.question import StateChoice
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.ros.expert.question_messages import to_goal
+from smach_oracle.ros.images import cloud_message, colour_image, depth_image, mask_image
+from smach_oracle.ros.recorder import TrialRecorder
+from smach_oracle.srv import SegmentObjectResponse
+
+KEY = '/robot/expert_query q1'
+URDF = '''<robot name="arm">
+<link name="base"><visual><geometry><box size="1 2 4"/></geometry></visual></link>
+<link name="hand"><visual><geometry><mesh filename="none"/></geometry></visual></link>
+<joint name="j" type="fixed"><parent link="base"/><child link="hand"/></joint></robot>'''
+
+
+def listed(status=OpenQuery.PENDING, deadline_s=math.inf, interface='', **changes):
+    goal = to_goal(make_question(**changes), '/robot', rospy.Time(1))
+    goal.interface = interface
+    return ListedQuestion('/robot/expert_query', goal, status, 'ann', 10.0, deadline_s)
+
+
+def questions():
+    """With every kind of value that a question may hold."""
+    visits = tuple(Visit('PICK', 'done', result) for result in VisitResult)
+    unknown = (StateChoice('PICK', math.nan, 0, 0, (), ()),)
+    userdata = {'plain': {'a': 1}, 'message': PointStamped(), 'messages': [PointStamped()],
+                'unsent': object()}
+    asked = [listed(), listed(OpenQuery.CLAIMED, 20.0, userdata=userdata, history=visits),
+             listed(OpenQuery.INTERFACE_RUNNING, interface='assist', rate=math.nan,
+                    choices=unknown)]
+    return [question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)) for each in asked]
+
+
+class NoLayouter:
+    """As where Graphviz is absent."""
+
+    def find(self, text, done):
+        return None
+
+
+class FrontEnd:
+    """With one question, for which an interface runs."""
+
+    def questions(self):
+        return [listed(OpenQuery.INTERFACE_RUNNING, interface='assist')]
+
+
+def put_questions(sections):
+    sections.put('questions', questions())
+    sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
+    checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
+        (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
+    sections.put('conditions', {KEY: checks_view(PreconditionChecks(checks=checks), 1000.0)})
+    sections.put('stills', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
+                                  for late_s in (None, 1.5)]})
+
+
+def put_machines(sections):
+    """A robot that is only heard, without a layout, and one container with it."""
+    alpha = FollowedRobot('/alpha')
+    alpha.on_rates(OracleRates(
+        states=[StateRate('TASK', 'A', 0.25, 1, 3, 1, 0, False),
+                StateRate('TASK', 'B', math.nan, 0, 0, 0, 0, True)],
+        transitions=[TransitionCount('TASK', 'A', 'ok', 'B', 3)]))
+    alpha.on_event(OracleEvent(kind=OracleEvent.TRANSITION, path='TASK', state='A', target='B'))
+    alpha.on_event(OracleEvent(kind=OracleEvent.FAILURE, path='TASK', state='B', rate=math.nan))
+    alpha.write_sections(sections, NoLayouter())
+    structure = ContainerGraph('TASK', ('A',), ('done',), (GraphEdge('A', 'ok', 'done'),), 'ORACLE')
+    place = (1.0, 2.0, 3.0, 4.0)
+    curve = ([(1.0, 2.0), (3.0, 4.0)], (5.0, 6.0))
+    layout = GraphLayout(9.0, 8.0, {'n0': place, 'n1': place}, {'e0': curve})
+    sections.put('graph /beta TASK', drawing(structure, layout, ['A']))
+    sections.put('robots', ['/alpha', '/beta'])
+
+
+def put_sensors(sections):
+    watching = SensorDiscovery(sections, FrontEnd())
+    watching._perception_actions = {'/assist'}
+    watching.sensors.follow([['/assist/image', 'sensor_msgs/Image'],
+                             ['/points', 'sensor_msgs/PointCloud2'],
+                             ['/joint_states', 'sensor_msgs/JointState']])
+    watching.write_sections()
+    assert sections.get('eye')['perception']
+
+
+def put_interfaces(sections):
+    outputs = InterfaceOutputs()
+    outputs.taker('/robot')(InterfaceOutput(
+        query_id='q1', status=InterfaceOutput.RUNNING, lines=['ready']))
+    sections.put('output', {KEY: interface_output_view(outputs.newest('q1'))})
+    held = DrivingControl()
+    held.take(DrivingSession(KEY, 7, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
+    stands = TeleopState(arm='left', speed=math.nan, clearance=math.inf, gripper=math.nan)
+    views = {}
+    for state, control, boxes in ((None, DrivingControl(), None), (TeleopState(), held, 3),
+                                  (stands, held, 0)):
+        hand = SimpleNamespace(
+            state=state, control=control, arm='left', arms=['left'], boxes=boxes,
+            frames=lambda arm: {'tool': 'tool', 'base': 'base', 'camera': 'camera'})
+        views['{}{}'.format(KEY, len(views))] = teleoperation._view(hand)
+    sections.put('hand', views)
+
+
+def put_trials(sections, log, folder):
+    """One that was heard, with each kind of event, and two of bags: their shelf."""
+    for kind in EventKind:
+        log.add('/robot', event_of(OracleEvent(
+            kind=int(kind), trial_id='t', seq=int(kind), path='TASK', rate=0.5)))
+    sections.put('trials', log.overview())
+    recorder = TrialRecorder(folder, warn=pytest.fail)
+    play(recorder, 2)
+    assert recorder.close(30.0)
+    Path(folder, 'torn.bag').write_bytes(b'#ROSBAG V2.0\n')
+    catalogue = BagCatalogue([folder], sections)
+    catalogue._reader = bag_catalogue.EventReader(bag_catalogue.MOST_EVENTS)
+    catalogue.scan()
+    return catalogue
+
+
+def later_event():
+    """Of a kind that only a later release knows."""
+    return event_view(event_of(OracleEvent(kind=99, rate=math.inf)))
+
+
+def sensor_facts():
+    """What is told beside the newest message of each kind of sensor, by the shape's name."""
+    header = Header(frame_id='camera', stamp=rospy.Time(7))
+    joints = JointState(name=['a', 'b'], position=[1.0, math.nan])
+    found = []
+    for name, kind, message in (
+            ('ImageFacts', 'Image', colour_image(np.zeros((4, 4, 3), np.uint8), header)),
+            ('ImageFacts', 'Image', depth_image(np.ones((4, 4), np.float32), header)),
+            ('JointFacts', 'JointState', joints),
+            ('CloudFacts', 'PointCloud2', cloud_message(np.ones((5, 3)), header))):
+        sensor = SensorStream(1, '/topic', 'sensor_msgs/' + kind)
+        sensor.take(message)
+        frame = sensor.newer(0)
+        encoded, facts = sensor.file_of(frame, 640)
+        found.append((name, json.loads(facts or encoded.body)))
+    for place in (np.eye(4)[:3], None):
+        beside = SimpleNamespace(newer=lambda than: None,
+                                 place_of=lambda *_, at=place: (at, 'no transform'))
+        found.append(('CloudFacts', json.loads(sample_handlers._with_place(facts, beside, frame))))
+    return found
+
+
+def model_header():
+    body = RobotAppearance(URDF).encoded().body
+    return json.loads(body[4:4 + int.from_bytes(body[:4], 'little')])
+
+
+def marked():
+    """What a perception interface answers: with an object, and without."""
+    answer = SegmentObjectResponse(
+        ok=True, mask=mask_image(np.ones((4, 4), bool), Header()), size=Vector3(1, 2, 3),
+        cloud=cloud_message(np.ones((5, 3)), Header()))
+    found = marked_view(answer)
+    answer.ok = False
+    return [found, marked_view(answer)]
