@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""How long from an expert's answer to the robot's next step: from the call of the answer service, in the expert's
-process, to the return of `ask` in the robot's, over loopback on a real master.
+"""How long from an expert's answer to the robot's next step: from the call of the answer service,
+in the expert's process, to the return of `ask` in the robot's, over loopback on a real master.
 
     benchmarks/answer_latency.py [--questions N] [--shared] [--check]
 
---shared puts the server into a third process, as where one serves many robots. --check fails above the limit.
+--shared puts the server into a third process, as where one serves many robots. --check fails above
+the limit.
 """
 import argparse
 import os
@@ -38,10 +39,12 @@ def main():
 
 
 def parse():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--questions', type=int, default=300)
     parser.add_argument('--shared', action='store_true')
-    parser.add_argument('--check', action='store_true', help='fail above {:g} ms at p95'.format(LIMIT_S * 1e3))
+    parser.add_argument('--check', action='store_true',
+                        help='fail above {:g} ms at p95'.format(LIMIT_S * 1e3))
     parser.add_argument('--role', default='robot', help=argparse.SUPPRESS)
     parser.add_argument('--server', help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -66,11 +69,14 @@ class Processes:
                 process.kill()
 
     def start(self, command):
-        self._started.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        self._started.append(
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
 
     def start_master(self):
-        """Start a master on a free port, for us and for all that is started after it; wait until it answers."""
-        from smach_oracle.simulation.experiment.launching import free_port
+        """Start a master on a free port, for us and for all that is started after it; wait until it
+        answers.
+        """
+        from smach_oracle.experiment.launching import free_port
         port = free_port()
         uri = 'http://localhost:{}'.format(port)
         os.environ['ROS_MASTER_URI'] = uri
@@ -87,8 +93,10 @@ class Processes:
 def measure(server, questions):
     """Latencies in seconds."""
     import rospy
-    from smach_oracle.ros.expert_client import ExpertQueryClient
-    sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest'))
+
+    from smach_oracle.ros.expert.client import ExpertQueryClient
+    sys.path.insert(
+        0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest'))
     from expert_fixtures import make_question
     rospy.init_node('latency_robot', disable_signals=True, log_level=rospy.WARN)
     client = ExpertQueryClient(server)
@@ -107,6 +115,7 @@ def measure(server, questions):
 def answer_everything(server):
     """The expert's process: answers each question, with the time of the call as its reason."""
     import rospy
+
     from smach_oracle.msg import ExpertDecision, OpenQueries
     from smach_oracle.srv import AnswerQuery
     rospy.init_node('latency_expert')
@@ -132,7 +141,8 @@ def answer_everything(server):
 
 def serve():
     import rospy
-    from smach_oracle.ros.expert_server import ExpertQueryServer
+
+    from smach_oracle.ros.expert.server import ExpertQueryServer
     rospy.init_node('shared')
     ExpertQueryServer('~expert_query')
     rospy.spin()
@@ -141,9 +151,11 @@ def serve():
 
 def report(latencies, options):
     cuts = statistics.quantiles(latencies, n=100, method='inclusive')
-    print('{} answers, {} server: median {:.1f} ms, p95 {:.1f} ms, p99 {:.1f} ms, slowest {:.1f} ms'.format(
-        len(latencies), 'shared' if options.shared else 'own', cuts[49] * 1e3, cuts[94] * 1e3, cuts[98] * 1e3,
-        max(latencies) * 1e3))
+    print(
+        '{} answers, {} server: median {:.1f} ms, p95 {:.1f} ms, p99 {:.1f} ms, slowest {:.1f} ms'.
+        format(len(latencies), 'shared' if options.shared else 'own', cuts[49] * 1e3,
+               cuts[94] * 1e3, cuts[98] * 1e3,
+               max(latencies) * 1e3))
     if options.check and cuts[94] > LIMIT_S:
         print('p95 is above the limit of {:.0f} ms'.format(LIMIT_S * 1e3), file=sys.stderr)
         return 1

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""How long the perception interface's work takes from a drawing to a mask with its object, at 640 x 480: a rectangle
-around a thing, one with strokes, and one as large as the image; with what the console makes of the answer for its page.
+"""How long the perception interface's work takes from a drawing to a mask with its object, at 640 x
+480: a rectangle around a thing, one with strokes, and one as large as the image; with what the
+console makes of the answer for its page.
 
     benchmarks/mark_latency.py [--check]
 
-Frames are cast from a scene, so that every machine cuts the same pixels; what is measured is the processor's time, so
-that others on the machine do not count. --check fails where the 90th percentile of any of them is above the budget,
-which leaves the rest of the 300 ms that a person may wait to the network and the browser.
+Frames are cast from a scene, so that every machine cuts the same pixels; what is measured is the
+processor's time, so that others on the machine do not count. --check fails where the 90th
+percentile of any of them is above the budget, which leaves the rest of the 300 ms that a person may
+wait to the network and the browser.
 """
 import argparse
 import sys
@@ -16,15 +18,21 @@ from pathlib import Path
 import numpy as np
 from std_msgs.msg import Header
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'unit' / 'perception'))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'unit' / 'support'))
 from ray_camera import camera_at, see  # noqa: E402
 
-from smach_oracle.expert.console.perception_desk import marked_view  # noqa: E402
-from smach_oracle.expert.marked_scene import SceneError, scene_of  # noqa: E402
-from smach_oracle.expert.marking import Marked, ingredients  # noqa: E402
-from smach_oracle.expert.segmentation import Picture, SegmentationError, Stroke, rectangle, segment  # noqa: E402
+from smach_oracle.expert.console.answering.interface_commands import marked_view  # noqa: E402
+from smach_oracle.geometry.camera_image import CameraImage  # noqa: E402
+from smach_oracle.interfaces.perception.marked_scene import MarkedSceneError, scene_of  # noqa: E402
+from smach_oracle.interfaces.perception.marking import ObjectInImage, output_messages  # noqa: E402
+from smach_oracle.interfaces.perception.segmentation import (
+    SegmentationError,
+    Stroke,
+    rectangle,
+    segment,
+)
 from smach_oracle.ros.images import mask_image  # noqa: E402
-from smach_oracle.simulation.world.scene import Body  # noqa: E402
+from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
 from smach_oracle.srv import SegmentObjectResponse  # noqa: E402
 
 BUDGET_S = 0.200
@@ -35,37 +43,47 @@ BODIES = [Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true', help='fail above {:.0f} ms at p90'.format(1e3 * BUDGET_S))
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--check', action='store_true',
+                        help='fail above {:.0f} ms at p90'.format(1e3 * BUDGET_S))
     check = parser.parse_args().check
     taken = {}
     for index in range(FRAMES):
-        seen = see(BODIES, camera_at((0.05, 0.03, 1.38), (0.75, 0.02 * index, 0.75)), np.random.default_rng(index))
-        picture = Picture(*seen.frame)
+        seen = see(BODIES, camera_at((0.05, 0.03, 1.38), (0.75, 0.02 * index, 0.75)),
+                   np.random.default_rng(index))
+        image = CameraImage(*seen.image)
         rows, columns = np.nonzero(seen.bodies == 1)
-        around = rectangle(columns.min() - 8, rows.min() - 8, np.ptp(columns) + 16, np.ptp(rows) + 16)
+        around = rectangle(columns.min() - 8,
+                           rows.min() - 8,
+                           np.ptp(columns) + 16,
+                           np.ptp(rows) + 16)
         stroke = Stroke(False, around[:2] + [0.0, 2.0])
-        for name, region, strokes in (('rectangle', around, []), ('with strokes', around, [stroke] * 5),
+        for name, region, strokes in (('rectangle', around, []), ('with strokes', around,
+                                                                  [stroke] * 5),
                                       ('whole image', rectangle(0, 0, 640, 480), [])):
             for _ in range(REPEATS):
-                taken.setdefault(name, []).append(marked_in(picture, region, strokes))
+                taken.setdefault(name, []).append(marked_in(image, region, strokes))
     worst = 0.0
     for name, times in taken.items():
         middle, high = np.percentile(times, (50, 90))
         worst = max(worst, high)
-        print('{:13s} p50 {:5.1f} ms   p90 {:5.1f} ms   of {}'.format(name, 1e3 * middle, 1e3 * high, len(times)))
+        print('{:13s} p50 {:5.1f} ms   p90 {:5.1f} ms   of {}'.format(name, 1e3 * middle,
+                                                                      1e3 * high, len(times)))
     print('budget at p90: {:.0f} ms'.format(1e3 * BUDGET_S))
     return int(check and worst > BUDGET_S)
 
 
-def marked_in(picture, region, strokes):
+def marked_in(image, region, strokes):
     """Seconds of the processor."""
     begun_s = time.process_time()
     answer = SegmentObjectResponse()
     try:
-        cutting = segment(picture, region, strokes)
-        parts = ingredients(Marked(cutting, Header(frame_id='base'), scene(picture, cutting), ''))
-        answer.object, answer.size, answer.cloud, mask = parts['object'], parts['size'], parts['cloud'], cutting.mask
+        segmented = segment(image, region, strokes)
+        parts = output_messages(
+            ObjectInImage(segmented, Header(frame_id='base'), scene(image, segmented), ''))
+        answer.object, answer.size = parts['object'], parts['size']
+        answer.cloud, mask = parts['cloud'], segmented.mask
         answer.ok = True
     except SegmentationError as err:
         mask = err.mask
@@ -75,11 +93,11 @@ def marked_in(picture, region, strokes):
     return time.process_time() - begun_s
 
 
-def scene(picture, cutting):
+def scene(image, segmented):
     """None where it cannot be made out, as when the image is one region."""
     try:
-        return scene_of(picture, cutting)
-    except SceneError:
+        return scene_of(image, segmented)
+    except MarkedSceneError:
         return None
 
 

@@ -3,8 +3,9 @@
 
     python3 benchmarks/oracle_decision.py [--check] [--visits N]
 
-Both are measured in one run, best of many: a failure, from the end of the failed state to the entry into the next, for
-each policy, with the preconditions met. With --check the exit status is 1 where the ratio is above 1.5.
+Both are measured in one run, best of many: a failure, from the end of the failed state to the entry
+into the next, for each policy, with the preconditions met. With --check the exit status is 1 where
+the ratio is above 1.5.
 """
 import argparse
 import itertools
@@ -12,11 +13,11 @@ import sys
 import time
 from typing import Any, List, Tuple
 
-import smach
 from oracle_overhead import silence
 
+import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.policy import POLICIES
+from smach_oracle.oracle.decision.policy import POLICIES
 
 LIMIT = 1.5
 FAILURES = 300
@@ -40,14 +41,17 @@ class Failing(smach.State):
 
 
 def machine_after(visits: int, policy: str) -> Tuple[Any, List[float]]:
-    """A machine that makes `visits` visits and then fails now and then; and the seconds that each decision takes."""
+    """A machine that makes `visits` visits and then fails now and then; and the seconds that each
+    decision takes.
+    """
     state, costs = Failing(), []
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', state, {'ok': 'B'})
         smach.StateMachine.add('B', Failing(), {'ok': 'A'})
-    OracleContainer.wrap(machine, settings={'policy': policy, 'max_recoveries': 10 ** 9, 'memory': 10 ** 6},
-                         preconditions={'A': [lambda ud: True]})
+    OracleContainer.wrap(machine,
+                         settings={'policy': policy, 'max_recoveries': 10**9,
+                                   'memory': 10**6}, preconditions={'A': [lambda ud: True]})
     left = [FAILURES]
 
     def told(ud: Any, active: List[str]) -> None:
@@ -73,8 +77,9 @@ def machine_after(visits: int, policy: str) -> Tuple[Any, List[float]]:
 def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--check', action='store_true', help='exit with status 1 where the limit is missed')
-    parser.add_argument('--visits', type=int, default=10 ** 6, help='visits before the first failure')
+    parser.add_argument('--check', action='store_true',
+                        help='exit with status 1 where the limit is missed')
+    parser.add_argument('--visits', type=int, default=10**6, help='visits before the first failure')
     args = parser.parse_args()
     silence()
     print('engine: {}'.format(smach.__file__))
@@ -83,8 +88,10 @@ def main() -> int:
         few, many = (min(machine_after(visits, policy)[1]) for visits in (10, args.visits))
         few = min(few, min(machine_after(10, policy)[1]))
         worst = max(worst, many / few)
-        print('{}: a decision takes {:.1f} us after ten visits, {:.1f} us after {}: {:.2f} times (limit {:g})'.format(
-            policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT))
+        print(
+            '{}: a decision takes {:.1f} us after ten visits, {:.1f} us after {}: {:.2f} times '
+            '(limit {:g})'
+            .format(policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT))
     return 1 if args.check and worst > LIMIT else 0
 
 

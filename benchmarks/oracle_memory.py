@@ -3,17 +3,18 @@
 
     python3 benchmarks/oracle_memory.py [--check] [--transitions N]
 
-A two-state loop whose userdata is written at each visit runs N transitions; the resident memory is read after a tenth
-of them and at the end. With --check the exit status is 1 where it grew by more than 1 MiB in between.
+A two-state loop whose userdata is written at each visit runs N transitions; the resident memory is
+read after a tenth of them and at the end. With --check the exit status is 1 where it grew by more
+than 1 MiB in between.
 """
 import argparse
 import itertools
 import sys
 import time
 
-import smach
 from oracle_overhead import silence
 
+import smach
 from smach_oracle.oracle import OracleContainer
 
 LIMIT_KIB = 1024
@@ -59,16 +60,20 @@ def main() -> int:
         return last
 
     tenth = args.transitions // 10
-    smach.set_shutdown_check(itertools.chain(
-        itertools.repeat(False, tenth), map(read, [False]), itertools.repeat(False, args.transitions - tenth),
-        map(read, [True])).__next__)
+    smach.set_shutdown_check(
+        itertools.chain(itertools.repeat(False, tenth), map(read, [False]),
+                        itertools.repeat(False, args.transitions - tenth), map(read,
+                                                                               [True])).__next__)
     begin = time.perf_counter()
     machine.execute()
     elapsed_s = time.perf_counter() - begin
     failures = sum(row.failures for row in machine.rates())
     print('engine: {}'.format(smach.__file__))
-    print('{} transitions in {:.0f} s, {} of them failures; resident {} KiB after a tenth, {} KiB at the end '
-          '(may grow by {})'.format(args.transitions, elapsed_s, failures, readings[0], readings[-1], LIMIT_KIB))
+    print(
+        '{} transitions in {:.0f} s, {} of them failures; resident {} KiB after a tenth, {} KiB '
+        'at the end '
+        '(may grow by {})'.format(args.transitions, elapsed_s, failures, readings[0], readings[-1],
+                                  LIMIT_KIB))
     return 1 if args.check and readings[-1] - readings[0] > LIMIT_KIB else 0
 
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""What a failure-free transition costs under an oracle, in steps of the bare loop over the same two states.
+"""What a failure-free transition costs under an oracle, in steps of the bare loop over the same two
+states.
 
     python3 benchmarks/oracle_overhead.py [--check] [--transitions N] [--rounds N]
 
-The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced, nobody observes. The
-rounds alternate and the best of each counts, so that neighbours on the machine do not. With --check the exit status is
-1 where a wrapped transition costs more than 20 bare steps.
+The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced,
+nobody observes. The rounds alternate and the best of each counts, so that neighbours on the machine
+do not. With --check the exit status is 1 where a wrapped transition costs more than 20 bare steps.
 """
 import argparse
 import itertools
@@ -14,7 +15,6 @@ import time
 from typing import Dict
 
 import smach
-
 from smach_oracle.oracle import OracleContainer
 
 LIMIT = 20.0
@@ -55,7 +55,8 @@ def bare_step_s(count: int) -> float:
 
 def machine_step_s(machine: smach.StateMachine, count: int) -> float:
     """Seconds that one transition of `machine` takes, the loop in its `execute` included."""
-    smach.set_shutdown_check(itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
+    smach.set_shutdown_check(
+        itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
     begin = time.perf_counter()
     machine.execute()
     elapsed_s = time.perf_counter() - begin
@@ -71,7 +72,8 @@ def silence() -> None:
 def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--check', action='store_true', help='exit with status 1 where the limit is missed')
+    parser.add_argument('--check', action='store_true',
+                        help='exit with status 1 where the limit is missed')
     parser.add_argument('--transitions', type=int, default=20000, help='transitions in each round')
     parser.add_argument('--rounds', type=int, default=60, help='rounds; the best counts')
     args = parser.parse_args()
@@ -79,12 +81,15 @@ def main() -> int:
     observed = OracleContainer.wrap(two_state_loop())
     observed.events.observers.append(lambda event: None)
     machines = (two_state_loop(), OracleContainer.wrap(two_state_loop()), observed)
-    rounds = [(bare_step_s(args.transitions * 2),) + tuple(machine_step_s(machine, args.transitions)
-                                                            for machine in machines) for _ in range(args.rounds)]
+    rounds = [(bare_step_s(args.transitions * 2),) +
+              tuple(machine_step_s(machine, args.transitions) for machine in machines)
+              for _ in range(args.rounds)]
     bare, engine, wrapped, watched = (min(column) for column in zip(*rounds))
     print('engine: {}'.format(smach.__file__))
-    print('bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f} (limit {:g}), observed too {:.1f}'.format(
-        bare * 1e9, engine / bare, wrapped / bare, LIMIT, watched / bare))
+    print(
+        'bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f} (limit {:g}), observed '
+        'too {:.1f}'
+        .format(bare * 1e9, engine / bare, wrapped / bare, LIMIT, watched / bare))
     return 1 if args.check and wrapped / bare > LIMIT else 0
 
 

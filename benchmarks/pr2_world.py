@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""How fast the simulated PR2 works, and what its time goes into: a few trials of a task on a master of their own.
+"""How fast the simulated PR2 works, and what its time goes into: a few trials of a task on a master
+of their own.
 
     benchmarks/pr2_world.py [--task drink_retrieval] [--trials N] [--oracle] [--check]
 
-Prints the real-time factor (simulated s per wall s), the world's share of the time by what it did, and each state's,
-the robot's planning and perception included. --check fails where simulated time does not run faster than the wall's.
+Prints the real-time factor (simulated s per wall s), the world's share of the time by what it did,
+and each state's, the robot's planning and perception included. --check fails where simulated time
+does not run faster than the wall's.
 """
 import argparse
 import collections
@@ -17,24 +19,33 @@ from typing import Dict, List, Sequence
 
 from smach_oracle.analysis.bag_events import EventReader, find_bags
 from smach_oracle.analysis.trials import TrialSummary, load_trials
-from smach_oracle.oracle.events import Event, EventKind
-from smach_oracle.simulation.experiment.command import main as run_trials
+from smach_oracle.experiment.command import main as run_trials
+from smach_oracle.oracle.records.events import Event, EventKind
 
 LEAST_FACTOR = 1.0
-WAITING = 'waiting for others'  # the world: while a subsystem plans or looks, or nothing is commanded
+# the world: while a subsystem plans or looks, or nothing is commanded
+WAITING = 'waiting for others'
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--task', default='pick_and_place', help='(default: %(default)s)')
     parser.add_argument('--trials', type=int, default=5, help='(default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1, help='of the first trial (default: %(default)s)')
-    parser.add_argument('--oracle', action='store_true', help='recover, and ask the scripted expert')
-    parser.add_argument('--check', action='store_true', help='fail where it is slower than real time')
+    parser.add_argument('--seed', type=int, default=1,
+                        help='of the first trial (default: %(default)s)')
+    parser.add_argument('--oracle', action='store_true',
+                        help='recover, and ask the scripted expert')
+    parser.add_argument('--check', action='store_true',
+                        help='fail where it is slower than real time')
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        words = ['--task', args.task, '--trials', str(args.trials), '--seed', str(args.seed), '--jobs', '1', '--output',
-                 folder + '/trials', '--arms', 'with' if args.oracle else 'without']
+        words = [
+            '--task', args.task, '--trials',
+            str(args.trials), '--seed',
+            str(args.seed), '--jobs', '1', '--output', folder + '/trials', '--variants',
+            'with' if args.oracle else 'without'
+        ]
         with contextlib.redirect_stdout(io.StringIO()) as told:
             code = run_trials(words)
         if code:
@@ -42,7 +53,8 @@ def main() -> int:
             return code
         factor = report(load_trials([folder]).trials, states_of(folder))
     if args.check and factor < LEAST_FACTOR:
-        print('slower than real time: {:.2f}, at least {:.1f} is wanted'.format(factor, LEAST_FACTOR))
+        print('slower than real time: {:.2f}, at least {:.1f} is wanted'.format(
+            factor, LEAST_FACTOR))
         return 1
     return 0
 
@@ -64,7 +76,8 @@ def add_states(events: Sequence[Event], spent: Dict[str, float]) -> None:
             entered[event.state] = event.wall_time
         elif event.kind in (EventKind.TRANSITION, EventKind.FAILURE) and event.state in entered:
             spent[event.state] += event.wall_time - entered.pop(event.state)
-        elif event.kind in (EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP) and event.state in entered:
+        elif event.kind in (EventKind.JUMP, EventKind.SUPERSEDE,
+                            EventKind.GIVE_UP) and event.state in entered:
             spent['(expert)'] += event.wall_time - entered.pop(event.state)
 
 
@@ -72,8 +85,11 @@ def report(trials: List[TrialSummary], states: Dict[str, float]) -> float:
     """Print it all; returns the real-time factor."""
     truths = [trial.truth for trial in trials if trial.truth is not None]
     wall_s, sim_s = sum(truth.wall_s for truth in truths), sum(truth.sim_s for truth in truths)
-    print('{} trials on {} cores: {:.1f} s a trial, {:.1f} s of simulated time; real-time factor {:.2f}'.format(
-        len(truths), os.cpu_count(), wall_s / len(truths), sim_s / len(truths), sim_s / wall_s))
+    print(
+        '{} trials on {} cores: {:.1f} s a trial, {:.1f} s of simulated time; real-time factor '
+        '{:.2f}'
+        .format(len(truths), os.cpu_count(), wall_s / len(truths), sim_s / len(truths),
+                sim_s / wall_s))
     world: Dict[str, float] = collections.defaultdict(float)
     for truth in truths:
         for name, share in truth.share.items():

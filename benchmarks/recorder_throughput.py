@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""How fast a wrapped machine runs while it is recorded, and whether anything is lost or piles up in memory.
+"""How fast a wrapped machine runs while it is recorded, and whether anything is lost or piles up in
+memory.
 
-A two-state loop without work in its states: the executive at its full speed, the worst case for a recorder. Needs no
-ROS master. `recorder_throughput.py --help` shows the options.
+A two-state loop without work in its states: the executive at its full speed, the worst case for a
+recorder. Needs no ROS master. `recorder_throughput.py --help` shows the options.
 """
 import argparse
 import glob
@@ -14,11 +15,11 @@ import tempfile
 import time
 from typing import Any, Callable, List, Optional
 
-import smach
 from rosbags.rosbag1 import Reader
 
+import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.events import Event
+from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.recorder import TrialRecorder
 
 
@@ -70,8 +71,10 @@ def recorded_numbers(folder: str) -> List[int]:
     (path,) = glob.glob(os.path.join(folder, '*.bag'))
     numbers = []
     with Reader(path) as reader:
-        for _, _, data in reader.messages([item for item in reader.connections if item.topic.endswith('events')]):
-            # uint8 kind, Header (seq, stamp, frame_id), float64 wall_time, string trial_id, uint64 seq
+        for _, _, data in reader.messages(
+            [item for item in reader.connections if item.topic.endswith('events')]):
+            # uint8 kind, Header (seq, stamp, frame_id), float64 wall_time, string trial_id, uint64
+            # seq
             start = 1 + 12 + 4 + int.from_bytes(data[13:17], 'little') + 8
             start += 4 + int.from_bytes(data[start:start + 4], 'little')
             numbers.append(int.from_bytes(data[start:start + 8], 'little'))
@@ -83,9 +86,12 @@ def peak_rss_mb() -> float:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--transitions', type=int, default=100_000, help='of the recorded trial (default: %(default)s)')
-    parser.add_argument('--folder', help='for the bags, to try a certain disk (default: that for temporary files)')
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--transitions', type=int, default=100_000,
+                        help='of the recorded trial (default: %(default)s)')
+    parser.add_argument(
+        '--folder', help='for the bags, to try a certain disk (default: that for temporary files)')
     args = parser.parse_args()
     smach.set_loggers(*[lambda text: None] * 4)
     folder = tempfile.mkdtemp(dir=args.folder)
@@ -108,12 +114,15 @@ def measure(transitions: int, folder: str) -> int:
     closing_s = time.perf_counter() - closing
     grown_mb = peak_rss_mb() - before_mb
     whole = recorded_numbers(folder + '/bags') == list(range(count.events)) and closed
-    print('{} transitions, {} events, {:.1f} MB of bag'.format(transitions, count.events, bag_mb(folder + '/bags')))
-    for name, seconds in (('no observer', bare_s), ('an observer that counts', counted_s), ('recorded', recorded_s)):
+    print('{} transitions, {} events, {:.1f} MB of bag'.format(transitions, count.events,
+                                                               bag_mb(folder + '/bags')))
+    for name, seconds in (('no observer', bare_s), ('an observer that counts', counted_s),
+                          ('recorded', recorded_s)):
         print('{:<24} {:8.2f} us per transition {:10.0f} events/s {:7.1f} x'.format(
             name, seconds / transitions * 1e6, count.events / seconds, seconds / bare_s))
     print('written to the end {:.2f} s after the trial'.format(closing_s))
-    print('events lost: {}; numbering without a gap: {}'.format(recorder.losses.events, 'yes' if whole else 'NO'))
+    print('events lost: {}; numbering without a gap: {}'.format(recorder.losses.events,
+                                                                'yes' if whole else 'NO'))
     print('memory: peak grew by {:.1f} MB while recording'.format(grown_mb))
     return 0 if whole else 1
 

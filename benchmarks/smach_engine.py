@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""What a failure-free transition of a machine costs, in steps of the bare loop over the same two states.
+"""What a failure-free transition of a machine costs, in steps of the bare loop over the same two
+states.
 
-    python3 benchmarks/smach_engine.py [--check] [--upstream PATH] [--steps N] [--rounds N] [--transitions N]
+    python3 benchmarks/smach_engine.py [--check] [--upstream PATH] [--steps N] [--rounds N]
+    [--transitions N]
 
-The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced with functions that do
-nothing. The second row reads and writes userdata in each state (`ud.counter = ud.counter + 1`) and is held against the
-same bare loop. Everything is measured in turn in one process, many short rounds; a ratio is that of the medians of the
-fastest quarter of the rounds, so that neighbours on the machine do not count. --upstream measures the smach found at
-PATH as well, in a process of its own with a bare loop of its own. --check ends with status 1 where a limit is broken,
-the last one being that memory stays flat over --transitions transitions.
+The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced with
+functions that do nothing. The second row reads and writes userdata in each state (`ud.counter =
+ud.counter + 1`) and is held against the same bare loop. Everything is measured in turn in one
+process, many short rounds; a ratio is that of the medians of the fastest quarter of the rounds, so
+that neighbours on the machine do not count. --upstream measures the smach found at PATH as well, in
+a process of its own with a bare loop of its own. --check ends with status 1 where a limit is
+broken, the last one being that memory stays flat over --transitions transitions.
 """
 import argparse
 import itertools
@@ -76,7 +79,8 @@ def machine_loop(smach, with_userdata: bool) -> Callable[[int], float]:
         smach.StateMachine.add('B', states['B'], {'y': 'A'})
 
     def run(count: int) -> float:
-        smach.set_shutdown_check(itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
+        smach.set_shutdown_check(
+            itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
         begin = time.perf_counter()
         machine.execute()
         return (time.perf_counter() - begin) / count
@@ -102,7 +106,10 @@ def measure(steps: int, rounds: int) -> Dict[str, float]:
     for _ in range(rounds):
         for name, loop in loops.items():
             times[name].append(loop(steps))
-    return {name: statistics.median(sorted(taken)[:max(1, rounds // 4)]) for name, taken in times.items()}
+    return {
+        name: statistics.median(sorted(taken)[:max(1, rounds // 4)])
+        for name, taken in times.items()
+    }
 
 
 def memory_growth_kb(transitions: int) -> int:
@@ -116,15 +123,22 @@ def memory_growth_kb(transitions: int) -> int:
 
 def measure_in_process(path: str, steps: int, rounds: int) -> Dict[str, float]:
     """The same for the smach at `path`."""
-    command = [sys.executable, os.path.abspath(__file__), '--json', '--steps', str(steps), '--rounds', str(rounds)]
-    done = subprocess.run(command, env=dict(os.environ, PYTHONPATH=path), stdout=subprocess.PIPE, check=True)
+    command = [
+        sys.executable,
+        os.path.abspath(__file__), '--json', '--steps',
+        str(steps), '--rounds',
+        str(rounds)
+    ]
+    done = subprocess.run(command, env=dict(os.environ, PYTHONPATH=path), stdout=subprocess.PIPE,
+                          check=True)
     times: Dict[str, float] = json.loads(done.stdout.decode())
     return times
 
 
 def print_table(ours: Dict[str, float], upstream: Optional[Dict[str, float]]) -> None:
     """Rows of nanoseconds and ratios, as in doc/smach_engine.md."""
-    print('| a step of | ns | x bare loop | limit |%s' % (' upstream ns | upstream x |' if upstream else ''))
+    print('| a step of | ns | x bare loop | limit |%s' %
+          (' upstream ns | upstream x |' if upstream else ''))
     print('|---|---|---|---|%s' % ('---|---|' if upstream else ''))
     for name in ours:
         row = '| %s | %.0f | %.1f | %s |' % (name, ours[name] * 1e9, ours[name] / ours['bare loop'],
@@ -137,9 +151,12 @@ def print_table(ours: Dict[str, float], upstream: Optional[Dict[str, float]]) ->
 def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description='Cost of a transition, in steps of the bare loop.')
-    parser.add_argument('--check', action='store_true', help='end with status 1 where a limit is broken')
-    parser.add_argument('--upstream', metavar='PATH', help='folder with an upstream smach to measure too')
-    parser.add_argument('--steps', type=int, default=3000, help='steps a round (default: %(default)s)')
+    parser.add_argument('--check', action='store_true',
+                        help='end with status 1 where a limit is broken')
+    parser.add_argument('--upstream', metavar='PATH',
+                        help='folder with an upstream smach to measure too')
+    parser.add_argument('--steps', type=int, default=3000,
+                        help='steps a round (default: %(default)s)')
     parser.add_argument('--rounds', type=int, default=200, help='rounds (default: %(default)s)')
     parser.add_argument('--transitions', type=int, default=10000000,
                         help='transitions for the memory check (default: %(default)s)')
@@ -154,14 +171,16 @@ def main() -> int:
         print(json.dumps(measure(arguments.steps, arguments.rounds)))
         return 0
     ours = measure_in_process(SRC, arguments.steps, arguments.rounds)
-    upstream = arguments.upstream and measure_in_process(arguments.upstream, arguments.steps, arguments.rounds)
+    upstream = arguments.upstream and measure_in_process(arguments.upstream, arguments.steps,
+                                                         arguments.rounds)
     print_table(ours, upstream or None)
     if not arguments.check:
         return 0
     broken = [name for name, limit in LIMITS.items() if ours[name] > limit * ours['bare loop']]
     sys.path.insert(0, SRC)
     grown_kb = memory_growth_kb(arguments.transitions)
-    print('memory: %d kB more after %d transitions (limit %d)' % (grown_kb, arguments.transitions, MEMORY_LIMIT_KB))
+    print('memory: %d kB more after %d transitions (limit %d)' %
+          (grown_kb, arguments.transitions, MEMORY_LIMIT_KB))
     if grown_kb > MEMORY_LIMIT_KB:
         broken.append('memory')
     for name in broken:

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""How often a driven hand is told where to go, and how soon it stands: the simulated PR2 at real time, own master.
+"""How often a driven hand is told where to go, and how soon it stands: the simulated PR2 at real
+time, own master.
 
     benchmarks/teleoperation.py [--seconds N] [--stops N] [--check]
 
-Commands come 40 times a second, as a page sends them. Prints the rate of the joint targets as a share of the rate that
-is set, and the world's time from the release, and from the last command of a link that is lost, until all joints stand.
---check fails below 30 targets a second of the world's time, or where the median stop takes more than 100 ms.
+Commands come 40 times a second, as a page sends them. Prints the rate of the joint targets as a
+share of the rate that is set, and the world's time from the release, and from the last command of a
+link that is lost, until all joints stand. --check fails below 30 targets a second of the world's
+time, or where the median stop takes more than 100 ms.
 """
 import argparse
 import os
@@ -34,9 +36,11 @@ class Measured:
         self._now = lambda: rospy.Time.now().to_sec()
         self.person = Person('manipulation_interface')
         self.joints, self.targets = [], []
-        rospy.Subscriber('joint_states', JointState, self.joints.append, queue_size=200, tcp_nodelay=True)
-        rospy.Subscriber('r_arm_controller/command', JointTrajectory, lambda _: self.targets.append(self._now()),
-                         queue_size=200, tcp_nodelay=True)
+        rospy.Subscriber('joint_states', JointState, self.joints.append, queue_size=200,
+                         tcp_nodelay=True)
+        rospy.Subscriber('r_arm_controller/command', JointTrajectory,
+                         lambda _: self.targets.append(self._now()), queue_size=200,
+                         tcp_nodelay=True)
         self.person.start()
         self.person.active()
         self._up = 1
@@ -63,8 +67,10 @@ class Measured:
         told_s = self._now()
         time.sleep(0.6)
         told = [each for each in self.joints if each.header.stamp.to_sec() > told_s - 0.2]
-        return max([after.header.stamp.to_sec() - told_s for before, after in zip(told, told[1:])
-                    if max(abs(a - b) for a, b in zip(after.position, before.position)) > STANDS], default=0.0)
+        return max([
+            after.header.stamp.to_sec() - told_s for before, after in zip(told, told[1:]) if max(
+                abs(a - b) for a, b in zip(after.position, before.position)) > STANDS
+        ], default=0.0)
 
 
 def measure(options):
@@ -75,8 +81,8 @@ def measure(options):
     asked = rospy.get_param('manipulation_interface/rate_hz')
     measured.drive(1.0)
     rate_hz = measured.rate_hz(options.seconds)
-    print('{:.1f} joint targets a second of the world\'s time, {:.2f} of the {:.0f} that are set'.format(
-        rate_hz, rate_hz / asked, asked))
+    print('{:.1f} joint targets a second of the world\'s time, {:.2f} of the {:.0f} that are set'.
+          format(rate_hz, rate_hz / asked, asked))
     good = rate_hz >= LEAST_HZ
     for what, release in (('released', True), ('link lost', False)):
         stops = [measured.stop_s(release) for _ in range(options.stops)]
@@ -88,16 +94,20 @@ def measure(options):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seconds', type=float, default=5.0, help='to drive for the rate (default: %(default)s)')
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--seconds', type=float, default=5.0,
+                        help='to drive for the rate (default: %(default)s)')
     parser.add_argument('--stops', type=int, default=7, help='of each kind (default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='fail outside of the limits')
     options = parser.parse_args()
-    from smach_oracle.simulation.experiment.launching import free_port
+    from smach_oracle.experiment.launching import free_port
     port = free_port()
     os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
-    robot = subprocess.Popen(['roslaunch', '-p', str(port), os.path.join(FIXTURES, 'console_drive_pr2.test')],
-                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    robot = subprocess.Popen(
+        ['roslaunch', '-p',
+         str(port), os.path.join(FIXTURES, 'console_drive_pr2.test')], stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL)
     try:
         wait_for_master(port)
         good = measure(options)

@@ -1,9 +1,11 @@
-"""Say where Python finds a package that is not one of our own stand-ins: ``find_upstream.py NAME [FOLDER...]``.
+"""Say where Python finds a package that is not one of our own stand-ins: ``find_upstream.py NAME
+[FOLDER...]``.
 
-Prints the folder of NAME's ``__init__.py``, or nothing. The FOLDERs are looked at before Python's own path. A copy that
-carries the stand-in marker, in a devel or an install space of ours, does not count: else the second configure would
-take what the first one staged for upstream's. A folder without ``__init__.py`` (a checkout that happens to be named
-``smach``) is no package either. Nothing is imported: the real smach_ros would pull in rospy.
+Prints the folder of NAME's ``__init__.py``, or nothing. The FOLDERs are looked at before Python's
+own path. A copy that carries the stand-in marker, in a devel or an install space of ours, does not
+count: else the second configure would take what the first one staged for upstream's. A folder
+without ``__init__.py`` (a checkout that happens to be named ``smach``) is no package either.
+Nothing is imported: the real smach_ros would pull in rospy.
 """
 import importlib.util
 import os
@@ -15,7 +17,8 @@ OWN_SOURCES = os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__fi
 
 def is_ours(folder: str, name: str) -> bool:
     """Whether `folder` holds NAME as our sources or as a stand-in staged from them."""
-    return os.path.realpath(folder) == OWN_SOURCES or os.path.exists(os.path.join(folder, name, MARKER))
+    return os.path.realpath(folder) == OWN_SOURCES or os.path.exists(
+        os.path.join(folder, name, MARKER))
 
 
 def find_upstream(name: str, folders: list) -> str:
