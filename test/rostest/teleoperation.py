@@ -259,9 +259,10 @@ class Teleoperation(unittest.TestCase):
         refused = self.ann.finish(outcome='finished', outputs=[], text='')
         self.assertEqual(
             (refused.ok, refused.message),
-            (False, "outcome 'finished' is not one of PICK; allowed: aborted, succeeded"))
+            (False, "PICK has no outcome 'finished' to supersede it with; allowed: aborted, "
+             "succeeded"))
         refused = self.ann.finish(outcome='succeeded', outputs=encode_all({'other': 1}), text='')
-        self.assertIn("output 'other' is not one of PICK; allowed: grasp, note", refused.message)
+        self.assertIn("PICK has no output keys other; allowed: grasp, note", refused.message)
         outputs = encode_all({'note': 'by the lid'})
         self.assertTrue(self.ann.finish(outcome='succeeded', outputs=outputs, text='done').ok)
         status, result = result_of(self.sent)

@@ -17,8 +17,9 @@ from smach_oracle.msg import (
     SharedAutonomyResult,
     UserdataItem,
 )
+from smach_oracle.oracle.asking.answer_rules import check_outcome, check_output_keys
 from smach_oracle.oracle.asking.question import names
-from smach_oracle.oracle.errors import OracleError
+from smach_oracle.oracle.errors import AnswerError, OracleError
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode, encode_all
 from smach_oracle.srv import (
     FinishInterface,
@@ -93,11 +94,9 @@ class InterfaceGoal:
         """
         with self._lock:
             goal = self._meant(query_id)
-            if outcome not in goal.outcomes:
-                raise InterfaceGoalError('outcome {!r} is not one of {}; allowed: {}'.format(
-                    outcome, goal.state, names(goal.outcomes)))
+            _check_result(outcome, given, goal)
             outputs = {item.key: item for item in encode_all(known) if item.key in goal.output_keys}
-            outputs.update({item.key: _fitting(item, goal) for item in given})
+            outputs.update({item.key: item for item in given})
             result = SharedAutonomyResult(outcome, [outputs[key] for key in sorted(outputs)], text)
             self._end(lambda handle: handle.set_succeeded(result, text))
 
@@ -222,19 +221,18 @@ class FinishServices:
         return GiveUpInterfaceResponse(True, '')
 
 
-def _fitting(item: UserdataItem, goal: SharedAutonomyGoal) -> UserdataItem:
-    """The item, if it is an output of the goal's state and can be decoded.
+def _check_result(outcome: str, given: Sequence[UserdataItem], goal: SharedAutonomyGoal) -> None:
+    """Check what a person gave against the rules of every answer.
 
-    :raises InterfaceGoalError: where it is not, or cannot.
+    :raises InterfaceGoalError: where it does not fit the goal's state, or cannot be decoded.
     """
-    if item.key not in goal.output_keys:
-        raise InterfaceGoalError('output {!r} is not one of {}; allowed: {}'.format(
-            item.key, goal.state, names(goal.output_keys)))
     try:
-        decode(item)
-    except UserdataCodecError as err:
+        check_outcome(goal.state, outcome, goal.outcomes)
+        check_output_keys(goal.state, [item.key for item in given], goal.output_keys)
+        for item in given:
+            decode(item)
+    except (AnswerError, UserdataCodecError) as err:
         raise InterfaceGoalError(str(err)) from err
-    return item
 
 
 def __getattr__(name: str) -> Any:

@@ -18,6 +18,12 @@ def after(event):
     return Scripted(lambda state, ud: event.wait(20.0) and 'done')
 
 
+def ignore_the_preempt(state, ud):
+    """End once it has come, but leave the request standing."""
+    assert wait_for(state.preempt_requested)
+    return 'done'
+
+
 def flags(container):
     return [state.preempt_requested() for state in container.get_children().values()]
 
@@ -196,10 +202,9 @@ def test_a_child_that_ends_while_it_is_being_asked_has_serviced_the_preempt():
 
 
 def test_a_child_that_ignores_the_preempt_leaves_it_to_the_parent(said):
-    asked = threading.Event()
-    both = concurrence({'A': UntilPreempted(), 'DEAF': after(asked)}, default='done')
-    asker = Once(lambda: len(both.get_active_states()) == 2,
-                 lambda: (both.request_preempt(), asked.set()))
+    heeds, deaf = UntilPreempted(), Scripted(ignore_the_preempt)
+    both = concurrence({'A': heeds, 'DEAF': deaf}, default='done')
+    asker = Once(heeds.started.is_set, both.request_preempt)
     assert both.execute() == 'done' and both.preempt_requested()
     asker.join()
     assert len(that_name(['DEAF'], said('warn'))) == 1 and not that_name(['A'], said('warn'))

@@ -20,10 +20,10 @@ class AnswerChoices(NamedTuple):
 def choices_of(question: Question) -> AnswerChoices:
     """Return what an answer to a question may choose from."""
     return AnswerChoices(question.container_path, question.failed_state,
-                   {choice.state: choice.blocked for choice in question.choices},
-                   [choice.outcome for choice in question.supersede_outcomes],
-                   question.give_up_outcomes, [offer.name for offer in question.interfaces],
-                   question.output_keys)
+                         {choice.state: choice.blocked for choice in question.choices},
+                         [choice.outcome for choice in question.supersede_outcomes],
+                         question.give_up_outcomes, [offer.name for offer in question.interfaces],
+                         question.output_keys)
 
 
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
@@ -32,18 +32,28 @@ def check_answer(answer: Answer, choices: AnswerChoices) -> None:
     :raises AnswerError: where it does not fit; the text says what would.
     """
     _CHECKS[answer.kind](answer, choices)
-    check_output_keys(answer.outputs or (), choices)
+    check_output_keys(choices.failed_state, answer.outputs or (), choices.output_keys)
 
 
-def check_output_keys(keys: Iterable[str], choices: AnswerChoices) -> None:
-    """Check that outputs go to output keys of the failed state.
+def check_output_keys(state: str, keys: Iterable[str], allowed: Sequence[str]) -> None:
+    """Check that outputs go to output keys of a state.
 
     :raises AnswerError: where one does not.
     """
-    unknown = [key for key in keys if key not in choices.output_keys]
+    unknown = [key for key in keys if key not in allowed]
     if unknown:
         raise AnswerError('{} has no output keys {}; allowed: {}'.format(
-            choices.failed_state, names(unknown), names(choices.output_keys)))
+            state, names(unknown), names(allowed)))
+
+
+def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:
+    """Check that a state may be superseded with an outcome.
+
+    :raises AnswerError: where it may not.
+    """
+    if outcome not in allowed:
+        raise AnswerError('{} has no outcome {!r} to supersede it with; allowed: {}'.format(
+            state, outcome, names(allowed)))
 
 
 def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
@@ -57,9 +67,7 @@ def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
 
 
 def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
-    if answer.outcome not in choices.supersede_outcomes:
-        raise AnswerError('{} has no outcome {!r} to supersede it with; allowed: {}'.format(
-            choices.failed_state, answer.outcome, names(choices.supersede_outcomes)))
+    check_outcome(choices.failed_state, answer.outcome, choices.supersede_outcomes)
 
 
 def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:

@@ -34,9 +34,10 @@ def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
 def choices_in(goal: ExpertQueryGoal) -> AnswerChoices:
     """Return what an answer to a question may choose from."""
     return AnswerChoices(goal.container_path, goal.failed_state,
-                   {choice.state: choice.blocked for choice in goal.choices},
-                   [choice.outcome for choice in goal.supersede_outcomes], goal.give_up_outcomes,
-                   [offer.name for offer in goal.interfaces], goal.output_keys)
+                         {choice.state: choice.blocked for choice in goal.choices},
+                         [choice.outcome for choice in goal.supersede_outcomes],
+                         goal.give_up_outcomes, [offer.name for offer in goal.interfaces],
+                         goal.output_keys)
 
 
 def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
@@ -61,7 +62,7 @@ def describe_decision(decision: ExpertDecision) -> str:
 
 def _check_outputs(choices: AnswerChoices, decision: ExpertDecision) -> None:
     keys = [item.key for item in decision.outputs]
-    check_output_keys(keys, choices)
+    check_output_keys(choices.failed_state, keys, choices.output_keys)
     if len(set(keys)) < len(keys):
         raise AnswerError('output keys come twice: {}'.format(
             names({key for key in keys if keys.count(key) > 1})))
