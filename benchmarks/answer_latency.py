@@ -6,7 +6,8 @@ in the expert's process, to the return of `ask` in the robot's, over loopback on
 
 --shared puts the server into a third process, as where one serves many robots. The unit is one call
 of an empty service over the same way, made by the expert right before each answer: a connection of
-its own, expert's process to robot's. --check fails where the median answer takes more than the limit.
+its own, expert's process to robot's. --check fails where the median answer takes more than the
+limit.
 """
 import argparse
 import os
