@@ -36,7 +36,7 @@ class RecordedCause(NamedTuple):
 class BagContent(NamedTuple):
     """What the analysis takes from a bag."""
 
-    events: List[Event]  # in the order of their recording
+    events: List[Event]  # in the order of their stamps; `seq` is that of their happening
     causes: Dict[str, RecordedCause]  # by trial id
     nodes: Dict[str, str]  # by trial id: the node, from the topic of the events
 
