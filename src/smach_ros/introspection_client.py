@@ -7,12 +7,9 @@ import rospy
 
 import smach
 from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus
-from smach_ros.plain_pickle import encode_userdata
+from smach_oracle.ros.introspection.introspection_server import INIT_TOPIC, STATUS_TOPIC
+from smach_oracle.ros.introspection.plain_pickle import encode_userdata
 from smach_ros.waiting import deadline_after, seconds, shutting_down
-
-STATUS_TOPIC = '/smach/container_status'
-INIT_TOPIC = '/smach/container_init'
-STRUCTURE_TOPIC = '/smach/container_structure'
 
 REPEAT_COMMAND_S = 2.0
 LOOK_S = 0.02

@@ -130,7 +130,7 @@ class OracleRunTest(unittest.TestCase):
     def test_an_introspection_server_of_the_scripts_own_is_not_doubled(self) -> None:
         own = SCRIPT.replace(
             'for name in', "viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')\n"
-            'viewer.start()\nfor name in')
+            'viewer.start()\nfor name in') + '\nviewer.stop()\n'  # its threads may be no daemons
         task = oracle_run(self, script(self, own), 'one')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         structure = rospy.wait_for_message('/mine/smach/container_structure',

@@ -13,14 +13,14 @@ from smach_ros_support import InBackground, LogWatch, userdata
 from waiting import stays, wait_for
 
 import smach
-import smach_ros
 from smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
     SmachContainerStructure,
 )
+from smach_oracle.ros.introspection import introspection_server
+from smach_oracle.ros.introspection.plain_pickle import decode_userdata
 from smach_ros import IntrospectionClient, IntrospectionServer
-from smach_ros.plain_pickle import decode_userdata
 
 MD5 = {SmachContainerStatus: '5ba2bb79ac19e3842d562a191f2a675b',
        SmachContainerStructure: '3d3d1e0d0f99779ee9e58101a5dcf7ea',
@@ -129,7 +129,7 @@ class IntrospectionTest(unittest.TestCase):
                 smach.StateMachine.add(str(number), Step(),
                                        {'next': str(number + 1) if number < 59 else 'done'})
         read = threading.Event()
-        with mock.patch.object(smach_ros.introspection, 'BACKLOG_BYTES',
+        with mock.patch.object(introspection_server, 'BACKLOG_BYTES',
                                3000000), LogWatch() as log:
             server = self.serve(machine)
             viewer = rospy.Subscriber(
@@ -139,7 +139,7 @@ class IntrospectionTest(unittest.TestCase):
             self.assertTrue(wait_for(server._status_pub.get_num_connections))
             machine.execute()
             self.assertTrue(wait_for(lambda: not server._changes))
-            self.assertTrue(stays(lambda: smach_ros.introspection._waiting_bytes(
+            self.assertTrue(stays(lambda: introspection_server._waiting_bytes(
                 server._status_pub) < 4000000, 0.2))
         self.assertIn('does not keep up', log.text())
         read.set()

@@ -6,13 +6,10 @@ Started at the first execute of a machine that needs it, so that importing this 
 machines and wrapping them cost nothing and need no ROS master.
 """
 import os
-import sys
 import threading
 import time
 import weakref
-from types import ModuleType
 from typing import (
-    TYPE_CHECKING,
     Any,
     Callable,
     Dict,
@@ -25,22 +22,20 @@ from typing import (
 
 import rospy
 
-import smach
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.settings.paths import path_of
 
+from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
 from .interfaces.starting import OUTPUT_TOPIC
+from .introspection.introspection_server import IntrospectionServer
 from .master_watch import start_master_watch
 from .parameters import private_flag, private_names, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
-
-if TYPE_CHECKING:
-    from smach_ros import IntrospectionServer
 
 PREEMPT_WAIT_S = 1.0  # for machines to end, before their bags are closed under them
 
@@ -68,7 +63,7 @@ class Attachments:
         # those of them that are attached to the node
         self._on_ros: MutableSet[OracleContainer] = weakref.WeakSet()
         # our servers, by path; each holds its machine
-        self._introspection: Dict[str, 'IntrospectionServer'] = {}
+        self._introspection: Dict[str, IntrospectionServer] = {}
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
@@ -207,28 +202,15 @@ def has_introspection(machine: OracleContainer) -> bool:
     for name in ('_start_cbs', '_transition_cbs', '_termination_cbs'):
         callbacks += getattr(machine, name, [])
     owners = [getattr(callback[0], '__self__', callback[0]) for callback in callbacks]
-    return any(type(owner).__module__.split('.')[0] == 'smach_ros' for owner in owners)
+    return any(type(owner).__module__.startswith(('smach_ros.', introspection.__name__ + '.'))
+               for owner in owners)
 
 
-def start_introspection(machine: OracleContainer) -> 'IntrospectionServer':
+def start_introspection(machine: OracleContainer) -> IntrospectionServer:
     """Show the machine, its ORACLE and its nested ones under `<node>/smach/container_*`."""
-    server = _smach_ros().IntrospectionServer(rospy.get_name(), machine,
-                                              '/' + oracle_of(machine).path)
+    server = IntrospectionServer(rospy.get_name(), machine, '/' + oracle_of(machine).path)
     server.start()
     return server
-
-
-def _smach_ros() -> ModuleType:
-    """The module, imported without its side effect: it would send SMACH's log to rospy.
-
-    Where the log goes is for the program to decide.
-    """
-    if 'smach_ros' in sys.modules:
-        return sys.modules['smach_ros']
-    loggers = smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr
-    import smach_ros
-    smach.set_loggers(*loggers)
-    return smach_ros
 
 
 def _snapshot_of_rates(machine: OracleContainer) -> Callable[[], Optional[OracleRates]]:

@@ -67,8 +67,6 @@ class OracleContainer(BareContainer):
 
         See `smach_oracle.oracle.OracleContainer.wrap`.
 
-        See `smach_oracle.oracle.OracleContainer.wrap`.
-
         :raises SettingsError: naming key, value and what is allowed.
         """
         wrapped: OracleContainer = super().wrap(  # type: ignore[assignment]

@@ -20,8 +20,9 @@ class RefusedDataError(ValueError):
 
 
 class _BytesMaker(object):
-    """Stands in for the two calls by which protocol 2 writes bytes; has no state that a pickle
-    could tamper with.
+    """Stands in for the two calls by which protocol 2 writes bytes.
+
+    It has no state that a pickle could tamper with.
     """
 
     __slots__ = ()
@@ -74,8 +75,9 @@ def decode_userdata(text: str) -> Dict[str, Any]:
 
 
 def encode_userdata(data: Mapping[str, Any], leave_out: Callable[[str, Exception], None]) -> str:
-    """``data`` for ``local_data``. A key that cannot be pickled is left out and handed to
-    ``leave_out(key, error)``.
+    """Return ``data`` as ``local_data``.
+
+    A key that cannot be pickled is left out and handed to ``leave_out(key, error)``.
     """
     try:
         return _encode(dict(data))

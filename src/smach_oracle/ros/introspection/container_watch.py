@@ -12,8 +12,9 @@ ended.
 
 
 class _Hook(object):
-    """The callback a container holds. Pickled or copied with its machine it becomes one that does
-    nothing.
+    """The callback a container holds.
+
+    Pickled or copied with its machine it becomes one that does nothing.
     """
 
     def __init__(self, watch: Optional['ContainerWatch'], info: str) -> None:
@@ -84,9 +85,9 @@ def _children(container: Any) -> Dict[str, Any]:
 
 
 class ContainerTree(object):
-    """All containers below a root, found again at each ``refresh``: machines grow, and get wrapped.
+    """All containers below a root.
 
-    Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at
+    They are found again at each ``refresh``, since machines grow and get wrapped. Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at
     runs at its speed.
     """
 

@@ -1,0 +1,1 @@
+"""What a machine is and does, published for viewers: for our engine and for upstream's."""
