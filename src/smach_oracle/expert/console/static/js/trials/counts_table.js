@@ -5,7 +5,7 @@ import { percent } from '../page/format.js';
 
 /** @typedef {import('../server').CountsRow} CountsRow */
 
-const COLUMNS = ['Experiment', 'Arm', 'Runs', 'Failures', 'Oracle recoveries', 'Questions',
+const COLUMNS = ['Experiment', 'Variant', 'Runs', 'Failures', 'Oracle recoveries', 'Questions',
   'Expert interventions', 'Ended in failure'];
 
 /**
