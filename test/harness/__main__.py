@@ -1,6 +1,7 @@
 """Run the checks, say what each found and how long it took, and end with `N passed, N failed`.
 
-The line above that one counts the checks that needed a second attempt, and names them.
+The lines above that one tell what was found on upstream's SMACH, and count the checks that needed
+a second attempt.
 
 Called by scripts/test, in the environment of scripts/ros_env.
 """
@@ -11,19 +12,30 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from typing import Dict, List
+from typing import Dict, List, Optional
 
-from checks import Bench, Check, benchmark_checks, lint_checks, pytest_checks, rostest_checks
+from checks import (
+    Bench,
+    Check,
+    benchmark_checks,
+    lint_checks,
+    pytest_checks,
+    rostest_checks,
+    upstream_checks,
+)
 from processes import Runner
-from report import Outcome, second_attempts, show, write_junit
+from report import Outcome, on_upstream, second_attempts, show, write_junit
+from upstream import UpstreamError, environment
 
 ROOT = Path(__file__).resolve().parents[2]
 # what may run side by side: rostests wait most of their time, benchmarks must be alone
-JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'package': 1, 'bench': 1}
+JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'upstream': 2, 'package': 1, 'bench': 1}
 
 
-def find_checks(group: str) -> Dict[str, Check]:
+def find_checks(group: str, upstream: Optional[Path]) -> Dict[str, Check]:
     """The checks of one group, by name."""
+    if group == 'upstream':
+        return upstream_checks(ROOT, upstream) if upstream is not None else {}
     if group == 'lint':
         return lint_checks(ROOT)
     if group == 'unit':
@@ -65,11 +77,25 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         'group', nargs='?', choices=sorted(JOBS) + ['all'], default='all',
         help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
-        'package: build and install; bench: limits on speed (default: all)')
+        'upstream: on the engine of --upstream; package: build and install; bench: limits on '
+        'speed (default: all)')
     parser.add_argument('pattern', nargs='?', default='',
                         help='only checks with this in their name; * is a wildcard')
     parser.add_argument('--jobs', type=int, help='checks at a time (default: 2, benchmarks 1)')
-    return parser.parse_args()
+    parser.add_argument(
+        '--upstream', metavar='PATH', type=Path,
+        help='a checkout of ros/executive_smach, branch noetic-devel: the tests of the executive, '
+        'of SMACH and of wrapped machines run on it too')
+    arguments = parser.parse_args()
+    if arguments.group == 'upstream' and arguments.upstream is None:
+        parser.error('upstream needs --upstream PATH')
+    if arguments.upstream is not None:
+        arguments.upstream = arguments.upstream.resolve()
+        try:
+            environment(arguments.upstream)
+        except UpstreamError as err:
+            parser.error('--upstream: {}'.format(err))
+    return arguments
 
 
 def _interrupt(number: int, frame: object) -> None:
@@ -88,7 +114,7 @@ def main() -> int:
     outcomes: List[Outcome] = []
     try:
         for group in JOBS if arguments.group == 'all' else [arguments.group]:
-            checks = select(find_checks(group), arguments.pattern)
+            checks = select(find_checks(group, arguments.upstream), arguments.pattern)
             if checks:
                 print('--- {}'.format(group))
                 outcomes += run_group(checks, bench, arguments.jobs or JOBS[group])
@@ -113,6 +139,7 @@ def _summarise(outcomes: List[Outcome], bench: Bench, seconds: float) -> int:
     # nothing
     failed += sum(1
                   for outcome in outcomes if not outcome.ok and not outcome.failed) + (not outcomes)
+    print(on_upstream(outcomes))
     print(second_attempts(outcomes))
     print('{} passed, {} failed'.format(passed, failed))
     return 1 if failed else 0

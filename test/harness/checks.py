@@ -1,4 +1,5 @@
 """The checks of scripts/test, by group. Each takes a `Bench` and returns an `Outcome`."""
+import fnmatch
 import os
 import shutil
 import sys
@@ -11,6 +12,7 @@ from typing import Callable, Dict, List, Optional
 
 from processes import Runner
 from report import Outcome, read_junit, tail_of
+from upstream import ROSTESTS, UNIT_TESTS, environment
 
 PACKAGE = 'smach_oracle'
 PYTHON_SOURCES = ['src', 'scripts', 'test', 'benchmarks', 'cmake', 'setup.py']
@@ -80,13 +82,15 @@ def pytest_checks(root: Path, folder: str, by_folder: bool) -> Dict[str, Check]:
     return {name: partial(_pytest, name) for name in names}
 
 
-def _pytest(name: str, bench: Bench) -> Outcome:
-    result = bench.results / '{}.xml'.format(name.replace('/', '-'))
+def _pytest(name: str, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None
+            ) -> Outcome:
+    shown = shown or name
+    result = bench.results / '{}.xml'.format(shown.replace('/', '-'))
     command = [
         sys.executable, '-m', 'pytest', '-q', '--tb=short', '--junit-xml',
         str(result), 'test/' + name
     ]
-    return _with_junit(bench.run(name, command, 600.0), [result])
+    return _with_junit(bench.run(shown, command, 600.0, env), [result])
 
 
 def _with_junit(outcome: Outcome, results: List[Path]) -> Outcome:
@@ -106,9 +110,28 @@ def rostest_checks(root: Path) -> Dict[str, Check]:
     return {'rostest/' + path.stem: partial(_rostest, path) for path in tests}
 
 
-def _rostest(path: Path, bench: Bench) -> Outcome:
+def upstream_checks(root: Path, checkout: Path) -> Dict[str, Check]:
+    """What touches the executive or smach_ros, on upstream's.
+
+    :raises UpstreamError: where `checkout` has no such packages.
+    """
+    env = environment(checkout)
+    checks: Dict[str, Check] = {}
+    for folder in UNIT_TESTS:
+        name = 'unit/' + folder
+        checks['upstream/' + name] = partial(_pytest, name, shown='upstream/' + name, env=env)
+    for path in sorted((root / 'test' / 'rostest').glob('*.test')):
+        if any(fnmatch.fnmatch(path.stem, pattern) for pattern in ROSTESTS):
+            name = 'upstream/rostest/' + path.stem
+            checks[name] = partial(_rostest, path, shown=name, env=env)
+    return checks
+
+
+def _rostest(path: Path, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None
+             ) -> Outcome:
     """As rostest's own attribute `retry`: a machine busy with other tests is no failure."""
-    return _at_most_twice(partial(_run_rostest, path, bench), bench)
+    shown = shown or 'rostest/' + path.stem
+    return _at_most_twice(partial(_run_rostest, path, bench, shown, env), bench)
 
 
 def _at_most_twice(attempt: Attempt, bench: Bench) -> Outcome:
@@ -133,16 +156,17 @@ def _kept(log: str) -> str:
     return str(path.rename(path.with_suffix('.first' + path.suffix)))
 
 
-def _run_rostest(path: Path, bench: Bench) -> Outcome:
+def _run_rostest(path: Path, bench: Bench, shown: str, more_env: Optional[Dict[str, str]]
+                 ) -> Outcome:
     command = ['rostest', '--package', PACKAGE, '--pkgdir', str(bench.root), str(path)]
-    folder = bench.results / 'rostest' / path.stem
+    folder = bench.results / shown
     # rostest hands the place of the results on unquoted: it must not have a space in it
     scratch = Path(tempfile.mkdtemp(prefix='rostest-'))
     env = {
         'ROS_TEST_RESULTS_DIR': str(scratch), 'ROS_LOG_DIR': str(scratch / 'log'),
         'ROS_HOME': str(scratch / 'home')
     }
-    outcome = bench.run('rostest/' + path.stem, command, MAX_ROSTEST_S, env)
+    outcome = bench.run(shown, command, MAX_ROSTEST_S, dict(env, **(more_env or {})))
     shutil.rmtree(str(folder), ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     shutil.move(str(scratch), str(folder))

@@ -81,6 +81,16 @@ def show(outcome: Outcome) -> None:
         print('\n'.join('     . ' + line for line in outcome.note.rstrip().splitlines()))
 
 
+def on_upstream(outcomes: Iterable[Outcome]) -> str:
+    """The line about the checks on upstream's SMACH."""
+    found = [outcome for outcome in outcomes if outcome.name.startswith('upstream/')]
+    if not found:
+        return 'upstream: not run'
+    passed, skipped = sum(each.passed for each in found), sum(each.skipped for each in found)
+    return 'upstream: {} passed, {} failed, {} skipped'.format(
+        passed, sum(max(each.failed, int(not each.ok)) for each in found), skipped)
+
+
 def second_attempts(outcomes: Iterable[Outcome]) -> str:
     """How many checks were tried twice, and which; said also where none was."""
     again = ['{} ({})'.format(outcome.name, 'passed then' if outcome.ok else 'failed again')

@@ -38,7 +38,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 BASE, CAMERA = 'base_footprint', 'wide_stereo_optical_frame'
 TOOLS = {'left': 'l_gripper_tool_frame', 'right': 'r_gripper_tool_frame'}
 FINGER = 'r_gripper_l_finger_joint'  # m, 0 closed
-STOPS_WITHIN_S = 0.1  # of the world's time
+STOPS_WITHIN_S = 0.2  # of the world's time; benchmarks/teleoperation.py tells how soon it is
 STANDS = 2e-4  # rad between two joint states, 1/60 s apart
 QUESTION = '.question-row[data-key^="/alpha/"]'
 
@@ -149,7 +149,7 @@ class Drive(unittest.TestCase):
         return (self.stands(side) - begin)[:3, 3]
 
     def assert_along(self, way, axis):
-        self.assertGreater(way @ axis / np.linalg.norm(way), 0.98, (way, axis))
+        self.assertGreater(way @ axis / np.linalg.norm(way), 0.95, (way, axis))
 
     def take_the_wheel(self):
         """Or keep it; what the page says counts once the console agrees."""

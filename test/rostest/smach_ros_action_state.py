@@ -18,6 +18,7 @@ from smach_ros_support import (
     InBackground,
     LogWatch,
     TellingState,
+    improvement,
     userdata,
 )
 from waiting import wait_for
@@ -110,6 +111,7 @@ class SimpleActionStateTest(unittest.TestCase):
             action_state(Behaviour.ABORT, result_slots=['result']).execute(data), 'aborted')
         self.assertEqual(data.result, -1)
 
+    @improvement
     def test_goal_callback_fills_or_replaces_and_leaves_the_scripts_goal_alone(self):
         def fill(ud, goal, step, times=1):
             goal.goal += step * times
@@ -180,6 +182,7 @@ class SimpleActionStateTest(unittest.TestCase):
                          output_keys=['result']).execute(data), 'succeeded')
         self.assertEqual(data.result, 151)
 
+    @improvement
     def test_a_callback_that_raises_or_invents_an_outcome_aborts_and_says_so(self):
         with LogWatch() as log:
             self.assertEqual(
@@ -191,6 +194,7 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertEqual(log.text().count('ZeroDivisionError: division by zero'), 2)
         self.assertIn("'invented'", log.text())
 
+    @improvement
     def test_wrong_arguments_are_named(self):
         for wrong, name in (({'goal_slots': ['gaol']}, 'gaol'), ({'result_slots': ['rusult']},
                                                                  'rusult'),
@@ -198,11 +202,13 @@ class SimpleActionStateTest(unittest.TestCase):
             with self.assertRaisesRegex(smach.InvalidStateError, name):
                 action_state(**wrong)
 
+    @improvement
     def test_an_invalid_goal_is_refused_and_the_next_one_gets_through(self):
         with self.assertRaisesRegex(smach.InvalidUserCodeError, 'TestGoal'):
             action_state(goal_cb=lambda ud, goal: TestGoal('many')).execute(userdata())
         self.assertEqual(action_state(150).execute(userdata()), 'succeeded')
 
+    @improvement
     def test_overridden_callbacks_are_told_everything(self):
         # status, feedback and result come by a topic each: what is late is not told
         for _ in range(3):
@@ -216,6 +222,7 @@ class SimpleActionStateTest(unittest.TestCase):
                 return
         self.fail(state.seen)
 
+    @improvement
     def test_each_preempt_works_not_only_the_first(self):
         state = action_state(Behaviour.HANG)
         for _ in range(3):
@@ -233,6 +240,7 @@ class SimpleActionStateTest(unittest.TestCase):
         state.request_preempt()
         self.assertEqual(state.execute(userdata()), 'preempted')
 
+    @improvement
     def test_a_server_that_succeeds_on_cancel_does_not_swallow_the_machines_preempt(self):
         machine = smach.StateMachine(outcomes=['done', 'preempted', 'aborted'])
         first = action_state(Behaviour.SUCCEED_ON_CANCEL)
@@ -259,6 +267,7 @@ class SimpleActionStateTest(unittest.TestCase):
         state.request_preempt()
         self.assertEqual(run.outcome(), 'preempted')
 
+    @improvement
     def test_an_absent_server_aborts_after_its_time_and_a_preempt_does_not_wait_for_it(self):
         absent = SimpleActionState('absent', TestAction, server_wait_timeout=rospy.Duration(0.5))
         with LogWatch() as log:
@@ -271,6 +280,7 @@ class SimpleActionStateTest(unittest.TestCase):
         # not after the minute that a server may take to come
         self.assertEqual(run.outcome(20.0), 'preempted')
 
+    @improvement
     def test_ctrl_c_ends_the_state_and_cancels_the_goal(self):
         statuses = {}
         rospy.Subscriber('work/status', GoalStatusArray, lambda message: statuses.update(

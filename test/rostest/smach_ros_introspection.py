@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""IntrospectionServer and IntrospectionClient over real topics, as a viewer would see them."""
+"""Our introspection server over real topics, as a viewer and smach_ros's client see it."""
 import base64
 import pickle
 import subprocess
@@ -19,8 +19,9 @@ from smach_msgs.msg import (
     SmachContainerStructure,
 )
 from smach_oracle.ros.introspection import introspection_server
+from smach_oracle.ros.introspection.introspection_server import IntrospectionServer
 from smach_oracle.ros.introspection.plain_pickle import decode_userdata
-from smach_ros import IntrospectionClient, IntrospectionServer
+from smach_ros import IntrospectionClient
 
 MD5 = {SmachContainerStatus: '5ba2bb79ac19e3842d562a191f2a675b',
        SmachContainerStructure: '3d3d1e0d0f99779ee9e58101a5dcf7ea',
@@ -235,14 +236,16 @@ class IntrospectionTest(unittest.TestCase):
                                      rospy.Duration(30.0)))
         machine.execute()
         self.assertEqual((visits, machine.userdata.x), (['B'], b'5'))
-        self.assertTrue(client.set_initial_state(self.name, '/ROOT/IN', ['Y'], timeout=30.0))
+        self.assertTrue(client.set_initial_state(self.name, '/ROOT/IN', ['Y'],
+                                                 timeout=rospy.Duration(30.0)))
         self.assertEqual(inner.get_initial_states(), ['Y'])
         confirmed = []
         with LogWatch() as log:
             self.assertTrue(wait_for(lambda: confirmed.append(client.set_initial_state(
-                self.name, '/ROOT', ['NOWHERE'], timeout=1.0)) or 'NOWHERE' in log.text()))
+                self.name, '/ROOT', ['NOWHERE'], timeout=rospy.Duration(1.0))) or 'NOWHERE' in log.text()))
         self.assertFalse(any(confirmed))
-        self.assertFalse(client.set_initial_state(self.name, '/ELSEWHERE', ['A'], timeout=0.3))
+        self.assertFalse(client.set_initial_state(self.name, '/ELSEWHERE', ['A'],
+                                                  timeout=rospy.Duration(0.3)))
 
     def test_running_machine_goes_there_at_its_next_transition(self):
         gate, visits = threading.Semaphore(0), []
@@ -251,7 +254,8 @@ class IntrospectionTest(unittest.TestCase):
         run = InBackground(machine)
         self.assertTrue(wait_for(lambda: visits == ['A']))
         self.assertTrue(IntrospectionClient().set_initial_state(self.name, '/ROOT', ['B'],
-                                                                userdata(y=1), 30.0))
+                                                                userdata(y=1),
+                                                                rospy.Duration(30.0)))
         gate.release(5)
         self.assertEqual(run.outcome(), 'done')
         self.assertEqual((visits, machine.userdata.y), (['A', 'B'], 1))

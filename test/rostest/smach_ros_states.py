@@ -12,7 +12,7 @@ import unittest
 import rosgraph
 import rospy
 import rostest
-from smach_ros_support import HERE, InBackground, LogWatch, userdata
+from smach_ros_support import HERE, InBackground, LogWatch, improvement, userdata
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 from waiting import wait_for
@@ -48,6 +48,7 @@ class ServiceStateTest(unittest.TestCase):
         self.assertEqual(state.execute(data), 'succeeded')
         self.assertEqual((data.message, data.whole.success), ('done', True))
 
+    @improvement
     def test_request_from_key_and_callbacks_with_their_interfaces(self):
         @smach.cb_interface(input_keys=['wish'])
         def ask(ud, request, negate):
@@ -76,6 +77,7 @@ class ServiceStateTest(unittest.TestCase):
         self.assertEqual(state.execute(data), 'succeeded')
         self.assertEqual(data.message, 'done')
 
+    @improvement
     def test_a_service_that_has_gone_since_the_last_call_aborts(self):
         service = rospy.Service('brief', SetBool, set_bool)
         state = ServiceState('brief', SetBool, SetBoolRequest(True))
@@ -88,6 +90,7 @@ class ServiceStateTest(unittest.TestCase):
         self.addCleanup(service.shutdown)
         self.assertEqual(state.execute(userdata()), 'succeeded')
 
+    @improvement
     def test_what_goes_wrong_aborts_and_is_logged(self):
         request = SetBoolRequest(True)
         for state, words in ((ServiceState('switch', SetBool, SetBoolRequest(False)), 'will not'),
@@ -103,6 +106,7 @@ class ServiceStateTest(unittest.TestCase):
                 self.assertEqual(state.execute(userdata()), 'aborted')
             self.assertIn(words, log.text())
 
+    @improvement
     def test_absent_service_is_awaited_and_a_preempt_ends_the_wait(self):
         state = ServiceState('later', SetBool, SetBoolRequest(True))
         run = InBackground(state, userdata())
@@ -114,6 +118,7 @@ class ServiceStateTest(unittest.TestCase):
         self.assertEqual(run.outcome(), 'succeeded')
         service.shutdown()
 
+    @improvement
     def test_service_that_does_not_answer_cannot_hold_a_preempt_for_ever(self):
         state = ServiceState('slow', SetBool, SetBoolRequest(True), preempt_timeout=0.5)
         run = InBackground(state, userdata())
@@ -122,6 +127,7 @@ class ServiceStateTest(unittest.TestCase):
         self.assertEqual(run.outcome(), 'preempted')
         self.release.set()
 
+    @improvement
     def test_call_that_ends_soon_after_a_preempt_counts(self):
         called, preempted = threading.Event(), threading.Event()
 
@@ -157,6 +163,7 @@ class MonitorStateTest(unittest.TestCase):
             self.publisher.publish(value)
         return run
 
+    @improvement
     def test_first_false_message_is_invalid(self):
         seen = []
         state = MonitorState(self.topic, Int32,
@@ -180,6 +187,7 @@ class MonitorStateTest(unittest.TestCase):
         self.assertEqual(self.watch(state, data, [5]).outcome(), 'invalid')
         self.assertEqual(data.last, 15)
 
+    @improvement
     def test_callback_that_raises_is_invalid_and_logged(self):
         state = MonitorState(self.topic, Int32, lambda ud, message: 1 / message.data)
         with LogWatch() as log:
@@ -245,6 +253,7 @@ class ConditionStateTest(unittest.TestCase):
     def test_no_time_at_all_means_no_limit(self):
         self.assertEqual(self.count(5, max_checks=-1, timeout=rospy.Duration(0)), ('true', 5))
 
+    @improvement
     def test_preempt_ends_a_long_pause(self):
         looked = threading.Event()
         state = ConditionState(lambda ud: looked.set(), poll_rate=rospy.Duration(60.0),
@@ -276,6 +285,7 @@ class CtrlCTest(unittest.TestCase):
         self.assertLess(time.monotonic() - begin, 6.0)
         return (said + rest).decode()
 
+    @improvement
     def test_handler_preempts_a_machine_in_the_main_thread(self):
         self.assertIn('ended: preempted', self.press('main', 'handler'))
 
@@ -284,14 +294,17 @@ class CtrlCTest(unittest.TestCase):
         self.assertIn('ended: preempted', said)
         self.assertIn('while up: True', said)
 
+    @improvement
     def test_states_of_ours_end_without_a_handler_too(self):
         self.assertIn('ended: preempted', self.press('main', 'none'))
 
+    @improvement
     def test_where_rospy_leaves_signals_alone_the_handler_takes_them(self):
         self.assertIn('ended: preempted', self.press('main', 'unsignalled'))
 
 
 class NoMasterTest(unittest.TestCase):
+    @improvement
     def test_ctrl_c_ends_states_that_began_while_the_master_was_away(self):
         port = free_port()
         master = subprocess.Popen(

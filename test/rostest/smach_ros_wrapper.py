@@ -8,7 +8,7 @@ import rospy
 import rostest
 from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
 from actionlib_msgs.msg import GoalStatus
-from smach_ros_support import LogWatch
+from smach_ros_support import LogWatch, improvement
 from waiting import wait_for
 
 import smach
@@ -81,6 +81,7 @@ class WrapperTest(unittest.TestCase):
             self.assertEqual(self.client.get_result().result, number + 1)
             self.assertEqual(self.feedback, [1])
 
+    @improvement
     def test_slot_maps_rename_single_fields(self):
         def start(state, ud):
             ud.progress = 30
@@ -105,6 +106,7 @@ class WrapperTest(unittest.TestCase):
         self.assertEqual(self.ask(7), GoalStatus.SUCCEEDED)
         self.assertEqual(self.client.get_result().result, 21)
 
+    @improvement
     def test_outcome_lists_decide_how_the_goal_ends(self):
         self.serve(lambda state, ud: OUTCOMES[ud.action_goal.goal])
         with LogWatch() as log:
@@ -114,12 +116,14 @@ class WrapperTest(unittest.TestCase):
             [GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED, GoalStatus.ABORTED])
         self.assertIn("outcome 'odd'", log.text())
 
+    @improvement
     def test_exception_aborts_with_its_text_and_the_server_goes_on(self):
         self.serve(lambda state, ud: 'good' if 1 / ud.action_goal.goal else 'bad')
         self.assertEqual(self.ask(0), GoalStatus.ABORTED)
         self.assertIn('division by zero', self.client.get_goal_status_text())
         self.assertEqual(self.ask(1), GoalStatus.SUCCEEDED)
 
+    @improvement
     def test_missing_result_key_aborts_and_says_which(self):
         self.serve(lambda state, ud: 'good', result_slots_map={'result': 'answer'})
         self.assertEqual(self.ask(1), GoalStatus.ABORTED)
@@ -144,6 +148,7 @@ class WrapperTest(unittest.TestCase):
         self.assertEqual(other.get_state(), GoalStatus.SUCCEEDED)
         self.assertEqual(self.client.get_state(), GoalStatus.PREEMPTED)
 
+    @improvement
     def test_cancel_that_came_too_late_does_not_stop_the_next_goal(self):
         release = threading.Event()
 
@@ -164,6 +169,7 @@ class WrapperTest(unittest.TestCase):
         self.assertEqual(self.client.get_state(), GoalStatus.SUCCEEDED)
         self.assertEqual(self.ask(2), GoalStatus.SUCCEEDED)
 
+    @improvement
     def test_mistakes_are_logged_when_the_wrapper_is_made(self):
         machine = smach.StateMachine(outcomes=['good'])
         with LogWatch() as log:

@@ -12,9 +12,17 @@ from waiting import wait_for
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
 import checks  # noqa: E402
-from checks import Bench, benchmark_checks, rostest_checks  # noqa: E402
+import upstream  # noqa: E402
+from checks import Bench, benchmark_checks, rostest_checks, upstream_checks  # noqa: E402
 from processes import Runner, kill_marked  # noqa: E402
-from report import Outcome, read_junit, second_attempts, show, write_junit  # noqa: E402
+from report import (  # noqa: E402
+    Outcome,
+    on_upstream,
+    read_junit,
+    second_attempts,
+    show,
+    write_junit,
+)
 
 JUNIT = '''<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
 <testcase classname="a" name="bad"><failure>1 is not 2</failure></testcase>
@@ -117,6 +125,49 @@ def test_a_rostest_that_hangs_is_ended_by_rostest_which_tells_the_case(path):
     ) + 60.0 <= checks.MAX_ROSTEST_S, 'no time is left for roslaunch to start and end its nodes'
 
 
+@pytest.fixture
+def checkout(tmp_path):
+    for name in ('smach', 'smach_ros'):
+        package = tmp_path / name / 'src' / name
+        package.mkdir(parents=True)
+        (package / '__init__.py').write_text('')
+    return tmp_path
+
+
+def test_upstream_comes_before_ours(checkout, monkeypatch):
+    monkeypatch.setenv('PYTHONPATH', '/ours')
+    env = upstream.environment(checkout)
+    assert env['PYTHONPATH'].split(os.pathsep) == [
+        str(checkout / 'smach/src'), str(checkout / 'smach_ros/src'), '/ours'
+    ]
+    assert env['SMACH_UPSTREAM'] == str(checkout / 'smach/src')
+
+
+def test_a_folder_that_is_no_checkout_is_told_before_anything_runs(tmp_path):
+    with pytest.raises(upstream.UpstreamError, match='smach/__init__.py is missing: give a check'):
+        upstream_checks(ROOT, tmp_path)
+    refused = subprocess.run([sys.executable, str(ROOT / 'test/harness'), '--upstream',
+                              str(tmp_path)], stderr=subprocess.PIPE, timeout=60, check=False)
+    assert refused.returncode == 2 and b'__init__.py is missing' in refused.stderr
+
+
+def test_each_name_of_a_test_on_upstream_is_that_of_a_test(checkout):
+    names = set(upstream_checks(ROOT, checkout))
+    for folder in upstream.UNIT_TESTS:
+        assert list((ROOT / 'test/unit' / folder).glob('**/test_*.py')), folder
+    for pattern in upstream.ROSTESTS:
+        assert list((ROOT / 'test/rostest').glob(pattern + '.test')), pattern
+    assert {'upstream/unit/oracle', 'upstream/rostest/oracle_library'} < names
+
+
+def test_the_summary_says_what_upstream_gave_or_that_it_was_not_run():
+    ours = Outcome('unit/oracle', passed=5)
+    assert on_upstream([ours]) == 'upstream: not run'
+    found = [ours, Outcome('upstream/unit/oracle', passed=3, skipped=1),
+             Outcome('upstream/unit/smach', failed=2, passed=1), Outcome('upstream/rostest/none')]
+    assert on_upstream(found) == 'upstream: 4 passed, 3 failed, 1 skipped'
+
+
 # a benchmark that passes or not as the file `left` says, one letter a run
 HELD = '''
 import sys
@@ -146,7 +197,7 @@ def test_a_rostest_has_a_second_attempt_that_everybody_sees(
         bench, monkeypatch, capsys, left, ok, attempts):
     runs = list(left)
 
-    def run(path, bench):
+    def run(path, *_):
         passed = runs.pop(0) == 'y'
         return Outcome(path.stem, passed=int(passed), failed=int(not passed),
                        detail='' if passed else '1 is not 2')
@@ -176,7 +227,7 @@ def test_that_no_second_attempt_was_needed_is_said_too():
 
 def test_an_interrupt_is_no_reason_for_a_second_attempt(bench, monkeypatch):
     runs = []
-    monkeypatch.setattr(checks, '_run_rostest', lambda path, bench: runs.append(path) or Outcome(
+    monkeypatch.setattr(checks, '_run_rostest', lambda path, *_: runs.append(path) or Outcome(
         path.stem, failed=1, detail='interrupted'))
     (bench.root / 'test/rostest').mkdir(parents=True)
     (bench.root / 'test/rostest/one.test').touch()

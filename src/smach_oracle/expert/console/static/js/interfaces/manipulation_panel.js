@@ -110,7 +110,8 @@ export class ManipulationPanel {
   /** @param {DriveFrame} name */
   frameButton(name) {
     return h('button', { class: 'tool', 'data-frame': name,
-      onclick: () => { this.frame = this.choose(name); } }, FRAMES[name]);
+      onclick: () => { remember('drive frame', name); this.frame = this.choose(name); } },
+      FRAMES[name]);
   }
 
   /** @param {Move} move */
@@ -163,7 +164,6 @@ export class ManipulationPanel {
    */
   choose(frame) {
     this.input.releaseAll();
-    remember('drive frame', frame);
     for (const button of Object.values(this.frames)) {
       button.setAttribute('aria-pressed', String(button === this.frames[frame]));
     }
