@@ -12,8 +12,8 @@ from ..machine.failure import (
     visit_result,
 )
 from ..machine.node import Node
-from ..machine.userdata_gate import UserdataGate, behind
-from ..machine.userdata_view import view_of
+from ..machine.userdata_gate import UserdataGate
+from ..machine.userdata_view import view_behind
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
@@ -93,11 +93,10 @@ class Step:
             smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and is '
                           'dropped'.format(node.path, label, key))
 
-        def make_view(gate: UserdataGate) -> smach.Remapper:
-            return view_of(self._machine, label, state, behind(gate))
-
-        result = node.tree.workers.run(state, make_view, UserdataGate(self._machine, on_late_write),
-                                       label, limit_s, self._record.settings.grace_period_s)
+        gate = UserdataGate(self._machine, on_late_write)
+        result = node.tree.workers.run(
+            state, view_behind(gate, self._machine, label, state), gate, label, limit_s,
+            self._record.settings.grace_period_s)
         if result.error is not None:
             raise result.error
         return Overrun(result.overrun) if result.overrun else result.outcome

@@ -6,6 +6,7 @@ import smach
 
 from .node import Node
 from .protocols import Machine
+from .userdata_gate import UserdataGate, behind
 
 
 class _WithConstants(MutableMapping):
@@ -52,6 +53,12 @@ def view_of(machine: Machine, label: str, state: smach.State,
         userdata = shown
     return smach.Remapper(userdata, state.get_registered_input_keys(),
                           state.get_registered_output_keys(), remapping)
+
+
+def view_behind(gate: UserdataGate, machine: Machine, label: str,
+                state: smach.State) -> smach.Remapper:
+    """Return what `view_of` does for the container's userdata, behind a gate."""
+    return view_of(machine, label, state, behind(gate))
 
 
 def _keeps_key_sets() -> bool:
