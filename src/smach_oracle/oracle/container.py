@@ -14,9 +14,9 @@ from .execution.trial import run_container
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.nesting import nodes_of
-from .machine.node import Node
 from .machine.oracle import StateRateRow, TransitionRow, oracle_of
 from .machine.tree import Tree, new_id
+from .machine.tree_node import TreeNode
 from .machine.userdata_view import StateView
 from .records.events import EventKind
 from .records.rates_file import read_rates, write_rates
@@ -56,7 +56,7 @@ class OracleContainer(smach.StateMachine):
         """
         checked = as_settings(settings, preconditions)
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
-        self._oracle = Node(self, Tree(OracleContainer, recover, expert), checked, name)
+        self._oracle = TreeNode(self, Tree(OracleContainer, recover, expert), checked, name)
         self._oracle.strict = strict
 
     @classmethod

@@ -11,7 +11,7 @@ from ..machine.failure import (
     natural_ending,
     visit_result,
 )
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
 from ..records.events import EventKind, FailureKind
@@ -23,7 +23,7 @@ from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 
 
-def before_step(node: Node) -> None:
+def before_step(node: TreeNode) -> None:
     """Before the first state of an execution, and before any state under a preempt request.
 
     Under a request the state is preempted too, unless the last one has serviced the request.
@@ -39,7 +39,7 @@ def before_step(node: Node) -> None:
             _pass_preempt_on(node)
 
 
-def _pass_preempt_on(node: Node) -> None:
+def _pass_preempt_on(node: TreeNode) -> None:
     machine = node.machine
     node.tell_preempt()
     last = machine._preempted_state
@@ -64,7 +64,7 @@ class Step:
 
     __slots__ = ('_node', '_machine', '_record')
 
-    def __init__(self, node: Node, record: StateRecord) -> None:
+    def __init__(self, node: TreeNode, record: StateRecord) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record

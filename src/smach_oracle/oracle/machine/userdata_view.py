@@ -4,8 +4,8 @@ from typing import Any, Collection, Iterable, Iterator, Mapping, Tuple
 
 import smach
 
-from .node import Node
 from .protocols import Machine
+from .tree_node import TreeNode
 from .userdata_gate import UserdataGate, behind
 
 
@@ -119,7 +119,7 @@ def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tupl
                if key not in constants and remapping.get(key, key) not in present))
 
 
-def keys_after_jump(node: Node, label: str, written: Collection[str]) -> Tuple[str, ...]:
+def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:
     """Return the container's userdata keys as they would be after a jump to a state."""
     now = node.machine.userdata._data
     snapshot = node.record(label).snapshot

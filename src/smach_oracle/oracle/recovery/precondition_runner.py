@@ -8,7 +8,7 @@ from typing import Any, Optional
 import smach
 
 from ..machine.failure import failure_kind, route_of
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
 from ..machine.userdata_view import view_behind
 from ..machine.write_watch import WriteWatch
@@ -30,7 +30,7 @@ class PreconditionRunner:
     more begins.
     """
 
-    def __init__(self, node: Node, watch: WriteWatch) -> None:
+    def __init__(self, node: TreeNode, watch: WriteWatch) -> None:
         self._machine = node.machine
         self._node = node
         self._watch = watch

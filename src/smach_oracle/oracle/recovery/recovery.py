@@ -9,7 +9,7 @@ from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
 from ..machine.failure import ContainerEnding, Failure, natural_ending
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
 from ..records.facts import DECIDED_BY, Decider
@@ -28,8 +28,8 @@ class Recovery:
     `inquiry.Asker`, and it alone makes the verdict.
     """
 
-    def __init__(self, node: Node, record: StateRecord, failure: Failure, context: FailureContext,
-                 continuous: bool) -> None:
+    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
+                 context: FailureContext, continuous: bool) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record
