@@ -28,7 +28,7 @@ def make_question(node: TreeNode, record: StateRecord, failure: Failure, account
     machine = node.machine
     state = machine._states[record.label]
     return Question(
-        query_id=node.tree.next_query_id(), trial_id=node.tree.trial_id,
+        question_id=node.tree.next_question_id(), trial_id=node.tree.trial_id,
         container_path=node.path, failed_state=record.label, failure_kind=failure.kind,
         outcome=failure.outcome, text=failure.text, failure_class=int(record.failure_class),
         rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
