@@ -69,10 +69,11 @@ class Step:
         self._machine = node.machine
         self._record = record
 
-    def execute(self, state: smach.State) -> object:
+    def execute(self, state: smach.State, userdata: smach.Remapper) -> object:
         """Execute the state, watched; return its outcome, or an Overrun.
 
-        It raises what the state raises.
+        It raises what the state raises. With a time limit it gets a view of its own, which is shut
+        when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
         if node.in_force.deep_copy_keys:
@@ -83,7 +84,7 @@ class Step:
             return Overrun(blocked)
         if record.settings.time_limit_s is not None and node.tree.recover:
             return self._execute_limited(state, record.settings.time_limit_s)
-        return state.execute(record.view.remapper)
+        return state.execute(userdata)
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
