@@ -62,9 +62,10 @@ class OracleVisit:
         lock = self._machine._state_transitioning_lock
         lock.release()
         try:
-            return meta.recover()
+            meta.execute(self._machine.userdata)
         finally:
             lock.acquire()
+        return meta.take_verdict()
 
     def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
         if verdict.kind is VerdictKind.JUMP:
