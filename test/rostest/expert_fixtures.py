@@ -22,7 +22,8 @@ def make_question(query_id='q1', **changes):
     name.
     """
     question = Question(
-        query_id=query_id, trial_id='trial', container_path='PICK_AND_PLACE', failed_state='PICK',
+        question_id=query_id, trial_id='trial', container_path='PICK_AND_PLACE',
+        failed_state='PICK',
         failure_kind=FailureKind.FELL_THROUGH, outcome='aborted', text='no grasp found',
         failure_class=3, rate=0.8, continuous=True, recoveries=2,
         reason='the failure rate of PICK is HIGH', tried=('revisit PICK',),

@@ -2,12 +2,13 @@
 
 From the top down, each package above all that follow it: `container`, the public face; `execution`,
 `recovery`, `machine`, `asking`, `records`, `settings`, `decision`. Pure are `decision`, `settings`,
-all of `records` but the rates file, the question of `asking`, and `errors`. `OracleContainer` is
-imported when it is first asked for, so that the pure parts need no smach.
+all of `records` but the rates file, the question of `asking`, `errors` and `number_checks`.
+`OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
 """
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .asking.question import Answer, AnswerKind, Expert, Question
     from .container import OracleContainer
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
     from .machine.oracle import oracle_of
@@ -16,10 +17,11 @@ if TYPE_CHECKING:
 _LAZY = {
     'OracleContainer': 'container', 'oracle_of': 'machine.oracle', 'Settings': 'settings.settings',
     'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
-    'FailureClass': 'decision.failure_rate'
+    'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
+    'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question'
 }
-__all__ = ['ExponentialFailureRate', 'FailureClass', 'FailureRate', 'OracleContainer', 'Settings',
-           'oracle_of']
+__all__ = ['Answer', 'AnswerKind', 'Expert', 'ExponentialFailureRate', 'FailureClass',
+           'FailureRate', 'OracleContainer', 'Question', 'Settings', 'oracle_of']
 
 
 def __getattr__(name: str) -> object:

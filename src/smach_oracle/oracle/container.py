@@ -14,9 +14,10 @@ from .execution.trial import run_container
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.nesting import nodes_of
-from .machine.node import Node
 from .machine.oracle import StateRateRow, TransitionRow, oracle_of
+from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
+from .machine.tree_node import TreeNode
 from .machine.userdata_view import StateView
 from .records.events import EventKind
 from .records.rates_file import read_rates, write_rates
@@ -56,7 +57,7 @@ class OracleContainer(smach.StateMachine):
         """
         checked = as_settings(settings, preconditions)
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
-        self._oracle = Node(self, Tree(OracleContainer, recover, expert), checked, name)
+        self._oracle = TreeNode(self, Tree(OracleContainer, recover, expert), checked, name)
         self._oracle.strict = strict
 
     @classmethod
@@ -255,12 +256,13 @@ class OracleContainer(smach.StateMachine):
         """
         node = self._oracle
         lock = self._state_transitioning_lock
-        label: Any = self._current_label
+        # a machine that runs has a current state, with its label and its transitions
+        label: str = self._current_label  # type: ignore[assignment]
         record = node.records.by_label.get(label) or node.record(label)
         engine = node.engine
         if self._preempt_requested or engine.attentive:
             before_step(node)
-        state: Any = self._current_state
+        state: smach.State = self._current_state  # type: ignore[assignment]
         userdata = self.userdata
         view = record.view
         if (view is None or view.state is not state or view.userdata is not userdata
@@ -270,14 +272,15 @@ class OracleContainer(smach.StateMachine):
             view = record.view = StateView(self, label, state)
         record.snapshot = userdata._data.copy()
         observed = node.events.observers
-        transitions: Any = self._current_transitions
+        transitions: Transitions = self._current_transitions  # type: ignore[assignment]
+        outcome: Any  # a user's state may return anything
         error = None
         if engine.lock_is_held:
             lock.release()
         try:
             try:
                 if observed or record.special or node.abandoned:
-                    outcome = Step(node, record).execute(state)
+                    outcome = Step(node, record).execute(state, view.remapper)
                 else:
                     outcome = state.execute(view.remapper)
             except Exception as err:

@@ -9,6 +9,7 @@ from typing import Any, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
+from smach_oracle.oracle.number_checks import is_number
 
 
 class Kitchen(NamedTuple):
@@ -158,7 +159,7 @@ def _like(name: str, value: Any) -> Any:
 def _floats(values: Sequence[float], count: int) -> Tuple[float, ...]:
     """The values as floats; `count` of them, or for 0 any number from 1."""
     made = tuple(float(value) for value in values)
-    if not np.isfinite(made).all() or (len(made) != count if count else not made):
+    if not all(is_number(each) for each in made) or (len(made) != count if count else not made):
         raise ValueError('{} numbers, not all finite'.format(len(made)))
     return made
 
@@ -166,6 +167,6 @@ def _floats(values: Sequence[float], count: int) -> Tuple[float, ...]:
 def _number(value: float, kind: type) -> float:
     """The value as an int, or as a float above 0."""
     made: float = kind(value)
-    if made != float(value) or not np.isfinite(made) or (made <= 0 and kind is not int):
+    if made != float(value) or not is_number(made) or (made <= 0 and kind is not int):
         raise ValueError('not a number of this kind')
     return made

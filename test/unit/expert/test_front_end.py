@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import pytest
 
 from smach_oracle.expert import front_end as module
-from smach_oracle.expert.claims import ClaimKeeper
+from smach_oracle.expert.claims import MOST_MISSED, ClaimKeeper
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question
 from smach_oracle.msg import OpenQueries, OpenQuery
 from smach_oracle.ros.service_calls import ServerGoneError
+from smach_oracle.srv import ClaimQueryRequest
 
 LIST = ['/robot/expert_query/open', OpenQueries._type]
 
@@ -26,6 +27,8 @@ class FakeServer:
         self.name = name
         self.connected = True
         self.stopped = False
+        self.listed = []
+        self.claims = []  # the actions of all calls
 
     def refresh(self, advertised):
         """Nothing to be done."""
@@ -34,7 +37,11 @@ class FakeServer:
         self.stopped = True
 
     def questions(self):
-        return []
+        return self.listed
+
+    def claim(self, _query_id, _expert, action, _lease_s=0.0):
+        self.claims.append(action)
+        return SimpleNamespace(ok=True)
 
 
 @pytest.fixture(name='clock')
@@ -96,6 +103,22 @@ def listed(key, status, holder=''):
 
 
 OTHERS = [listed('held', OpenQuery.CLAIMED, 'bob'), listed('by hand', OpenQuery.INTERFACE_RUNNING)]
+
+
+@pytest.mark.parametrize('missed, renewed', [(MOST_MISSED, True), (MOST_MISSED + 1, False)])
+def test_a_claim_is_dropped_after_renewals_in_which_its_question_is_not_listed(clock, missed,
+                                                                               renewed):
+    front_end = FrontEnd('ann', ['/robot/expert_query'])
+    server, question = FakeServer.made, listed('ours', OpenQuery.PENDING)
+    assert front_end.claim(question).ok
+    for _ in range(missed):
+        front_end._claims.renew()
+    assert server.claims == [ClaimQueryRequest.CLAIM]
+    server.listed = [question]  # it was a server that was being restarted
+    front_end._claims.renew()
+    front_end.stop()
+    again = [ClaimQueryRequest.RENEW, ClaimQueryRequest.RELEASE] if renewed else []
+    assert server.claims == [ClaimQueryRequest.CLAIM] + again
 
 
 class Asking:

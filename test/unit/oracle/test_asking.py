@@ -123,10 +123,18 @@ def test_an_answer_that_does_not_fit_is_warned_of_and_asked_again_under_a_new_id
     assert machine.run() == 'done'
     assert len(machine.of(EventKind.WARNING)) == 1
     first, second = expert.questions
-    assert first.query_id != second.query_id
+    assert first.question_id != second.question_id
     assert second.deadline_s <= first.deadline_s
-    assert [event.query_id
-            for event in machine.of(EventKind.QUERY_OPENED)] == [first.query_id, second.query_id]
+    assert [event.query_id for event in machine.of(EventKind.QUERY_OPENED)
+            ] == [first.question_id, second.question_id]
+
+
+def test_the_id_of_a_question_keeps_its_old_name_with_a_warning():
+    machine, expert = asking(goto('C'))
+    machine.run()
+    question, = expert.questions
+    with pytest.warns(FutureWarning, match='query_id is now called question_id'):
+        assert question.query_id == question.question_id
 
 
 def test_nonsense_without_end_ends_at_the_deadline_and_does_not_spin():

@@ -1,10 +1,16 @@
 """A script's own classes and objects may use any name for their own ends, those of an
 OracleContainer among them.
 """
+import importlib
+import sys
+
+import pytest
 from machines import FakeExpert, Scripted, chain_of, supersede
 
 import smach
+import smach_oracle.oracle
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.asking import question
 from smach_oracle.oracle.records.events import EventKind
 
 NAMES = ('name', 'path', 'settings', 'events', 'trial_id', 'is_top', 'recovers', 'rates',
@@ -71,3 +77,13 @@ def test_adapters_read_the_containers_face_whatever_the_class_is_like():
     assert face.trial_id and face.settings.policy == 'prose'
     assert [(row.state, row.failures) for row in face.rates()] == [('A', 1)]
     assert {row.to for row in face.transition_counts()} == {'A', 'ORACLE', 'done'}
+
+
+@pytest.mark.parametrize('name', ['Answer', 'AnswerKind', 'Expert', 'Question'])
+def test_what_an_expert_of_ones_own_needs_is_found_at_the_top_and_at_its_old_place(name):
+    sys.modules.pop('smach_oracle.oracle.question', None)
+    with pytest.warns(FutureWarning, match='moved to smach_oracle.oracle.asking.question'):
+        old = importlib.import_module('smach_oracle.oracle.question')
+    assert getattr(old, name) is getattr(question, name)
+    assert getattr(smach_oracle.oracle, name) is getattr(question, name)
+    assert name in smach_oracle.oracle.__all__

@@ -179,6 +179,21 @@ def test_prose_keeps_its_goal_while_the_state_keeps_failing():
     assert machine.decisions() == [('revisit', 'S'), ('step_back', 'A'), ('step_back', 'A')]
 
 
+def test_prose_steps_back_to_a_new_goal_once_the_state_has_succeeded():
+    import smach
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'B'})
+        smach.StateMachine.add('B', Scripted('aborted', 'ok', 'aborted'), {'ok': 'C'})
+        smach.StateMachine.add('C', Scripted('back', outcomes=('ok', 'back')),
+                               {'ok': 'done', 'back': 'B'})
+    machine = Watched(machine, settings={
+        'policy': 'prose', 'memory': 1000,
+        'states': {'B': {'preconditions': [lambda ud: False]}}})
+    machine.run()
+    assert machine.decisions() == [('step_back', 'A'), ('step_back', 'C')]
+
+
 def test_prose_steps_back_to_the_initial_state_where_nothing_succeeded_before():
     machine = failing('prose', Scripted('aborted', 'aborted'), Scripted())
     machine.run()

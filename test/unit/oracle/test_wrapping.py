@@ -7,7 +7,7 @@ from machines import OUTCOMES, FakeExpert, Scripted, Watched, chain_of, supersed
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.errors import OracleError, SettingsError
+from smach_oracle.oracle.errors import OracleError, SettingsError, TrialError
 from smach_oracle.oracle.records.events import EventKind
 
 
@@ -181,6 +181,31 @@ def test_the_oracle_cannot_be_where_a_machine_begins():
     with pytest.raises(smach.InvalidStateError, match='ORACLE'):
         machine.execute()
     assert machine.is_running() is False
+
+
+def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state():
+    machine = watched(Scripted('aborted'), expert=FakeExpert(supersede('ok')),
+                      settings={'states': {'A': {'prior': 1.0}}})
+    meta, seen = machine.machine.get_children()['ORACLE'], []
+    execute = meta.execute
+
+    def hooked(ud):
+        outcome = execute(ud)
+        seen.append((ud is machine.machine.userdata, outcome))
+        return outcome
+    meta.execute = hooked
+    assert machine.run() == 'done'
+    assert seen == [(True, 'ok')]
+
+
+def test_the_meta_state_executes_for_a_failure_alone():
+    machine = watched(Scripted('aborted'), settings={'states': {'A': {'prior': 1.0}}})
+    meta = machine.machine.get_children()['ORACLE']
+    with pytest.raises(TrialError, match='by failures alone'):
+        meta.execute(smach.UserData())
+    meta.execute = lambda ud: 'ok'
+    with pytest.raises(TrialError, match='without a recovery'):
+        machine.run()
 
 
 def test_a_subclass_keeps_its_own_methods():

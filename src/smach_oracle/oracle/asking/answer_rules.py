@@ -1,8 +1,51 @@
 """Which answers fit a question: one rule for executive, servers and interfaces. Pure."""
-from typing import Callable, Dict, Iterable, Mapping, NamedTuple, Sequence
+from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence
 
 from ..errors import AnswerError
-from .question import Answer, AnswerKind, Question, names
+from .question import Answer, AnswerKind, names
+
+
+class _NamedState(Protocol):
+    @property
+    def state(self) -> str: ...
+
+    @property
+    def blocked(self) -> str: ...
+
+
+class _NamedOutcome(Protocol):
+    @property
+    def outcome(self) -> str: ...
+
+
+class _NamedInterface(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+class AskedQuestion(Protocol):
+    """What a Question and the ExpertQuery goal that carries it have in common."""
+
+    @property
+    def container_path(self) -> str: ...
+
+    @property
+    def failed_state(self) -> str: ...
+
+    @property
+    def choices(self) -> Sequence[_NamedState]: ...
+
+    @property
+    def supersede_outcomes(self) -> Sequence[_NamedOutcome]: ...
+
+    @property
+    def give_up_outcomes(self) -> Sequence[str]: ...
+
+    @property
+    def interfaces(self) -> Sequence[_NamedInterface]: ...
+
+    @property
+    def output_keys(self) -> Sequence[str]: ...
 
 
 class AnswerChoices(NamedTuple):
@@ -17,7 +60,7 @@ class AnswerChoices(NamedTuple):
     output_keys: Sequence[str]  # of the failed state
 
 
-def choices_of(question: Question) -> AnswerChoices:
+def choices_of(question: AskedQuestion) -> AnswerChoices:
     """Return what an answer to a question may choose from."""
     return AnswerChoices(question.container_path, question.failed_state,
                          {choice.state: choice.blocked for choice in question.choices},
@@ -36,14 +79,18 @@ def check_answer(answer: Answer, choices: AnswerChoices) -> None:
 
 
 def check_output_keys(state: str, keys: Iterable[str], allowed: Sequence[str]) -> None:
-    """Check that outputs go to output keys of a state.
+    """Check that outputs go to output keys of a state, to each once at most.
 
-    :raises AnswerError: where one does not.
+    :raises AnswerError: where they do not.
     """
-    unknown = [key for key in keys if key not in allowed]
+    given: List[str] = list(keys)
+    unknown = [key for key in given if key not in allowed]
     if unknown:
         raise AnswerError('{} has no output keys {}; allowed: {}'.format(
             state, names(unknown), names(allowed)))
+    if len(set(given)) < len(given):
+        raise AnswerError('output keys come twice: {}'.format(
+            names({key for key in given if given.count(key) > 1})))
 
 
 def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:

@@ -20,7 +20,7 @@ class Asker(Protocol):
     """The recovery that asks: what an inquiry needs of it."""
 
     tried: List[str]  # what was tried already, in words; runs of interfaces are added
-    query_cancelled: threading.Event  # the question is to be taken back
+    question_cancelled: threading.Event  # the question is to be taken back
 
     def stopped(self) -> bool:
         """Whether a preempt or a shutdown ends the recovery."""
@@ -45,7 +45,7 @@ class Reply(NamedTuple):
     """How an inquiry ended: with an answer that fits, or without one."""
 
     answer: Optional[Answer]
-    query_id: str = ''  # of the last question, '' where none was put
+    question_id: str = ''  # of the last question, '' where none was put
     why_none: str = ''
 
 
@@ -86,22 +86,22 @@ class Inquiry:
         self._asker = asker
         self._expert = expert
         self._end = time.monotonic() + deadline_s if deadline_s else None
-        self._cancelled = asker.query_cancelled
+        self._cancelled = asker.question_cancelled
         self._unfit = 0
-        self._query_id = ''
+        self._question_id = ''
 
     def run(self) -> Reply:
         """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
             with _StopWatch(self._cancelled, self._end):
-                return Reply(self._ask_until_it_fits(), self._query_id)
+                return Reply(self._ask_until_it_fits(), self._question_id)
         except _NoAnswer as why:
-            return Reply(None, self._query_id, str(why))
+            return Reply(None, self._question_id, str(why))
 
     def _ask_until_it_fits(self) -> Answer:
         while True:
             question = self._asker.make_question(self._remaining_s())
-            self._query_id = question.query_id
+            self._question_id = question.question_id
             self._emit(EventKind.QUERY_OPENED, text=question.reason)
             self._asker.say_that_it_waits(question)
             answer = self._answer_to(question)
@@ -193,4 +193,4 @@ class Inquiry:
             self._emit(kinds[what], by=by, text=text)
 
     def _emit(self, kind: EventKind, **fields: Any) -> None:
-        self._asker.emit(kind, query_id=self._query_id, **fields)
+        self._asker.emit(kind, query_id=self._question_id, **fields)

@@ -1,5 +1,6 @@
 """What the oracle asks an expert and what may come back (paper, section V). No ROS, no smach."""
 import threading
+import warnings
 from enum import IntEnum
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
 
@@ -57,9 +58,12 @@ class PreconditionProbe:
 
 
 class Question(NamedTuple):
-    """Everything an expert is told; the fields are those of the ExpertQuery goal."""
+    """Everything an expert is told.
 
-    query_id: str
+    The fields are those of the ExpertQuery goal, where `question_id` is called `query_id`.
+    """
+
+    question_id: str
     trial_id: str
     container_path: str
     failed_state: str
@@ -85,6 +89,12 @@ class Question(NamedTuple):
     fallback: str  # what happens at the deadline, in words
     # how those of the choices stand, as long as it is open; None: nobody can tell
     preconditions: Optional[PreconditionProbe] = None
+
+    @property
+    def query_id(self) -> str:
+        """Return `question_id`, by the name that it had before."""
+        warnings.warn('Question.query_id is now called question_id', FutureWarning, stacklevel=2)
+        return self.question_id
 
 
 class Answer(NamedTuple):

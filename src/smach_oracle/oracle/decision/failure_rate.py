@@ -9,6 +9,7 @@ from enum import IntEnum
 from typing import Any, Callable, Deque, Dict, Mapping, Tuple, Union
 
 from ..errors import SettingsError
+from ..number_checks import is_number, is_whole
 
 _ROUNDING = 1e-9  # a rate that equals a threshold but for binary rounding has reached it
 
@@ -35,9 +36,9 @@ def classify(rate: float, moderate_from: float, high_from: float) -> FailureClas
 
 
 def _checked(memory: int, prior: float) -> None:
-    if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
+    if not is_whole(memory, 1):
         raise SettingsError('memory', memory, 'a whole number of results from 1')
-    if isinstance(prior, bool) or not isinstance(prior, (int, float)) or not 0 <= prior <= 1:
+    if not is_number(prior, 0, 1):
         raise SettingsError('prior', prior, 'a failure rate from 0 to 1')
 
 
@@ -195,14 +196,14 @@ class ExponentialFailureRate:
         successes, failures = _totals(learned)
         rate = learned.get('rate',
                            self.prior) if learned.get('estimator') == self.kind else self.prior
-        if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not 0 <= rate <= 1:
+        if not is_number(rate, 0, 1):
             raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
         self.successes, self.failures, self._rate = successes, failures, float(rate)
 
 
 def _totals(learned: Mapping[str, Any]) -> Tuple[int, int]:
     totals = (learned.get('successes', 0), learned.get('failures', 0))
-    if any(isinstance(total, bool) or not isinstance(total, int) or total < 0 for total in totals):
+    if not all(is_whole(total, 0) for total in totals):
         raise ValueError('successes, failures: {!r} are not counts'.format(totals))
     return totals
 

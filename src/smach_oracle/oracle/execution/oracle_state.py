@@ -22,6 +22,7 @@ class OracleState(smach.State):
         smach.State.__init__(self, outcomes=[])
         self._lock = threading.Lock()
         self._recovery: Optional[Recovery] = None
+        self._verdict: Optional[Verdict] = None
 
     def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
         """Have these outcomes and no others; return the transitions, each to its own name."""
@@ -36,24 +37,33 @@ class OracleState(smach.State):
         with self._lock:
             self._preempt_requested = False
             self._recovery = recovery
+            self._verdict = None
 
-    def recover(self) -> Verdict:
+    def execute(self, ud: smach.UserData) -> str:
         """Recover from the failure handed to `begin`.
 
+        :returns: where the machine goes, '' where it raises; it follows the verdict itself.
         :raises TrialError: where no failure was handed over.
         """
         recovery = self._recovery
         if recovery is None:
             raise TrialError('the meta state is entered by failures alone')
         try:
-            return recovery.run()
+            self._verdict = recovery.run()
+            return self._verdict.leads_to()
         finally:
             with self._lock:
                 self._recovery = None
 
-    def execute(self, ud: smach.UserData) -> str:
-        """Recover; return where to go ('' where the machine raises)."""
-        return self.recover().leads_to()
+    def take_verdict(self) -> Verdict:
+        """Return what the recovery that `execute` ran has come to, once.
+
+        :raises TrialError: where `execute` has run none.
+        """
+        verdict, self._verdict = self._verdict, None
+        if verdict is None:
+            raise TrialError('the meta state has executed without a recovery')
+        return verdict
 
     def request_preempt(self) -> None:
         """End the recovery: a precondition that runs is preempted, an open question taken back."""
@@ -64,9 +74,9 @@ class OracleState(smach.State):
             recovery.cancel()
 
     def __getstate__(self) -> Dict[str, Any]:
-        """Without the lock and a recovery under way: neither travels with a pickled machine."""
+        """Without what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
-        state.update(_lock=None, _recovery=None)
+        state.update(_lock=None, _recovery=None, _verdict=None)
         return state
 
     def __setstate__(self, state: Dict[str, Any]) -> None:

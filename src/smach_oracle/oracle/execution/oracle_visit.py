@@ -6,8 +6,8 @@ import smach
 from ..decision.policy import FailureContext
 from ..machine.failure import Failure, route_of
 from ..machine.learned_rates import save_rates
-from ..machine.node import Node
 from ..machine.snapshots import restore
+from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
@@ -21,7 +21,7 @@ from .transitions import go_to, message_of, terminate
 class OracleVisit:
     """The way of one failure into the meta state and out of it."""
 
-    def __init__(self, node: Node, record: StateRecord, failure: Failure) -> None:
+    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record
@@ -62,9 +62,10 @@ class OracleVisit:
         lock = self._machine._state_transitioning_lock
         lock.release()
         try:
-            return meta.recover()
+            meta.execute(self._machine.userdata)
         finally:
             lock.acquire()
+        return meta.take_verdict()
 
     def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
         if verdict.kind is VerdictKind.JUMP:

@@ -5,10 +5,10 @@ import smach
 
 from ..errors import SettingsError
 from ..machine.nesting import nodes_of
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 
 
-def check_state_names(top: Node) -> None:
+def check_state_names(top: TreeNode) -> None:
     """Check that the states for which something is set are somewhere in the tree.
 
     :raises SettingsError: where one is not; it is logged instead where the node is not strict.
@@ -20,7 +20,7 @@ def check_state_names(top: Node) -> None:
                 key, name, 'the states of the machine: ' + ', '.join(sorted(known))))
 
 
-def _known_names(top: Node) -> Set[str]:
+def _known_names(top: TreeNode) -> Set[str]:
     known: Set[str] = set()
     for node in nodes_of(top.machine):
         path = node.relative_path
@@ -29,14 +29,14 @@ def _known_names(top: Node) -> Set[str]:
     return known
 
 
-def _named_states(top: Node) -> List[Tuple[str, str]]:
+def _named_states(top: TreeNode) -> List[Tuple[str, str]]:
     """Each key of the settings that names a state, and the name."""
     named = [('states.' + name, name) for name in top.settings.states]
     return named + [('interfaces.{}.states'.format(offer.name), name)
                     for offer, states in top.settings.interfaces for name in states]
 
 
-def check_preconditions(node: Node) -> None:
+def check_preconditions(node: TreeNode) -> None:
     """Check that preconditions name other states of their container.
 
     :raises SettingsError: where one does not; it is logged instead where the node is not strict.
@@ -52,7 +52,7 @@ def check_preconditions(node: Node) -> None:
                         'the labels of the other states of {}: {}'.format(node.path, others)))
 
 
-def _refuse(node: Node, err: SettingsError) -> None:
+def _refuse(node: TreeNode, err: SettingsError) -> None:
     if node.strict:
         raise err
     smach.logwarn(str(err))

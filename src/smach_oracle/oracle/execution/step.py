@@ -11,9 +11,9 @@ from ..machine.failure import (
     natural_ending,
     visit_result,
 )
-from ..machine.node import Node
-from ..machine.userdata_gate import UserdataGate, behind
-from ..machine.userdata_view import view_of
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_gate import UserdataGate
+from ..machine.userdata_view import view_behind
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
@@ -23,7 +23,7 @@ from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 
 
-def before_step(node: Node) -> None:
+def before_step(node: TreeNode) -> None:
     """Before the first state of an execution, and before any state under a preempt request.
 
     Under a request the state is preempted too, unless the last one has serviced the request.
@@ -39,7 +39,7 @@ def before_step(node: Node) -> None:
             _pass_preempt_on(node)
 
 
-def _pass_preempt_on(node: Node) -> None:
+def _pass_preempt_on(node: TreeNode) -> None:
     machine = node.machine
     node.tell_preempt()
     last = machine._preempted_state
@@ -64,15 +64,16 @@ class Step:
 
     __slots__ = ('_node', '_machine', '_record')
 
-    def __init__(self, node: Node, record: StateRecord) -> None:
+    def __init__(self, node: TreeNode, record: StateRecord) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record
 
-    def execute(self, state: smach.State) -> object:
+    def execute(self, state: smach.State, userdata: smach.Remapper) -> object:
         """Execute the state, watched; return its outcome, or an Overrun.
 
-        It raises what the state raises.
+        It raises what the state raises. With a time limit it gets a view of its own, which is shut
+        when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
         if node.in_force.deep_copy_keys:
@@ -83,7 +84,7 @@ class Step:
             return Overrun(blocked)
         if record.settings.time_limit_s is not None and node.tree.recover:
             return self._execute_limited(state, record.settings.time_limit_s)
-        return state.execute(record.view.remapper)
+        return state.execute(userdata)
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
@@ -93,11 +94,10 @@ class Step:
             smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and is '
                           'dropped'.format(node.path, label, key))
 
-        def make_view(gate: UserdataGate) -> smach.Remapper:
-            return view_of(self._machine, label, state, behind(gate))
-
-        result = node.tree.workers.run(state, make_view, UserdataGate(self._machine, on_late_write),
-                                       label, limit_s, self._record.settings.grace_period_s)
+        gate = UserdataGate(self._machine, on_late_write)
+        result = node.tree.workers.run(
+            state, view_behind(gate, self._machine, label, state), gate, label, limit_s,
+            self._record.settings.grace_period_s)
         if result.error is not None:
             raise result.error
         return Overrun(result.overrun) if result.overrun else result.outcome

@@ -1,11 +1,11 @@
 """How a machine moves on: to a state, or to its end."""
 import smach
 
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..settings.failing_outcomes import PREEMPTED
 
 
-def go_to(node: Node, message: str, target: str) -> None:
+def go_to(node: TreeNode, message: str, target: str) -> None:
     """Make `target` the current state, log the transition, tell the callbacks."""
     machine = node.machine
     machine._set_current_state(target)
@@ -18,7 +18,7 @@ def message_of(source: str, outcome: str, target: str) -> str:
     return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
 
 
-def terminate(node: Node, label: str, outcome: str, container_outcome: str) -> str:
+def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
     """End the container; a preempt that its last state has serviced is serviced."""
     machine = node.machine
     last = machine._current_state

@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, Optional
 
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
-from ..machine.node import Node, WrappedMachine
+from ..machine.tree_node import TreeNode, WrappedMachine
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
@@ -29,7 +29,7 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
     return _run_trial(node, execute)
 
 
-def _run_trial(node: Node, execute: Callable[[], Optional[str]]) -> Optional[str]:
+def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     node.emit(EventKind.TRIAL_START, data={
         'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
         'settings': _settings(node)})
@@ -47,7 +47,7 @@ def _run_trial(node: Node, execute: Callable[[], Optional[str]]) -> Optional[str
         save_rates(node)
 
 
-def _settings(node: Node) -> Dict[str, Any]:
+def _settings(node: TreeNode) -> Dict[str, Any]:
     """What the oracle of the top machine decides by, but for what is set for single states."""
     settings, defaults = node.settings, node.settings.defaults
     return {'policy': settings.policy, 'memory': defaults.memory, 'estimator': defaults.estimator,
@@ -55,7 +55,7 @@ def _settings(node: Node) -> Dict[str, Any]:
             'high_from': defaults.high_from, 'max_recoveries': defaults.max_recoveries}
 
 
-def _learned(node: Node) -> Dict[str, Any]:
+def _learned(node: TreeNode) -> Dict[str, Any]:
     """What was learned so far, where it is kept in a file.
 
     A record of the trial then has all that is needed to go on after it.
@@ -65,7 +65,7 @@ def _learned(node: Node) -> Dict[str, Any]:
     return {'learned': learned_by(nodes_of(node.machine))}
 
 
-def _trial_end(node: Node, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
+def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
     if isinstance(error, (KeyboardInterrupt, SystemExit)):
         return TrialEnd.STOPPED
     if error is not None:
@@ -75,7 +75,7 @@ def _trial_end(node: Node, outcome: Optional[str], error: Optional[BaseException
     return TrialEnd.SHUTDOWN if node.engine.stepped else TrialEnd.INCONSISTENT
 
 
-def _run(node: Node, execute: Callable[[], Optional[str]]) -> Optional[str]:
+def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     machine = node.machine
     node.begin_execution()
     node.emit(EventKind.CONTAINER_START, state=machine._initial_state_label or '')

@@ -6,9 +6,9 @@ import smach
 from ..errors import SettingsError
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
-from ..machine.node import Node, WrappedMachine
 from ..machine.protocols import Labels
 from ..machine.tree import Tree
+from ..machine.tree_node import TreeNode, WrappedMachine
 from ..settings.settings import Settings
 from .settings_check import check_preconditions, check_state_names
 from .wrapped_classes import change_class, two_classes
@@ -40,7 +40,7 @@ def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, sett
                name: str) -> WrappedMachine:
     change_class(machine, oracle_class)
     wrapped = cast(WrappedMachine, machine)
-    wrapped._oracle = Node(wrapped, tree, settings, name)
+    wrapped._oracle = TreeNode(wrapped, tree, settings, name)
     return wrapped
 
 
@@ -57,7 +57,7 @@ def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, str
         bring_up_to_date(node)
 
 
-def bring_up_to_date(node: Node) -> None:
+def bring_up_to_date(node: TreeNode) -> None:
     """Take notice of states added since.
 
     :raises SettingsError: where the settings do not fit them.
@@ -131,7 +131,7 @@ def adopt(machine: WrappedMachine) -> None:
         adopt(container)
 
 
-def _move_below(node: Node, parent: Node, below: Labels) -> None:
+def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
     """Make a wrapped machine one below `parent`.
 
     It may have been on its own, or below another machine, before.

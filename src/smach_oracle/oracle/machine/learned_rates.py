@@ -1,10 +1,10 @@
 """The rates file of a tree: written and read where the settings name one."""
 from ..records.rates_file import read_rates, write_rates
 from .nesting import nodes_of
-from .node import Node
+from .tree_node import TreeNode
 
 
-def save_rates(node: Node) -> None:
+def save_rates(node: TreeNode) -> None:
     """Write the rates file of the top machine, if there is one.
 
     What goes wrong is logged and stops nothing.
@@ -20,7 +20,7 @@ def save_rates(node: Node) -> None:
         node.warn('rates file {} cannot be written: {}'.format(path, err))
 
 
-def load_rates(node: Node) -> None:
+def load_rates(node: TreeNode) -> None:
     """Read the rates file of the top machine, if it is another than the last one read."""
     path = node.settings.rates_file
     if node.parent is None and node.tree.rates_loaded != path:

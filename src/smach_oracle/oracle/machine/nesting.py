@@ -3,8 +3,8 @@ from typing import Iterator, List, Mapping, Tuple, cast
 
 import smach
 
-from .node import Node, WrappedMachine
 from .protocols import Labels
+from .tree_node import TreeNode, WrappedMachine
 
 
 def machines_below(
@@ -41,7 +41,7 @@ def containers_in(machine: WrappedMachine) -> List[WrappedMachine]:
     return found
 
 
-def nodes_of(machine: WrappedMachine) -> Iterator[Node]:
+def nodes_of(machine: WrappedMachine) -> Iterator[TreeNode]:
     """Yield the node of a container and those of all wrapped containers below it, each once."""
     for container in containers_in(machine):
         yield container._oracle

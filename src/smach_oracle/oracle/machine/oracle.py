@@ -8,7 +8,7 @@ from ..errors import TrialError
 from ..records.events import EventSource
 from ..settings.settings import Settings
 from .nesting import nodes_of
-from .node import Node, WrappedMachine
+from .tree_node import TreeNode, WrappedMachine
 
 
 class StateRateRow(NamedTuple):
@@ -68,7 +68,7 @@ class Oracle:
     its own ends.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: TreeNode) -> None:
         self._node = node
 
     @property
@@ -139,7 +139,7 @@ def oracle_of(machine: object) -> Oracle:
     :raises TrialError: for what is not under an oracle.
     """
     node = getattr(machine, '_oracle', None)
-    if not isinstance(node, Node):
+    if not isinstance(node, TreeNode):
         raise TrialError('{!r} is not under an oracle; OracleContainer.wrap puts it there'.format(
             machine))
     return Oracle(node)

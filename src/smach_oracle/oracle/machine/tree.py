@@ -53,7 +53,7 @@ class Tree:
         self._questions = 0
         self.events.begin_trial(trial_id)
 
-    def next_query_id(self) -> str:
+    def next_question_id(self) -> str:
         """Return the id of the next question.
 
         Each is new, also when it is asked about the same failure.

@@ -4,8 +4,9 @@ from typing import Any, Collection, Iterable, Iterator, Mapping, Tuple
 
 import smach
 
-from .node import Node
 from .protocols import Machine
+from .tree_node import TreeNode
+from .userdata_gate import UserdataGate, behind
 
 
 class _WithConstants(MutableMapping):
@@ -52,6 +53,12 @@ def view_of(machine: Machine, label: str, state: smach.State,
         userdata = shown
     return smach.Remapper(userdata, state.get_registered_input_keys(),
                           state.get_registered_output_keys(), remapping)
+
+
+def view_behind(gate: UserdataGate, machine: Machine, label: str,
+                state: smach.State) -> smach.Remapper:
+    """Return what `view_of` does for the container's userdata, behind a gate."""
+    return view_of(machine, label, state, behind(gate))
 
 
 def _keeps_key_sets() -> bool:
@@ -112,7 +119,7 @@ def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tupl
                if key not in constants and remapping.get(key, key) not in present))
 
 
-def keys_after_jump(node: Node, label: str, written: Collection[str]) -> Tuple[str, ...]:
+def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:
     """Return the container's userdata keys as they would be after a jump to a state."""
     now = node.machine.userdata._data
     snapshot = node.record(label).snapshot

@@ -6,7 +6,7 @@ abandoned. While an abandoned thread lives its state is blocked: nobody enters i
 import contextvars
 import threading
 import time
-from typing import Any, Callable, Dict, NamedTuple, Optional
+from typing import Any, Dict, NamedTuple, Optional
 
 import smach
 
@@ -73,13 +73,14 @@ class Workers:
             del self.abandoned[id(state)]
             return ''
 
-    def run(self, state: smach.State, make_userdata: Callable[[UserdataGate], smach.Remapper],
-            gate: UserdataGate, label: str, limit_s: float, grace_s: float) -> LimitedResult:
+    def run(self, state: smach.State, userdata: smach.Remapper, gate: UserdataGate, label: str,
+            limit_s: float, grace_s: float) -> LimitedResult:
         """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
 
-        What the state raises is told in the result, not raised.
+        `gate` is what `userdata` writes through. What the state raises is told in the result, not
+        raised.
         """
-        run = _Execution(state, make_userdata(gate), 'smach_oracle worker of {}'.format(label))
+        run = _Execution(state, userdata, 'smach_oracle worker of {}'.format(label))
         run.thread.start()
         try:
             if wait(run.done, limit_s):

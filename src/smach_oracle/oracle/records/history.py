@@ -79,7 +79,7 @@ class History:
         """
         return FailureContext(state, initial, self.failed_last(state),
                               self.failing_since(state, successes), self.unconditioned,
-                              self.succeeded_before(state))
+                              self.succeeded_before(state, successes))
 
     def failed_last(self, state: str) -> bool:
         """Whether the most recent failure of this trial was of `state`."""
@@ -92,12 +92,15 @@ class History:
         """
         return self._streak.state == state and self._streak.successes == successes
 
-    def succeeded_before(self, state: str) -> Optional[str]:
+    def succeeded_before(self, state: str, successes: int) -> Optional[str]:
         """Return the other state that succeeded last before `state` began to fail.
 
-        It is None where there is no such state.
+        The answer stays the same while `state` keeps failing. It is None where there is no such
+        state.
+
+        :param successes: number of successes of `state` in all.
         """
-        if self._streak.state == state and self._streak.anchor is not None:
+        if self.failing_since(state, successes) and self._streak.anchor is not None:
             return self._streak.anchor
         return self._latest_other(state)
 
@@ -106,10 +109,7 @@ class History:
 
         A step back keeps its goal while the state keeps failing.
         """
-        going_on = self.failing_since(state, successes)
-        anchor = self._streak.anchor if going_on else None
-        if anchor is None:
-            anchor = self._latest_other(state)
+        anchor = self.succeeded_before(state, successes)
         self._before = self._streak
         self._streak = _Streak(state, successes, anchor)
 

@@ -1,6 +1,6 @@
 """What the oracle remembers of one state of a container. Pure; no smach."""
 import threading
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Optional, Protocol, Tuple
 
 from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
 from ..records.visits import Visit
@@ -19,6 +19,35 @@ class FastEdge:
         self.visit = visit
 
 
+class KeptView(Protocol):
+    """What a state reads and writes, kept for its next visit (`machine.userdata_view.StateView`).
+
+    It may be used again while all that it was made of is still the same.
+    """
+
+    remapper: Any  # a smach.Remapper, which this module does not know
+
+    @property
+    def state(self) -> object:
+        """The state, None where the view was made for one visit."""
+
+    @property
+    def userdata(self) -> object:
+        """The container's userdata."""
+
+    @property
+    def remapping(self) -> object:
+        """The container's key by the state's own."""
+
+    @property
+    def input_keys(self) -> object:
+        """The state's set of input keys."""
+
+    @property
+    def output_keys(self) -> object:
+        """The state's set of output keys."""
+
+
 class StateRecord:
     """Learned rate, counts and latest snapshot of one state.
 
@@ -35,7 +64,7 @@ class StateRecord:
         self.label = label
         self.fast: Dict[Any, FastEdge] = {}
         self.snapshot: Optional[Dict[str, Any]] = None
-        self.view: Any = None  # what the state reads and writes, kept from its last visit
+        self.view: Optional[KeptView] = None  # from its last visit
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
         self.fallbacks = 0

@@ -14,7 +14,7 @@ from ..machine.failure import (
     unbound_text,
     unregistered_text,
 )
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..records.state_record import StateRecord
 
@@ -25,7 +25,7 @@ class Overrun(NamedTuple):
     text: str
 
 
-def judge(node: Node, record: StateRecord, outcome: Any,
+def judge(node: TreeNode, record: StateRecord, outcome: Any,
           error: Optional[Exception]) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
     machine = node.machine
@@ -51,7 +51,7 @@ def judge(node: Node, record: StateRecord, outcome: Any,
     return Failure(label, kind, outcome, text, route, partial(smach.InvalidTransitionError, text))
 
 
-def _description(node: Node, label: str, state: smach.State) -> str:
+def _description(node: TreeNode, label: str, state: smach.State) -> str:
     try:
         return node.tree.describe_failure(state)
     except Exception as err:  # it looks into states of any make

@@ -7,7 +7,7 @@ that nobody waits for.
 from typing import List, NamedTuple, Optional
 
 from ..asking.question import PreconditionProbe, PreconditionStatus
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
@@ -31,7 +31,7 @@ class LivePreconditionProbe(PreconditionProbe):
     `status` may be called from any thread; what a callable writes into the userdata is dropped.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: TreeNode) -> None:
         self._node = node
         self._gate = UserdataGate(node.machine)
         self._gate.shut()

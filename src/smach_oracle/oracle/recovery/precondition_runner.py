@@ -8,9 +8,9 @@ from typing import Any, Optional
 import smach
 
 from ..machine.failure import failure_kind, route_of
-from ..machine.node import Node
-from ..machine.userdata_gate import UserdataGate, behind
-from ..machine.userdata_view import view_of
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_gate import behind
+from ..machine.userdata_view import view_behind
 from ..machine.write_watch import WriteWatch
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
@@ -30,7 +30,7 @@ class PreconditionRunner:
     more begins.
     """
 
-    def __init__(self, node: Node, watch: WriteWatch) -> None:
+    def __init__(self, node: TreeNode, watch: WriteWatch) -> None:
         self._machine = node.machine
         self._node = node
         self._watch = watch
@@ -111,14 +111,13 @@ class PreconditionRunner:
             self._ended(state)
 
     def _with_limit(self, state: smach.State, label: str) -> object:
-        def make_view(gate: UserdataGate) -> smach.Remapper:
-            return view_of(self._machine, label, state, behind(gate))
-
         settings = self._node.settings_of(label) if label else None
         if settings is None or settings.time_limit_s is None:
-            return state.execute(make_view(self._gate))
-        result = self._node.tree.workers.run(state, make_view, self._gate.branch(), label,
-                                               settings.time_limit_s, settings.grace_period_s)
+            return state.execute(view_behind(self._gate, self._machine, label, state))
+        gate = self._gate.branch()
+        result = self._node.tree.workers.run(
+            state, view_behind(gate, self._machine, label, state), gate, label,
+            settings.time_limit_s, settings.grace_period_s)
         if result.error is not None:
             raise result.error
         if result.overrun:

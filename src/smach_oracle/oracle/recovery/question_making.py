@@ -5,8 +5,8 @@ import smach
 
 from ..asking.question import OutcomeChoice, Question, StateChoice
 from ..machine.failure import Failure, route_of
-from ..machine.node import Node
 from ..machine.protocols import Machine
+from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of, keys_after_jump, missing_keys
 from ..records.state_record import StateRecord
 from .precondition_probe import LivePreconditionProbe
@@ -22,13 +22,13 @@ class Account(NamedTuple):
     fallback: str  # what happens without an answer, in words
 
 
-def make_question(node: Node, record: StateRecord, failure: Failure, account: Account,
+def make_question(node: TreeNode, record: StateRecord, failure: Failure, account: Account,
                   deadline_s: float) -> Question:
     """Return a question about a failure. `deadline_s`: seconds left; 0 waits without end."""
     machine = node.machine
     state = machine._states[record.label]
     return Question(
-        query_id=node.tree.next_query_id(), trial_id=node.tree.trial_id,
+        question_id=node.tree.next_question_id(), trial_id=node.tree.trial_id,
         container_path=node.path, failed_state=record.label, failure_kind=failure.kind,
         outcome=failure.outcome, text=failure.text, failure_class=int(record.failure_class),
         rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
@@ -43,7 +43,7 @@ def make_question(node: Node, record: StateRecord, failure: Failure, account: Ac
         fallback=account.fallback, preconditions=LivePreconditionProbe(node))
 
 
-def _state_choices(node: Node, written: Collection[str]) -> Iterator[StateChoice]:
+def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateChoice]:
     """Yield the states the machine could be sent to, in the order in which they were added."""
     for label in node.labels():
         record = node.record(label)

@@ -9,7 +9,7 @@ from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
 from ..machine.failure import ContainerEnding, Failure, natural_ending
-from ..machine.node import Node
+from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
 from ..records.facts import DECIDED_BY, Decider
@@ -28,8 +28,8 @@ class Recovery:
     `inquiry.Asker`, and it alone makes the verdict.
     """
 
-    def __init__(self, node: Node, record: StateRecord, failure: Failure, context: FailureContext,
-                 continuous: bool) -> None:
+    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
+                 context: FailureContext, continuous: bool) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record
@@ -41,12 +41,12 @@ class Recovery:
         self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, self._watch)
         self.tried: List[str] = []
-        self.query_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
+        self.question_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
 
     def cancel(self) -> None:
         """End the recovery soon: preempt what runs, take the question back."""
         self._cancelled.set()
-        self.query_cancelled.set()
+        self.question_cancelled.set()
         self._preconditions.cancel()
 
     def stopped(self) -> bool:
@@ -139,13 +139,13 @@ class Recovery:
     def _ask_expert(self, expert: Expert) -> Verdict:
         reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
         if self.stopped():
-            if reply.query_id:
-                self.emit(EventKind.QUERY_CANCELLED, query_id=reply.query_id,
+            if reply.question_id:
+                self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
                           text='preempted' if self._cancelled.is_set() else 'shutdown')
             return self._preempted()
         if reply.answer is not None:
-            return self._obey(reply.answer)._replace(query_id=reply.query_id)
-        self.emit(EventKind.QUERY_EXPIRED, query_id=reply.query_id,
+            return self._obey(reply.answer)
+        self.emit(EventKind.QUERY_EXPIRED, query_id=reply.question_id,
                   text='{}; fallback: {}'.format(reply.why_none, self._fallback_in_words()))
         return self._fall_back(reply.why_none)
 
@@ -162,7 +162,7 @@ class Recovery:
         if question.deadline_s:
             limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback)
         smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
-            self._node.path, self._record.label, question.query_id, limit))
+            self._node.path, self._record.label, question.question_id, limit))
 
     def states_now(self) -> Mapping[str, str]:
         """Return the states by label, and why each cannot be entered now, '' where it can."""

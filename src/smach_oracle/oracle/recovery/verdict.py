@@ -1,6 +1,6 @@
 """What the meta state hands back to the machine."""
 from enum import Enum
-from typing import FrozenSet, NamedTuple, Optional
+from typing import FrozenSet, NamedTuple
 
 from ..machine.failure import ContainerEnding
 
@@ -24,7 +24,6 @@ class Verdict(NamedTuple):
     by: str = ''  # the expert's name
     text: str = ''
     written: FrozenSet[str] = frozenset()  # userdata keys that survive a restore
-    query_id: Optional[str] = None
 
     def leads_to(self) -> str:
         """Return the state or outcome that the meta state leads to, '' where it raises."""

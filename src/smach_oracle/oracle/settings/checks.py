@@ -6,6 +6,7 @@ import math
 from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 
 from ..errors import SettingsError
+from ..number_checks import is_number, is_whole
 from .paths import path_of
 
 Check = Callable[[str, object], Any]
@@ -19,26 +20,19 @@ def is_state(value: object) -> bool:
 
 def number(low: float, high: float, allowed: str) -> Check:
     """Check for a number from `low` to `high`; its SettingsError says `allowed`."""
-    def check(key: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value,
-                                                     (int, float)) or not low <= value <= high:
+    def check(key: str, value: Any) -> float:
+        if not is_number(value, low, high):
             raise SettingsError(key, value, allowed)
-        try:
-            taken = float(value)
-        except OverflowError:  # a whole number of hundreds of digits
-            taken = math.inf
-        if not math.isfinite(taken):
-            raise SettingsError(key, value, allowed)
-        return taken
+        return float(value)
     return check
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check:
     """Check for a whole number from `low` to `high`; its SettingsError says `allowed`."""
-    def check(key: str, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+    def check(key: str, value: Any) -> int:
+        if not is_whole(value, low, high):
             raise SettingsError(key, value, allowed)
-        return value
+        return int(value)
     return check
 
 

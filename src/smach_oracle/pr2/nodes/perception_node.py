@@ -1,7 +1,6 @@
 """The node of the PR2's perception: objects on the table, a drink in the open refrigerator."""
 from typing import Dict, List, Optional
 
-import numpy as np
 import rospy
 import yaml
 from rosgraph.names import is_legal_name
@@ -17,6 +16,7 @@ from smach_oracle.msg import (
     DetectTabletopResult,
 )
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.number_checks import is_number
 from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.parameters import name_of
@@ -88,7 +88,7 @@ def _height(value: float) -> float:
 
     :raises NotSeen: for one that is not allowed.
     """
-    if not (np.isfinite(value) and 0 <= value <= HIGHEST_LEAST):
+    if not is_number(value, 0, HIGHEST_LEAST):
         raise NotSeen('min_height is {} m; allowed: 0 to {}'.format(value, HIGHEST_LEAST))
     return float(value)
 

@@ -6,8 +6,9 @@ from smach_oracle.oracle.asking.answer_rules import (
     AnswerChoices,
     check_answer,
     check_output_keys,
+    choices_of,
 )
-from smach_oracle.oracle.asking.question import Answer, AnswerKind, names
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.errors import AnswerError
 
 from ..userdata_codec import UserdataCodecError, decode
@@ -25,19 +26,10 @@ def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
     if decision.kind not in _KINDS:
         raise AnswerError('decision kind {} is unknown; allowed: GOTO (1), SUPERSEDE (2), '
                           'GIVE_UP (3), INTERFACE (4)'.format(decision.kind))
-    choices = choices_in(goal)
+    choices = choices_of(goal)
     check_answer(Answer(AnswerKind(decision.kind), decision.state, decision.outcome,
                         decision.interface), choices)
     _check_outputs(choices, decision)
-
-
-def choices_in(goal: ExpertQueryGoal) -> AnswerChoices:
-    """Return what an answer to a question may choose from."""
-    return AnswerChoices(goal.container_path, goal.failed_state,
-                         {choice.state: choice.blocked for choice in goal.choices},
-                         [choice.outcome for choice in goal.supersede_outcomes],
-                         goal.give_up_outcomes, [offer.name for offer in goal.interfaces],
-                         goal.output_keys)
 
 
 def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
@@ -61,11 +53,8 @@ def describe_decision(decision: ExpertDecision) -> str:
 
 
 def _check_outputs(choices: AnswerChoices, decision: ExpertDecision) -> None:
-    keys = [item.key for item in decision.outputs]
-    check_output_keys(choices.failed_state, keys, choices.output_keys)
-    if len(set(keys)) < len(keys):
-        raise AnswerError('output keys come twice: {}'.format(
-            names({key for key in keys if keys.count(key) > 1})))
+    check_output_keys(choices.failed_state, [item.key for item in decision.outputs],
+                      choices.output_keys)
     _check_values(decision.outputs)
 
 

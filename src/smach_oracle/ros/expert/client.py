@@ -120,7 +120,7 @@ class ExpertQueryClient(Expert):
     def _run(self, offer: InterfaceOffer, question: Question,
              cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
         link = self._interface(offer.action)
-        started = self._provide(offer, link, question.query_id, cancelled)
+        started = self._provide(offer, link, question.question_id, cancelled)
         try:
             return self._result(offer, link, question, cancelled)
         finally:

@@ -86,7 +86,7 @@ class FailureCameras:
             self._newest[topic] = image, rospy.get_rostime()
 
     def _publish(self, question: Question, images: List[Tuple[str, CameraMessage]]) -> None:
-        message = FailureFrames(trial_id=question.trial_id, query_id=question.query_id)
+        message = FailureFrames(trial_id=question.trial_id, query_id=question.question_id)
         for topic, image in images:
             try:
                 message.images.append(compressed(image))

@@ -78,7 +78,7 @@ class _QuestionWatch:
                  publish: Callable[[PreconditionChecks], None], listened: Callable[[], bool],
                  free_threads: threading.Semaphore) -> None:
         self.ended = threading.Event()
-        self._query_id = question.query_id
+        self._query_id = question.question_id
         self._watched = [
             _WatchedPrecondition(probe, number, free_threads)
             for number in range(min(MOST_PRECONDITIONS, len(probe.names)))

@@ -29,7 +29,8 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
     """
     return _sendable(
         ExpertQueryGoal(
-            query_id=question.query_id, trial_id=question.trial_id, asked=asked or rospy.Time.now(),
+            query_id=question.question_id, trial_id=question.trial_id,
+            asked=asked or rospy.Time.now(),
             robot=robot, container_path=question.container_path, failed_state=question.failed_state,
             failure_kind=int(question.failure_kind), outcome=question.outcome, text=question.text,
             failure_class=int(question.failure_class), rate=question.rate,
@@ -86,7 +87,7 @@ def to_decision(answer: Answer) -> ExpertDecision:
 def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
     """The goal for a shared-autonomy interface; here the userdata goes whole."""
     return _sendable(
-        SharedAutonomyGoal(query_id=question.query_id, container_path=question.container_path,
+        SharedAutonomyGoal(query_id=question.question_id, container_path=question.container_path,
                            state=question.failed_state, interface=offer.name,
                            userdata=encode_all(question.input_userdata),
                            outcomes=[choice.outcome for choice in question.supersede_outcomes],

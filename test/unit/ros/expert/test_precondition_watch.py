@@ -50,7 +50,7 @@ class FakeQuestion:
 
     def __init__(self, look):
         self.preconditions = look
-        self.query_id = 'q1'
+        self.question_id = 'q1'
 
 
 @pytest.fixture

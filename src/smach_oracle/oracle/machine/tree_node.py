@@ -20,7 +20,7 @@ DEFAULT_NAME = 'SM_ROOT'
 class WrappedMachine(Machine, Protocol):
     """A machine under an oracle: an OracleContainer."""
 
-    _oracle: 'Node'
+    _oracle: 'TreeNode'
 
     def _sync_oracle(self) -> None:
         """Have an ORACLE state that leads to the states and outcomes there are now."""
@@ -32,7 +32,7 @@ class WrappedMachine(Machine, Protocol):
         """Return the id of the trial about to begin."""
 
 
-class Node:
+class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
     `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
@@ -43,7 +43,7 @@ class Node:
 
     def __init__(self, machine: WrappedMachine, tree: Tree, settings: Settings, name: str) -> None:
         self.machine = machine
-        self.parent: Optional['Node'] = None
+        self.parent: Optional['TreeNode'] = None
         self.below: Labels = ()
         self.name = name or DEFAULT_NAME
         self.strict = True
@@ -80,7 +80,7 @@ class Node:
         above = self.parent.relative_path
         return '/'.join(((above,) if above else ()) + self.below)
 
-    def top(self) -> 'Node':
+    def top(self) -> 'TreeNode':
         """Return the node of the top machine."""
         return self if self.parent is None else self.parent.top()
 
@@ -190,7 +190,7 @@ class Node:
         """
         self.records.take_over(label, self.settings_of(label), learned)
 
-    def twin_for(self, machine: WrappedMachine) -> 'Node':
+    def twin_for(self, machine: WrappedMachine) -> 'TreeNode':
         """Return a node for a shallow copy of the machine.
 
         It has the same tree and settings, and rates of its own.
