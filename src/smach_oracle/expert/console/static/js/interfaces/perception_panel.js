@@ -68,7 +68,7 @@ export class PerceptionPanel {
     /** @type {SensorFeed<ImageFacts>} */
     this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
-        say: (text) => this.say(text) });
+        say: (text, missing) => this.say(text, missing) });
     this.refresh();
   }
 
@@ -137,9 +137,12 @@ export class PerceptionPanel {
     }
   }
 
-  /** @param {string} text */
-  say(text) {
-    if (text === 'Nothing new comes.') return; // one image is all there is to come
+  /**
+   * @param {string} text
+   * @param {import('../sensors/sensor_feed.js').Missing} missing
+   */
+  say(text, missing) {
+    if (missing === 'next') return; // one image is all there is to come
     setText(this.note, this.stamp ? '' : text);
     this.note.hidden = !this.note.textContent;
   }
