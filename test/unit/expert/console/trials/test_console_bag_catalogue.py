@@ -58,7 +58,7 @@ def test_they_are_counted_as_the_analysis_counts_them(folder):
     found = load_trials([folder]).trials
     group = count_variants(found)[0]
     row = section()['table'][0]
-    assert (row['experiment'], row['arm'], row['runs']) == (group.experiment, group.name, TRIALS)
+    assert (row['experiment'], row['arm'], row['trials']) == (group.experiment, group.name, TRIALS)
     assert row['counts']['recoveries'] == {'trials': group.of('oracle recoveries').trials,
                                            'events': group.of('oracle recoveries').events}
     assert row['endings']['failure'] == group.of('ended in failure').trials
@@ -112,7 +112,7 @@ def test_number_and_size_are_bounded(folder, monkeypatch):
     monkeypatch.setattr(bag_catalogue, 'MOST_BAGS', 5)
     monkeypatch.setattr(bag_catalogue, 'SHOWN_TRIALS', 3)
     _, section = catalogue_of(folder)
-    assert section()['table'][0]['runs'] == 5 and len(section()['trials']) == 3
+    assert section()['table'][0]['trials'] == 5 and len(section()['trials']) == 3
     assert section(
     )['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
     monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 10)

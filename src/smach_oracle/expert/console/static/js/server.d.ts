@@ -236,7 +236,7 @@ export interface CountsRow {
   experiment: string;
   oracle?: boolean; // of trials that were heard
   arm?: string; // of trials of bags: the variant
-  runs: number;
+  trials: number;
   endings: { success: number; failure: number; preempted: number; unfinished?: number };
   counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
 }
