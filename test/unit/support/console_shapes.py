@@ -17,7 +17,7 @@ from smach_oracle.expert.console.answering import teleoperation
 from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
 from smach_oracle.expert.console.answering.interface_commands import marked_view
 from smach_oracle.expert.console.answering.interface_outputs import interface_output_view
-from smach_oracle.expert.console.answering.precondition_status import checks_view
+from smach_oracle.expert.console.answering.precondition_status import status_view
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view
@@ -101,7 +101,7 @@ def put_questions(sections):
     sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
     checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
         (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
-    sections.put('conditions', {KEY: checks_view(PreconditionChecks(checks=checks), 1000.0)})
+    sections.put('preconditions', {KEY: status_view(PreconditionChecks(checks=checks), 1000.0)})
     sections.put('stills', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
                                   for late_s in (None, 1.5)]})
 

@@ -28,7 +28,7 @@ export interface Batch {
 export interface Sections {
   questions: Question[];
   servers: QueryServer[];
-  conditions: ByKey<ByState<PreconditionCheck[]>>;
+  preconditions: ByKey<ByState<PreconditionStatus[]>>;
   stills: ByKey<KeptImage[]>;
   robots: string[]; // names of their nodes
   trials: TrialOverview;
@@ -111,11 +111,11 @@ export interface UserdataItem {
 
 export interface QueryServer { name: string; connected: boolean }
 
-export interface PreconditionCheck {
+export interface PreconditionStatus {
   name: string;
   holds: boolean | null; // null: unknown
   text: string;
-  looked: number | null; // null: never
+  checked: number | null; // when; null: never
 }
 
 /** An image that the server keeps: what a camera gave when a question was put. */

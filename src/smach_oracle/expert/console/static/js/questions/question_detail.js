@@ -166,7 +166,7 @@ export class QuestionDetail {
     }
     const clock = this.app.store.now();
     const left = now.deadline === null ? Infinity : now.deadline - clock;
-    this.form.showPreconditions(this.app.store.get('conditions')?.[this.key] || {}, clock);
+    this.form.showPreconditions(this.app.store.get('preconditions')?.[this.key] || {}, clock);
     setText(this.time, 'asked ' + duration(clock - now.asked) + ' ago · '
       + (left === Infinity ? 'no time limit' : duration(left) + ' left'));
     this.time.classList.toggle('urgent', left < URGENT_S);
@@ -241,7 +241,7 @@ export class QuestionDetail {
     /** @param {...string} wanted */
     const changed = (...wanted) => wanted.some((name) => names.includes(name));
     if (changed('questions', 'hand', 'output', 'eye')) this.showInterface();
-    if (changed('conditions')) this.tick();
+    if (changed('preconditions')) this.tick();
     if (changed('stills', 'eye')) this.camera.update();
     if (changed('eye')) this.showPerception();
     if (changed('questions')) this.showClaim();
