@@ -102,7 +102,7 @@ def put_questions(sections):
     checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
         (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
     sections.put('preconditions', {KEY: status_view(PreconditionChecks(checks=checks), 1000.0)})
-    sections.put('stills', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
+    sections.put('images', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
                                   for late_s in (None, 1.5)]})
 
 

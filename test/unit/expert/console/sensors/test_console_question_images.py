@@ -58,7 +58,7 @@ def seen(*topics):
 def shown(board, question):
     sections = PageSections()
     board.write_sections(sections, [question])
-    return sections.get('stills').get(question.key, [])
+    return sections.get('images').get(question.key, [])
 
 
 def test_the_console_takes_the_first_frame_after_the_question(monkeypatch):

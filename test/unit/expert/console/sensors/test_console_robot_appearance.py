@@ -334,7 +334,7 @@ class TestModels(console_case.ConsoleCase):
     def test_a_cloud_is_told_with_its_place_at_a_robot(self):
         self.robot.appearance()
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='hand')))
-        path = '/frame/{}?robot={}'.format(self.cloud.number, self.number)
+        path = '/sample/{}?robot={}'.format(self.cloud.number, self.number)
         assert json.loads(
             self.get(path).headers['X-Facts'])['place'] == [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='nowhere')))
@@ -342,6 +342,6 @@ class TestModels(console_case.ConsoleCase):
             self.get(path).headers['X-Facts'])['astray'] == 'No transform from nowhere to base.'
         for robot, code in ((self.cloud.number, 404), (99, 404), ('x', 400), ('1&robot=1', 400),
                             ('-1', 400)):
-            assert self.get('/frame/{}?robot={}'.format(self.cloud.number,
+            assert self.get('/sample/{}?robot={}'.format(self.cloud.number,
                                                         robot)).code == code, robot
         assert isinstance(self.cloud._sample.message, PointCloud2)

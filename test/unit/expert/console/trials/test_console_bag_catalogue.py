@@ -197,14 +197,14 @@ class TestServed(console_case.ConsoleCase):
 
     def test_nobody_else_does(self):
         number = self.trial()
-        for path in ('/recorded/{}'.format(number), '/still/1'):
+        for path in ('/recorded/{}'.format(number), '/image/1'):
             assert self.ask(path).code == 401
             assert self.get(path, xsrf=False).code == 403
 
     def test_a_browser_can_name_neither_path_nor_anything_but_a_number(self):
         for path in ('/recorded/../{}'.format(self.place), '/recorded/' + self.place,
                      '/recorded/1e3', '/recorded/-1', '/recorded/', '/recorded/%2e%2e%2fetc',
-                     '/recorded/12345678901', '/still/a', '/still/1/2'):
+                     '/recorded/12345678901', '/image/a', '/image/1/2'):
             assert self.get(path).code == 404, path
         assert self.get('/recorded/1?path=/etc/passwd').code == 400
         answer = self.get('/recorded/999')
@@ -213,7 +213,7 @@ class TestServed(console_case.ConsoleCase):
     def test_they_are_limited_in_rate(self):
         cookie, info = self.sign_in('viewer')
         began = time.monotonic()
-        codes = [self.ask('/still/1', Cookie=cookie, X_Xsrf=info['xsrf']).code for _ in range(100)]
+        codes = [self.ask('/image/1', Cookie=cookie, X_Xsrf=info['xsrf']).code for _ in range(100)]
         if time.monotonic() - began < 3.0:
             assert 429 in codes
         assert set(codes) <= {404, 429}

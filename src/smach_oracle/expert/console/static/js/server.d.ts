@@ -29,7 +29,7 @@ export interface Sections {
   questions: Question[];
   servers: QueryServer[];
   preconditions: ByKey<ByState<PreconditionStatus[]>>;
-  stills: ByKey<KeptImage[]>;
+  images: ByKey<KeptImage[]>;
   robots: string[]; // names of their nodes
   trials: TrialOverview;
   bags: BagOverview;
@@ -256,7 +256,7 @@ export interface BagOverview {
 export interface RecordedTrial {
   events: TrialEvent[];
   graphs: ByPath<Graph>;
-  stills: { [query: string]: KeptImage[] | undefined };
+  images: { [query: string]: KeptImage[] | undefined };
 }
 
 // --- sensors
@@ -268,7 +268,7 @@ export interface Sensor { id: number; topic: string; kind: SensorKind; type: str
 /** Numbers of the sensors of a perception interface's image and cloud; null: there is none yet. */
 export interface PerceptionSensors { image: number | null; cloud: number | null }
 
-/** GET /frame/NUMBER: what is told beside the newest message of a sensor. */
+/** GET /sample/NUMBER: what is told beside the newest message of a sensor. */
 export interface SensorFacts { sequence: number }
 
 export interface StampedFacts extends SensorFacts {

@@ -52,9 +52,9 @@ export class PerceptionPanel {
     this.warning = '';
     this.resultKey = ''; // of what is shown of it
     this.image = h('canvas', { class: 'image', width: 4, height: 3,
-      'aria-label': 'The frame to draw on' });
+      'aria-label': 'The image to draw on' });
     this.canvas = this.makeCanvas();
-    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the frame…');
+    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the image…');
     /** @type {Map<Tool, HTMLButtonElement>} */
     this.tools = new Map(TOOLS.map(({ tool, text, title }) => [tool, h('button', { class: 'tool',
       'data-tool': tool, title, onclick: () => this.take(tool) }, text)]));
@@ -86,8 +86,8 @@ export class PerceptionPanel {
     return {
       undo: button('Undo', () => this.undo()),
       clear: button('Clear', () => this.clear()),
-      failed: button('Frame of the failure', () => this.useFrame('at_goal')),
-      fresh: button('New frame', () => this.useFrame('fresh')),
+      failed: button('Image of the failure', () => this.useFrame('at_goal')),
+      fresh: button('New image', () => this.useFrame('fresh')),
       accept: button('Accept the object', () => this.accept(), 'primary accept'),
       quit: button('Give up', () => this.giveUp(), 'quit'),
     };

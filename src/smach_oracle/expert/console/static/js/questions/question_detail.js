@@ -242,7 +242,7 @@ export class QuestionDetail {
     const changed = (...wanted) => wanted.some((name) => names.includes(name));
     if (changed('questions', 'hand', 'output', 'eye')) this.showInterface();
     if (changed('preconditions')) this.tick();
-    if (changed('stills', 'eye')) this.camera.update();
+    if (changed('images', 'eye')) this.camera.update();
     if (changed('eye')) this.showPerception();
     if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));

@@ -9,7 +9,7 @@ const LEAST_PAUSE_MS = 60;
 const TROUBLE_PAUSE_MS = 1000;
 const AWAY_PAUSE_MS = 250;
 const RATE_OVER_MS = 3000;
-const TOO_MANY = 'Too many pictures at a time.';
+const TOO_MANY = 'Too many sensors at a time.';
 /** @type {{ [status: number]: string | undefined }} */
 const REFUSALS = { 404: 'It is gone.', 429: TOO_MANY, 503: TOO_MANY };
 
@@ -120,7 +120,7 @@ export class SensorFeed {
     this.controller = new AbortController();
     const { signal } = this.controller;
     const query = 'after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : '');
-    const answer = await this.app.connection.fetch('frame/' + id + '?' + query, { signal });
+    const answer = await this.app.connection.fetch('sample/' + id + '?' + query, { signal });
     if (answer.status === 204) {
       if (after) this.use.say('Nothing new comes.', 'next');
       else this.use.say('Nothing comes.', 'first');
