@@ -131,14 +131,14 @@ def put_sensors(sections):
                              ['/points', 'sensor_msgs/PointCloud2'],
                              ['/joint_states', 'sensor_msgs/JointState']])
     watching.write_sections()
-    assert sections.get('eye')['perception']
+    assert sections.get('sensors')['perception']
 
 
 def put_interfaces(sections):
     outputs = InterfaceOutputs()
     outputs.taker('/robot')(InterfaceOutput(
         query_id='q1', status=InterfaceOutput.RUNNING, lines=['ready']))
-    sections.put('output', {KEY: interface_output_view(outputs.newest('q1'))})
+    sections.put('interface_output', {KEY: interface_output_view(outputs.newest('q1'))})
     held = DrivingControl()
     held.take(DrivingSession(KEY, 7, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
     stands = TeleopState(arm='left', speed=math.nan, clearance=math.inf, gripper=math.nan)
@@ -149,7 +149,7 @@ def put_interfaces(sections):
             state=state, control=control, arm='left', arms=['left'], boxes=boxes,
             frames=lambda arm: {'tool': 'tool', 'base': 'base', 'camera': 'camera'})
         views['{}{}'.format(KEY, len(views))] = teleoperation._view(hand)
-    sections.put('hand', views)
+    sections.put('manipulation', views)
 
 
 def put_trials(sections, log, folder):

@@ -59,7 +59,7 @@ def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
         left = '' if each.deadline_s == math.inf else duration(each.deadline_s - now_s)
         table.add_row(str(number), Text(clean(each.goal.robot)), _place(each.goal),
                       Text('{:.0f}%'.format(100 * each.goal.rate), rate_colour(each.goal.rate)),
-                      duration(now_s - each.asked_s), left, Text(_who(each)))
+                      duration(now_s - each.asked_s), left, Text(_holder(each)))
     return table
 
 
@@ -183,7 +183,7 @@ def _place(goal: ExpertQueryGoal) -> Text:
                          (clean(goal.failed_state), 'bold'))
 
 
-def _who(each: ListedQuestion) -> str:
+def _holder(each: ListedQuestion) -> str:
     if each.status == OpenQuery.INTERFACE_RUNNING:
         return 'interface ' + clean(each.goal.interface)
     return clean(each.holder)

@@ -149,11 +149,11 @@ class Teleoperation:
         for key, client in list(self._clients.items()):
             if client.control.session is not None and client.control.silent(time.monotonic()):
                 self._leave(key, None, 'the page has fallen silent')
-        self._sections.put('hand',
+        self._sections.put('manipulation',
                            {key: _view(client)
                             for key, client in list(self._clients.items())})
         self._sections.put(
-            'output', {
+            'interface_output', {
                 listed.key: interface_output_view(self._outputs.newest(listed.goal.query_id))
                 for listed in self._front_end.questions() if self._known(listed)
             })

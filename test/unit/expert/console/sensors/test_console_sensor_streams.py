@@ -70,17 +70,17 @@ def test_there_are_only_so_many():
 
 def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(monkeypatch):
     found = known()
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 0
     sensor = found.on('/camera/image')
     assert sensor.newer(0) is None
-    found.tend()
-    found.tend()
+    found.update_subscriptions()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 1
     sensor.take(picture())
     later = time.monotonic() + sensor_streams.IDLE_S
     monkeypatch.setattr(sensor_streams.time, 'monotonic', lambda: later)
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 0
     assert sensor.newer(0) is None, 'what was seen long ago is not shown as new'
 
@@ -90,7 +90,7 @@ def test_only_so_many_are_listened_to_at_a_time():
     found.follow([['/camera{}'.format(number), 'sensor_msgs/Image'] for number in range(50)])
     for each in found.view():
         found.find(each['id']).newer(0)
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == sensor_streams.MOST_LISTENED
 
 

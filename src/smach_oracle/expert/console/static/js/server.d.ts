@@ -33,9 +33,9 @@ export interface Sections {
   robots: string[]; // names of their nodes
   trials: TrialOverview;
   bags: BagOverview;
-  eye: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
-  hand: ByKey<Manipulation>;
-  output: ByKey<InterfaceOutput>;
+  sensors: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
+  manipulation: ByKey<Manipulation>;
+  interface_output: ByKey<InterfaceOutput>;
   [name: `live ${string}`]: LiveMachines; // by robot
   [name: `graph ${string}`]: Graph; // by robot and container path
 }

@@ -121,7 +121,7 @@ export class PerceptionPanel {
 
   /** Numbers of the sensors of its image and of the cloud of that, null before there are any. */
   get sensors() {
-    const running = this.app.store.get('eye')?.perception || {};
+    const running = this.app.store.get('sensors')?.perception || {};
     return running[this.question.key] || { image: null, cloud: null };
   }
 
