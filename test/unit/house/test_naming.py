@@ -22,10 +22,10 @@ VAGUE = {
 VAGUE_SECTIONS = {'eye', 'hand', 'output', 'stills', 'conditions'}
 
 
-def definitions():
-    """Every class and function of the package, as (file, node)."""
+def definitions(paths=PACKAGE):
+    """Every class and function of these files, as (file, node)."""
     kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    return [(path, node) for path in PACKAGE for node in ast.walk(parse(path))
+    return [(path, node) for path in paths for node in ast.walk(parse(path))
             if isinstance(node, kinds)]
 
 
@@ -37,7 +37,7 @@ def names_in_script(path):
 
 def test_a_class_name_occurs_once():
     places = collections.defaultdict(list)
-    for path, node in definitions():
+    for path, node in definitions(python_files('src')):
         if isinstance(node, ast.ClassDef):
             places[node.name.lstrip('_')].append('{}:{}'.format(shown(path), node.lineno))
     assert not {name: found for name, found in places.items()

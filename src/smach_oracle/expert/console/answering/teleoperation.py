@@ -14,7 +14,7 @@ from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
 from ...interface_outputs import InterfaceOutputs
 from ..commands.checks import shown
-from ..commands.commands import Command, CommandReply
+from ..commands.commands import CommandReply, PageCommand
 from ..feeds.repeating import repeat
 from ..feeds.views import number
 from ..web.audit import Audit, Person
@@ -60,7 +60,7 @@ class Teleoperation:
         return any(client.control.session is not None and client.control.session.page == page
                    for client in list(self._clients.values()))
 
-    def drive(self, command: Command, page: int) -> CommandReply:
+    def drive(self, command: PageCommand, page: int) -> CommandReply:
         """Relay one command of the page in control; a command that comes late stops the arm."""
         arguments = command.arguments
         client = self._clients.get(arguments['question'])
@@ -83,7 +83,7 @@ class Teleoperation:
                 client.release(_operator(session))
         return CommandReply(True)
 
-    def carry_out(self, command: Command, person: Person, page: int) -> CommandReply:
+    def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
         """Take control or leave it, and record it in the audit."""
         key = command.arguments['question']
         client, listed = self._clients.get(key), self._front_end.find(key)
