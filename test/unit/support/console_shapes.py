@@ -16,8 +16,8 @@ from std_msgs.msg import Header
 from smach_oracle.expert.console.answering import teleoperation
 from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
 from smach_oracle.expert.console.answering.interface_commands import marked_view
-from smach_oracle.expert.console.answering.interface_outputs import interface_output_view
-from smach_oracle.expert.console.answering.precondition_status import status_view
+from smach_oracle.expert.console.answering.interface_output_view import interface_output_view
+from smach_oracle.expert.console.answering.precondition_sections import status_view
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view

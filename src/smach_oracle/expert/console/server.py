@@ -19,7 +19,7 @@ from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
 from .answering.interface_commands import InterfaceCommands
-from .answering.precondition_status import PreconditionStatuses
+from .answering.precondition_sections import PreconditionStatuses
 from .answering.question_commands import QuestionCommands
 from .answering.question_sections import QuestionSections
 from .answering.sensor_discovery import SensorDiscovery

@@ -21,7 +21,7 @@ from ..web.audit import Audit, Person
 from ..web.sections import PageSections
 from .driving_control import DrivingSession
 from .interface_actions import action_of, interface_actions
-from .interface_outputs import interface_output_view
+from .interface_output_view import interface_output_view
 from .teleop_client import TeleopClient
 
 DISCOVERY_PERIOD_S = 0.5
