@@ -7,7 +7,7 @@ import smach
 from smach.container import Container, Edge
 from smach.state import State
 from smach.transitions import end_of, inconsistencies, search_target
-from smach.visit import Visit
+from smach.visit import StateVisit
 
 __all__ = ['StateMachine']
 
@@ -46,7 +46,7 @@ class StateMachine(Container):
         self._current_outcome: Optional[str] = None
         self._preempted_label: Optional[str] = None
         self._preempted_state: Optional[State] = None
-        self._visits: Dict[str, Visit] = {}
+        self._visits: Dict[str, StateVisit] = {}
 
         # What add_auto() left to be connected to the next state added.
         self._last_added_label: Optional[str] = None
@@ -257,12 +257,13 @@ class StateMachine(Container):
         finally:
             self._state_transitioning_lock.acquire()
 
-    def _prepare_visit(self, label: str, state: Any) -> Visit:
+    def _prepare_visit(self, label: str, state: Any) -> StateVisit:
         """What the state is given to read and write, kept for its next visit where that is safe."""
         if label not in self._states:
             raise smach.InvalidStateError(
                 "The current state '%s' is none of %s" % (label, list(self._states)))
-        visit = Visit(state, self.userdata, self._remappings[label], self._constants.get(label))
+        visit = StateVisit(state, self.userdata, self._remappings[label],
+                           self._constants.get(label))
         if visit.may_be_kept:
             self._visits[label] = visit
         return visit

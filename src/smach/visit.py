@@ -5,7 +5,7 @@ from smach.state import State
 from smach.user_data import ConstantsRemapper, Remapper
 
 
-class Visit(object):
+class StateVisit(object):
     """The view on userdata a state is given, with everything it was made of, to be compared by
     identity later.
     """

@@ -11,7 +11,7 @@ NO_ANSWER = 'no answer'
 ANSWER_WITHIN_S = 1.5
 
 
-class _TimedTransport(xmlrpc.client.Transport):
+class _ProbeTransport(xmlrpc.client.Transport):
     """XML-RPC over HTTP that gives up after ``ANSWER_WITHIN_S``."""
 
     def make_connection(self, host):  # type: ignore[no-untyped-def]
@@ -27,7 +27,7 @@ def probe_node(node_uri: str, caller_id: str) -> str:
     host or the process keeps silent (frozen, busy, or cut off from the network).
     """
     try:
-        with xmlrpc.client.ServerProxy(node_uri, transport=_TimedTransport()) as node:
+        with xmlrpc.client.ServerProxy(node_uri, transport=_ProbeTransport()) as node:
             node.getPid(caller_id)
         return ALIVE
     except ConnectionRefusedError:

@@ -242,7 +242,8 @@ class IntrospectionTest(unittest.TestCase):
         confirmed = []
         with LogWatch() as log:
             self.assertTrue(wait_for(lambda: confirmed.append(client.set_initial_state(
-                self.name, '/ROOT', ['NOWHERE'], timeout=rospy.Duration(1.0))) or 'NOWHERE' in log.text()))
+                self.name, '/ROOT', ['NOWHERE'],
+                timeout=rospy.Duration(1.0))) or 'NOWHERE' in log.text()))
         self.assertFalse(any(confirmed))
         self.assertFalse(client.set_initial_state(self.name, '/ELSEWHERE', ['A'],
                                                   timeout=rospy.Duration(0.3)))

@@ -11,7 +11,7 @@ MOST_CONTAINERS = 200
 MOST_FRAMES = 40
 
 
-class Container(NamedTuple):
+class RecordedContainer(NamedTuple):
     """One container's structure, by labels."""
 
     children: Tuple[str, ...]
@@ -31,13 +31,13 @@ class FailureImage(NamedTuple):
 class RecordedMachines(NamedTuple):
     """The machines of a bag."""
 
-    containers: Dict[str, Container]  # by path, as in events; the latest word on each
+    containers: Dict[str, RecordedContainer]  # by path, as in events; the latest word on each
     frames: List[FailureImage]
 
 
 def read_machines(path: str) -> RecordedMachines:
     """Read a bag that has events in it. A damaged one may raise anything."""
-    containers: Dict[str, Container] = {}
+    containers: Dict[str, RecordedContainer] = {}
     frames: List[FailureImage] = []
     stores = MessageStores()
     with Reader(path) as reader:
@@ -53,9 +53,10 @@ def read_machines(path: str) -> RecordedMachines:
     return RecordedMachines(containers, frames)
 
 
-def _container(message: Any) -> Container:
+def _container(message: Any) -> RecordedContainer:
     edges = zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)
-    return Container(tuple(message.children), tuple(edges), tuple(message.container_outcomes))
+    return RecordedContainer(tuple(message.children), tuple(edges),
+                             tuple(message.container_outcomes))
 
 
 def _frames(message: Any) -> Iterator[FailureImage]:

@@ -77,7 +77,7 @@ def format_points(points: Sequence[SweepPoint]) -> str:
         ]
         lines += [
             '', '{}, {}'.format(experiment, label),
-            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format('memory N', 'runs',
+            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format('memory N', 'trials',
                                                                'expert asked (95% interval)',
                                                                'over replicates',
                                                                'oracle recovered', 'failed',

@@ -32,7 +32,7 @@ def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary
 
 def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
     headings = [
-        'Experiment', 'Variant', 'Runs', 'Oracle recoveries', 'Expert interventions',
+        'Experiment', 'Variant', 'Trials', 'Oracle recoveries', 'Expert interventions',
         'Ended in failure'
     ]
     names = [RECOVERIES, ANSWERED, ENDED_IN_FAILURE]
@@ -65,7 +65,7 @@ def _variant_lines(variant: VariantCounts) -> List[str]:
     heading = '  {:<26}{:>8}{:>9}   {:<16}{:>8}'.format('', 'trials', 'share', '95% interval',
                                                         'events')
     lines = [
-        '{}, {}: {} runs{}'.format(
+        '{}, {}: {} trials{}'.format(
             variant.experiment, variant.name, variant.trials,
             ' in {} replicates'.format(variant.replicates) if several else ''),
         heading + ('   over replicates' if several else '')

@@ -45,7 +45,7 @@ class QuestionSource(Protocol):
         """
 
 
-class _Kept(NamedTuple):
+class _KeptClaim(NamedTuple):
     listed: ListedQuestion
     holders: Set[int]
 
@@ -61,7 +61,7 @@ class ClaimKeeper:
         self._questions = questions
         self._lease_s = lease_s
         self._lock = threading.Lock()
-        self._kept: Dict[Claim, _Kept] = {}
+        self._kept: Dict[Claim, _KeptClaim] = {}
         self._missed: Dict[Claim, int] = {}
         self._stopped = threading.Event()
         threading.Thread(target=self._run, name='keep claims', daemon=True).start()
@@ -76,7 +76,7 @@ class ClaimKeeper:
         """Renew a claim from now on."""
         claim = Claim(listed.key, expert)
         with self._lock:
-            self._kept.setdefault(claim, _Kept(listed, set())).holders.add(holder)
+            self._kept.setdefault(claim, _KeptClaim(listed, set())).holders.add(holder)
 
     def leave(self, claim: Claim, holder: int) -> bool:
         """Take a holder from a claim; whether no other is left, and it is renewed no longer."""

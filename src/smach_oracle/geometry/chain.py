@@ -10,6 +10,7 @@ from typing import List, Mapping, Optional, Tuple
 import numpy as np
 
 from .joints import Joint, moved, placed_parts, read_joints
+from .links import joints_down
 from .transforms import rotation_vector
 
 POSITION_TOLERANCE = 1e-3  # m
@@ -19,7 +20,9 @@ ANGLE_TOLERANCE = 5e-3  # rad
 class JointChain:
     """The n moving joints between two links, in order from the root.
 
-    Their positions are rad, or m where they slide.
+    Their positions are rad, or m where they slide. A joint that mimics another counts as one that
+    moves by itself. Many configurations are computed at a time here, as the inverse needs them:
+    links.py has the walk along the links for one.
     """
 
     def __init__(self, joints: List[Joint], fixed: Mapping[str, float]) -> None:
@@ -59,15 +62,7 @@ class JointChain:
         for link in (root, tip):
             if link not in links:
                 raise ValueError('robot description: no link {!r}'.format(link))
-        joints = []
-        link = tip
-        while link != root:
-            if link not in by_child:
-                raise ValueError('robot description: {!r} does not hang below {!r}'.format(
-                    tip, root))
-            joints.append(by_child[link])
-            link = by_child[link].parent
-        joints.reverse()
+        joints = joints_down(by_child, root, tip)
         unknown = sorted(set(fixed or {}) - {joint.name for joint in joints})
         if unknown:
             raise ValueError('no joint {} between {!r} and {!r}'.format(

@@ -1,6 +1,6 @@
 """The joints of a URDF, and how each moves the link that it carries: all kinematics begins here."""
 import xml.etree.ElementTree as ElementTree
-from typing import Dict, List, NamedTuple, Optional, Sequence, Union
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
@@ -8,6 +8,14 @@ from .transforms import from_rpy, skew
 
 TURNING = ('revolute', 'continuous')
 MOVING = TURNING + ('prismatic',)
+
+
+class Mimic(NamedTuple):
+    """A joint that follows another one: its position is multiplier * that of `joint` + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float  # rad or m
 
 
 class Joint(NamedTuple):
@@ -25,6 +33,7 @@ class Joint(NamedTuple):
     # (3, 4, 4): the motion at q is parts[0] + sin q * parts[1] + cos q * parts[2], of a joint that
     # slides parts[0] + q * parts[1]
     parts: np.ndarray
+    mimic: Optional[Mimic] = None  # None where it follows no other
 
     @property
     def moves(self) -> bool:
@@ -39,6 +48,18 @@ class Joint(NamedTuple):
     def motion(self, position: float) -> np.ndarray:
         """4x4: the joint's frame at zero from that at a position (rad or m)."""
         return moved(self.parts, self.turns, position) if self.moves else np.eye(4)
+
+    def position(self, positions: Mapping[str, float]) -> float:
+        """Where it stands, in rad or m.
+
+        :param positions: rad or m by joint; a joint that is missing goes with the one that it
+            mimics, else it stands at zero.
+        """
+        if self.name in positions:
+            return positions[self.name]
+        if self.mimic is None:
+            return 0.0
+        return self.mimic.multiplier * positions.get(self.mimic.joint, 0.0) + self.mimic.offset
 
 
 def moved(parts: np.ndarray, turns: Union[bool, np.ndarray],
@@ -98,7 +119,24 @@ def _joint(element: ElementTree.Element) -> Joint:
     if kind == 'continuous':
         lower, upper = -np.inf, np.inf
     return Joint(element.get('name', ''), kind, _link(element, 'parent'), _link(element, 'child'),
-                 origin_of(element), direction, lower, upper, velocity, _parts(kind, direction))
+                 origin_of(element), direction, lower, upper, velocity, _parts(kind, direction),
+                 _mimic(element))
+
+
+def _mimic(joint: ElementTree.Element) -> Optional[Mimic]:
+    element = joint.find('mimic')
+    if element is None:
+        return None
+    return Mimic(element.get('joint', ''), _number(element, 'multiplier', 1.0),
+                 _number(element, 'offset', 0.0))
+
+
+def _number(element: ElementTree.Element, name: str, default: float) -> float:
+    text = element.get(name)
+    try:
+        return float(text) if text else default
+    except ValueError:
+        raise ValueError('{}="{}" is no number'.format(name, text)) from None
 
 
 def _link(joint: ElementTree.Element, end: str) -> str:

@@ -10,7 +10,8 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from .joints import Joint, read_joints
+from .joints import Joint, Mimic, read_joints
+from .links import link_poses
 from .transforms import from_rpy
 from .xml_text import read_xml
 
@@ -34,21 +35,12 @@ class Shape(NamedTuple):
     colour: Colour
 
 
-class Mimic(NamedTuple):
-    """A joint that follows another one: its position is multiplier * that of `joint` + offset."""
-
-    joint: str
-    multiplier: float
-    offset: float
-
-
 class RobotShapes(NamedTuple):
     """A robot to draw."""
 
     name: str
     root: str  # the link on which all others hang
     joints: List[Joint]  # every link's after that of the link that it hangs on
-    mimics: Dict[str, Mimic]
     shapes: List[Shape]  # as the robot looks; where a link has no looks, what it collides with
     # of links that have looks: what may stand for a mesh that cannot be had
     collisions: List[Shape]
@@ -61,20 +53,10 @@ class RobotShapes(NamedTuple):
     def poses(self, positions: Mapping[str, float]) -> Dict[str, np.ndarray]:
         """4x4 by link: the root from it.
 
-        :param positions: rad or m by joint; joints that are missing stand at zero, or go with those
-            that they mimic.
+        :param positions: rad or m by joint; joints that are missing go with those that they mimic,
+            or stand at zero.
         """
-        poses = {self.root: np.eye(4)}
-        for joint in self.joints:
-            poses[joint.child] = poses[joint.parent] @ joint.origin @ joint.motion(
-                self._position(joint, positions))
-        return poses
-
-    def _position(self, joint: Joint, positions: Mapping[str, float]) -> float:
-        if joint.name in positions:
-            return positions[joint.name]
-        mimic = self.mimics.get(joint.name)
-        return mimic.multiplier * positions.get(mimic.joint, 0.0) + mimic.offset if mimic else 0.0
+        return link_poses(self.joints, self.root, positions)
 
 
 def read_shapes(urdf: str) -> RobotShapes:
@@ -97,10 +79,9 @@ def read_shapes(urdf: str) -> RobotShapes:
     known = _materials(root)
     try:
         shapes, collisions = _all_shapes(elements, known)
-        mimics = _mimics(root)
     except (TypeError, AttributeError) as err:
         raise ValueError('robot description: not a URDF: {}'.format(err)) from err
-    return RobotShapes(root.get('name', '')[:200], base, joints, mimics, shapes, collisions)
+    return RobotShapes(root.get('name', '')[:200], base, joints, shapes, collisions)
 
 
 def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Joint], str]:
@@ -112,6 +93,10 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
             raise ValueError(
                 'robot description: joint {!r} has a place or an axis that is none'.format(
                     joint.name[:100]))
+        if joint.mimic is not None and not _is_finite(joint.mimic):
+            raise ValueError(
+                'robot description: joint {!r} mimics another by a number that is none, or not '
+                'below {:g}'.format(joint.name[:100], FURTHEST))
         below.setdefault(joint.parent, []).append(joint)
     roots = [name for name in names if name not in by_child]
     if len(roots) != 1:
@@ -129,6 +114,10 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
         raise ValueError('robot description: {} does not hang on {}, by whatever way'.format(
             ', '.join(lost)[:200], roots[0][:100]))
     return ordered, roots[0]
+
+
+def _is_finite(mimic: Mimic) -> bool:
+    return all(abs(number) < FURTHEST for number in (mimic.multiplier, mimic.offset))
 
 
 def _all_shapes(elements: List[ElementTree.Element],
@@ -208,15 +197,3 @@ def _colour(material: Optional[ElementTree.Element], known: Mapping[str, Colour]
         return known.get(material.get('name', ''), GREY)
     red, green, blue = (round(255 * min(max(level, 0.0), 1.0)) for level in levels)
     return red, green, blue
-
-
-def _mimics(root: ElementTree.Element) -> Dict[str, Mimic]:
-    found = {}
-    for joint in root.findall('joint'):
-        mimic = joint.find('mimic')
-        if mimic is not None:
-            where = 'robot description: joint {!r}'.format(joint.get('name', '')[:100])
-            multiplier, offset = (_numbers(where, mimic, name, default, 1)[0]
-                                  for name, default in (('multiplier', '1'), ('offset', '0')))
-            found[joint.get('name', '')] = Mimic(mimic.get('joint', ''), multiplier, offset)
-    return found

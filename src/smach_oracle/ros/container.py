@@ -26,7 +26,7 @@ from .loaded_settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_
 PreconditionLists = Optional[Mapping[str, List[Any]]]
 
 
-class _Given(NamedTuple):
+class _GivenSettings(NamedTuple):
     """What a machine was given in code, kept for when the parameters are merged in."""
 
     settings: Optional[Mapping[str, Any]]
@@ -34,7 +34,7 @@ class _Given(NamedTuple):
     nested: Optional[bool]
 
 
-_given: MutableMapping[BareContainer, _Given] = weakref.WeakKeyDictionary()
+_given: MutableMapping[BareContainer, _GivenSettings] = weakref.WeakKeyDictionary()
 
 
 class OracleContainer(BareContainer):
@@ -114,7 +114,7 @@ def _remember(machine: BareContainer, settings: SettingsLike, preconditions: Pre
     if isinstance(settings, Settings):
         _given.pop(machine, None)
     else:
-        _given[machine] = _Given(settings, preconditions, nested)
+        _given[machine] = _GivenSettings(settings, preconditions, nested)
 
 
 def _take_parameters(machine: BareContainer) -> None:

@@ -42,7 +42,7 @@ def test_folders_may_be_given_one_by_one_and_bags_too(both_variants, capsys):
     assert capsys.readouterr().out == whole
     bag = sorted((both_variants / 'with_oracle').iterdir())[0]
     assert bag_statistics.main([str(bag)]) == 0
-    assert 'with oracle: 1 runs' in capsys.readouterr().out
+    assert 'with oracle: 1 trials' in capsys.readouterr().out
 
 
 def test_files_are_written_where_asked(both_variants, tmp_path, capsys):
@@ -75,7 +75,7 @@ def test_skipped_bags_are_named_and_the_exit_code_tells(record, capsys):
     Path(folder, 'broken.bag').write_text('?')
     assert bag_statistics.main([folder]) == 1
     out, err = capsys.readouterr()
-    assert 'with oracle: 2 runs' in out
+    assert 'with oracle: 2 trials' in out
     assert 'broken.bag' in err and 'magic' in err
 
 
@@ -136,7 +136,7 @@ def test_neither_ros_nor_smach_need_be_installed(both_variants, tmp_path):
          str(tmp_path / 'f')], env={'PATH': os.environ['PATH'], 'HOME': str(tmp_path)}, timeout=100,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
     assert run.returncode == 0, run.stderr
-    assert 'with oracle: 150 runs' in run.stdout
+    assert 'with oracle: 150 trials' in run.stdout
 
 
 def test_the_command_counts_300_bags_in_seconds(both_variants):

@@ -33,6 +33,7 @@ def test_each_oracle_is_a_point_in_the_order_of_its_memory():
 
 def test_the_table_shows_shares_with_intervals():
     text = sweep.format_points(points())
+    assert text.splitlines()[1].split()[:3] == ['memory', 'N', 'trials']
     assert 'PICK_AND_PLACE, algorithm1\n' in text and 'PICK_AND_PLACE, prose\n' in text
     row = next(line for line in text.split('prose')[1].splitlines()
                if line.startswith('         2'))

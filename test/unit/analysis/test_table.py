@@ -32,30 +32,30 @@ def trial(number=0, **fields):
     return TrialSummary(**dict(defaults, **fields))
 
 
-# scipy 1.10: stats.binomtest(successes, runs).proportion_ci(method='wilson')
-@pytest.mark.parametrize('successes, runs, low, high', [(39, 150, 0.196421, 0.335564),
+# scipy 1.10: stats.binomtest(successes, trials).proportion_ci(method='wilson')
+@pytest.mark.parametrize('successes, trials, low, high', [(39, 150, 0.196421, 0.335564),
                                                         (6, 150, 0.018459, 0.084513),
                                                         (0, 10, 0.0, 0.277533),
                                                         (10, 10, 0.722467, 1.0),
                                                         (1, 2, 0.094531, 0.905469)])
-def test_wilson_interval(successes, runs, low, high):
-    assert wilson_interval(successes, runs) == pytest.approx((low, high), abs=1e-6)
+def test_wilson_interval(successes, trials, low, high):
+    assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=1e-6)
 
 
 def test_wilson_interval_holds_the_share_and_narrows_with_the_runs():
     widths = []
-    for runs in (10, 100, 1000, 10_000):
-        low, high = wilson_interval(runs // 5, runs)
+    for trials in (10, 100, 1000, 10_000):
+        low, high = wilson_interval(trials // 5, trials)
         assert 0.0 <= low < 0.2 < high <= 1.0
         widths.append(high - low)
     assert widths == sorted(widths, reverse=True)
     assert math.isclose(widths[-1], 2 * 1.96 * math.sqrt(0.2 * 0.8 / 10_000), rel_tol=0.01)
 
 
-@pytest.mark.parametrize('successes, runs', [(-1, 10), (11, 10)])
-def test_impossible_counts_are_refused(successes, runs):
+@pytest.mark.parametrize('successes, trials', [(-1, 10), (11, 10)])
+def test_impossible_counts_are_refused(successes, trials):
     with pytest.raises(ValueError, match='allowed: 0 to 10'):
-        wilson_interval(successes, runs)
+        wilson_interval(successes, trials)
 
 
 def test_no_runs_say_nothing():

@@ -67,6 +67,8 @@ def test_links_are_where_the_joints_say_and_mimics_follow():
       'xyz="inf 0 0"'),
      (ARM.replace('xyz="0 0 1"/><axis', 'xyz="nan 0 1"/><axis'), 'place or an axis'),
      (ARM.replace('multiplier="-2"', 'multiplier="x"'), 'multiplier="x"'),
+     (ARM.replace('multiplier="-2"', 'multiplier="inf"'), "'other' mimics another"),
+     (ARM.replace('offset="0.5"', 'offset="nan"'), "'other' mimics another"),
      (ARM.replace('<child link="finger"/>', ''), 'not a URDF')])
 def test_what_is_wrong_is_said(text, said):
     with pytest.raises(ValueError, match='robot description') as error:

@@ -3,27 +3,41 @@ import ast
 import collections
 import re
 
-from house import parse, python_files, shown
+from house import ROOT, parse, python_files, shown
 
 PACKAGE = python_files('src/smach_oracle')
 # the one in ros/ extends the bare one of the executive, and stands for it in ROS programs
 SHARED = {'OracleContainer'}
+STATIC, = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
+SCRIPTS = sorted((STATIC / 'js').rglob('*.js'))
+# a class, or a function of a module or a class
+IN_SCRIPT = re.compile(
+    r'^(?:export )?(?:async )?(?:function|class) (\w+)|^  (?:async |get |set |static )*(\w+)\(',
+    re.MULTILINE)
 # names that do not say what a thing is
 VAGUE = {
-    'quicken', 'Face', 'Desk', 'Office', 'Eye', 'Hands', 'Tally', 'standing', 'course', 'settling'
+    'quicken', 'Face', 'Desk', 'Office', 'Eye', 'Hands', 'Tally', 'standing', 'course', 'settling',
+    'Thing', 'Item', 'Given', 'Kept', 'Freshness', 'tend', 'lap', 'apart', 'who', 'letting_be'
 }
+VAGUE_SECTIONS = {'eye', 'hand', 'output', 'stills', 'conditions'}
 
 
-def definitions():
-    """Every class and function of the package, as (file, node)."""
+def definitions(paths=PACKAGE):
+    """Every class and function of these files, as (file, node)."""
     kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    return [(path, node) for path in PACKAGE for node in ast.walk(parse(path))
+    return [(path, node) for path in paths for node in ast.walk(parse(path))
             if isinstance(node, kinds)]
+
+
+def names_in_script(path):
+    """The classes and functions that a script defines; calls at its margin may be among them."""
+    found = IN_SCRIPT.findall(path.read_text(encoding='utf-8'))
+    return [function or method for function, method in found]
 
 
 def test_a_class_name_occurs_once():
     places = collections.defaultdict(list)
-    for path, node in definitions():
+    for path, node in definitions(python_files('src')):
         if isinstance(node, ast.ClassDef):
             places[node.name.lstrip('_')].append('{}:{}'.format(shown(path), node.lineno))
     assert not {name: found for name, found in places.items()
@@ -33,8 +47,24 @@ def test_a_class_name_occurs_once():
 def test_nothing_has_a_name_that_does_not_say_what_it_is():
     found = ['{}:{} {}'.format(shown(path), node.lineno, node.name) for path, node in definitions()
              if node.name.lstrip('_') in VAGUE]
-    found += [shown(path) for path in PACKAGE if path.stem in {name.lower() for name in VAGUE}]
+    found += [shown(path) for path in PACKAGE + SCRIPTS
+              if path.stem in {name.lower() for name in VAGUE}]
+    found += ['{} {}'.format(shown(path), name) for path in SCRIPTS
+              for name in names_in_script(path) if name in VAGUE]
     assert not found
+
+
+def test_the_names_in_scripts_are_found():
+    names = {name for path in SCRIPTS for name in names_in_script(path)}
+    assert len(names) > 400 and {'SensorFeed', 'counted', 'sayOfRobot', 'stop'} <= names
+
+
+def test_every_section_of_the_page_says_what_it_holds():
+    text = (STATIC / 'js/server.d.ts').read_text(encoding='utf-8')
+    sections = text.split('export interface Sections {')[1].split('\n}')[0]
+    names = set(re.findall(r'^  (\w+):', sections, re.MULTILINE))
+    assert {'questions', 'sensors', 'preconditions'} <= names
+    assert not names & VAGUE_SECTIONS
 
 
 def test_errors_are_documented_in_one_style():

@@ -70,6 +70,14 @@ def test_every_line_has_at_most_100_columns():
     assert not [place for length, place in lines if length > MOST_COLUMNS]
 
 
+def test_no_script_asks_which_words_a_text_has():
+    """What is told to people is worded anew now and then; what scripts ask has a name or a flag."""
+    words = re.compile(r"(?:startsWith\('[A-Z]|includes\('[A-Z]|[!=]== '[A-Z]\w* )[^'\n]*'")
+    found = ['{}: {}'.format(shown(path), match.group())
+             for path in SCRIPTS for match in words.finditer(text_of(path))]
+    assert not found
+
+
 def test_files_functions_and_folders_are_short():
     lengths = {shown(path): len(text_of(path).splitlines()) for path in FILES}
     assert not {name: length for name, length in lengths.items() if length > MOST_LINES}

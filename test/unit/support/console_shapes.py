@@ -16,8 +16,8 @@ from std_msgs.msg import Header
 from smach_oracle.expert.console.answering import teleoperation
 from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
 from smach_oracle.expert.console.answering.interface_commands import marked_view
-from smach_oracle.expert.console.answering.interface_outputs import interface_output_view
-from smach_oracle.expert.console.answering.precondition_status import checks_view
+from smach_oracle.expert.console.answering.interface_output_view import interface_output_view
+from smach_oracle.expert.console.answering.precondition_sections import status_view
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view
@@ -101,8 +101,8 @@ def put_questions(sections):
     sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
     checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
         (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
-    sections.put('conditions', {KEY: checks_view(PreconditionChecks(checks=checks), 1000.0)})
-    sections.put('stills', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
+    sections.put('preconditions', {KEY: status_view(PreconditionChecks(checks=checks), 1000.0)})
+    sections.put('images', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
                                   for late_s in (None, 1.5)]})
 
 
@@ -131,14 +131,14 @@ def put_sensors(sections):
                              ['/points', 'sensor_msgs/PointCloud2'],
                              ['/joint_states', 'sensor_msgs/JointState']])
     watching.write_sections()
-    assert sections.get('eye')['perception']
+    assert sections.get('sensors')['perception']
 
 
 def put_interfaces(sections):
     outputs = InterfaceOutputs()
     outputs.taker('/robot')(InterfaceOutput(
         query_id='q1', status=InterfaceOutput.RUNNING, lines=['ready']))
-    sections.put('output', {KEY: interface_output_view(outputs.newest('q1'))})
+    sections.put('interface_output', {KEY: interface_output_view(outputs.newest('q1'))})
     held = DrivingControl()
     held.take(DrivingSession(KEY, 7, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
     stands = TeleopState(arm='left', speed=math.nan, clearance=math.inf, gripper=math.nan)
@@ -149,7 +149,7 @@ def put_interfaces(sections):
             state=state, control=control, arm='left', arms=['left'], boxes=boxes,
             frames=lambda arm: {'tool': 'tool', 'base': 'base', 'camera': 'camera'})
         views['{}{}'.format(KEY, len(views))] = teleoperation._view(hand)
-    sections.put('hand', views)
+    sections.put('manipulation', views)
 
 
 def put_trials(sections, log, folder):

@@ -12,7 +12,7 @@ import tornado.websocket
 
 from .answering.question_commands import QuestionCommands
 from .answering.teleoperation import Teleoperation
-from .commands.commands import Command, CommandError, CommandReply, needed_role, parse
+from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse
 from .commands.driving import DRIVING_COMMANDS
 from .trials.trial_log import TrialLog
 from .web import sessions
@@ -171,7 +171,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         return self._limits.driving if driving and self._pages.teleoperation.drives(
             self._number) else self._limits.commands
 
-    async def _carry_out(self, command: Command) -> CommandReply:
+    async def _carry_out(self, command: PageCommand) -> CommandReply:
         if command.name == 'hello':
             return self._hello(command)
         if self._person is None:
@@ -188,7 +188,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return self._note(command, CommandReply(False, 'too many commands at a time'))
         return await self._work(self._person, command)
 
-    async def _work(self, person: Person, command: Command) -> CommandReply:
+    async def _work(self, person: Person, command: PageCommand) -> CommandReply:
         self._at_work += 1
         try:
             loop = asyncio.get_running_loop()
@@ -202,7 +202,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
                 self._pages.question_commands.leave(self._number)
                 self._pages.teleoperation.leave(self._number)
 
-    def _hello(self, command: Command) -> CommandReply:
+    def _hello(self, command: PageCommand) -> CommandReply:
         session, identity = self.session, self._access.identity(self.session)
         if session is None or identity is None or not sessions.same(
                 command.arguments['xsrf'], sessions.xsrf_token(session, self._access.secret)):
@@ -215,7 +215,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._note(command, CommandReply(True))
         return CommandReply(True, name)
 
-    def _note(self, command: Optional[Command], reply: CommandReply) -> CommandReply:
+    def _note(self, command: Optional[PageCommand], reply: CommandReply) -> CommandReply:
         """Record in the audit a command that went no further than this socket."""
         session = self.session.short if self.session else ''
         person = self._person or Person(self.request.remote_ip or '', session, '', '')

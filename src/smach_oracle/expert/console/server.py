@@ -19,7 +19,7 @@ from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
 from .answering.interface_commands import InterfaceCommands
-from .answering.precondition_status import PreconditionStatuses
+from .answering.precondition_sections import PreconditionStatuses
 from .answering.question_commands import QuestionCommands
 from .answering.question_sections import QuestionSections
 from .answering.sensor_discovery import SensorDiscovery
@@ -59,10 +59,10 @@ def make_app(access: AccessControl, pages: OpenPages, sensors: SensorStreams,
     return tornado.web.Application(
         [(r'/session', SessionHandler, {'close': pages.close}),
          (r'/socket', PageSocket, {'pages': pages}),
-         (r'/frame/([0-9]{1,9})', SampleHandler, {'shared': shared}),
+         (r'/sample/([0-9]{1,9})', SampleHandler, {'shared': shared}),
          (r'/model/([0-9]{1,9})', RobotAppearanceHandler, {'shared': shared}),
          (r'/recorded/([0-9]{1,9})', RecordedHandler, {'shared': history}),
-         (r'/still/([0-9]{1,9})', QuestionImageHandler, {'shared': history}),
+         (r'/image/([0-9]{1,9})', QuestionImageHandler, {'shared': history}),
          (r'/()', PageFileHandler, dict(static, default_filename='index.html')),
          (r'/static/(.+)', PageFileHandler, static)],
         access=access, default_handler_class=NotFoundHandler, cookie_secret=access.secret,

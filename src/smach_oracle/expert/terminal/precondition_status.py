@@ -15,7 +15,7 @@ Line = Tuple[str, str]  # text, style
 
 
 class PreconditionStatusListener:
-    """Listens for as long as the question is looked at: the robot looks while somebody listens."""
+    """Listens for as long as the question is shown: the robot checks while somebody listens."""
 
     def __init__(self, robot: str, query_id: str) -> None:
         """`robot`: the node's name; it publishes <robot>/oracle/preconditions."""
@@ -23,10 +23,10 @@ class PreconditionStatusListener:
         self._newest: Optional[PreconditionChecks] = None
         self._heard_s = 0.0
         self._listener = RobotTopic(robot, '/oracle/preconditions', PreconditionChecks,
-                                       self.take)
+                                    self.take)
 
     def take(self, message: PreconditionChecks) -> None:
-        """The robot has looked."""
+        """The robot has checked them."""
         if message.query_id == self._query_id:
             self._heard_s, self._newest = time.monotonic(), message
 

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from smach_oracle.msg import (
+    ExpertDecision,
     ExpertQueryGoal,
     OpenQuery,
     StateChoice,
@@ -58,7 +59,7 @@ def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
         left = '' if each.deadline_s == math.inf else duration(each.deadline_s - now_s)
         table.add_row(str(number), Text(clean(each.goal.robot)), _place(each.goal),
                       Text('{:.0f}%'.format(100 * each.goal.rate), rate_colour(each.goal.rate)),
-                      duration(now_s - each.asked_s), left, Text(_who(each)))
+                      duration(now_s - each.asked_s), left, Text(_holder(each)))
     return table
 
 
@@ -101,7 +102,7 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
 
 
 def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
-    keys = {option.name: option.key for option in found if option.words.startswith('goto ')}
+    keys = {option.name: option.key for option in found if option.kind == ExpertDecision.GOTO}
     table = _table('', 'state', 'success', 'class', 'visits', 'on arrival')
     for choice in goal.choices:
         dim = 'dim' if choice.blocked else ''
@@ -130,7 +131,7 @@ def _supersede(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Renderab
     table = _table('', 'outcome', 'leads to')
     targets = {choice.outcome: choice.target for choice in goal.supersede_outcomes}
     for option in found:
-        if option.words.startswith('supersede '):
+        if option.kind == ExpertDecision.SUPERSEDE:
             table.add_row(option.key, Text(clean(option.name), 'bold'),
                           Text('→ ' + clean(targets[option.name])))
     if not goal.output_keys:
@@ -141,7 +142,7 @@ def _supersede(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Renderab
 def _give_up(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     table = _table('', 'outcome', header=False)
     for option in found:
-        if option.words.split()[0] == 'give_up':
+        if option.kind == ExpertDecision.GIVE_UP:
             table.add_row(
                 option.key,
                 Text(clean(option.name), 'bold') if option.name else Text(
@@ -153,7 +154,7 @@ def _interfaces(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     table = _table('', 'name', 'description', header=False)
     described = {offer.name: offer.description for offer in goal.interfaces}
     for option in found:
-        if option.words.startswith('interface '):
+        if option.kind == ExpertDecision.INTERFACE:
             table.add_row(option.key, Text(clean(option.name), 'bold'),
                           Text(clean(described[option.name])))
     return table
@@ -182,7 +183,7 @@ def _place(goal: ExpertQueryGoal) -> Text:
                          (clean(goal.failed_state), 'bold'))
 
 
-def _who(each: ListedQuestion) -> str:
+def _holder(each: ListedQuestion) -> str:
     if each.status == OpenQuery.INTERFACE_RUNNING:
         return 'interface ' + clean(each.goal.interface)
     return clean(each.holder)

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from smach_oracle.msg import ExpertDecision, OpenQuery
 from smach_oracle.oracle.errors import AnswerError
+from smach_oracle.ros.expert.open_questions import is_unknown
 from smach_oracle.ros.master_watch import start_master_watch
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.ros.userdata_codec import encode
@@ -273,8 +274,9 @@ class Terminal:
         response = self._front_end.claim(listed)
         if response.ok:
             return None
-        unknown = response.message.startswith('there is no question')
-        return self._gone_for_good(response.message) if unknown else response.message
+        if is_unknown(response.message):
+            return self._gone_for_good(response.message)
+        return response.message
 
     def _gone_for_good(self, why: str) -> Optional[str]:
         """The reason, once a server or its robot has had time to come back."""

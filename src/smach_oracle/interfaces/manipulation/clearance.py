@@ -118,7 +118,7 @@ class ClearanceModel:
         return [(first, second) for first in shaped if first in moving for second in shaped
                 if second not in moving]
 
-    def apart(self, pair: Pair, within: float) -> float:
+    def distance(self, pair: Pair, within: float) -> float:
         """Distance (m) between two links, inf from `within` on."""
         points = self._bullet.getClosestPoints(self._robot, self._robot, within, *pair,
                                                physicsClientId=self._client)
@@ -191,7 +191,7 @@ class ArmClearance:
     def __call__(self, joints: np.ndarray) -> List[Clearance]:
         """The nearest of the robot itself and of the boxes, where near, at joint positions (n,)."""
         self._model.set_joints(dict(zip(self._chain.names, joints)))
-        apart = ((self._model.apart(pair, self._within), pair) for pair in self._pairs)
+        apart = ((self._model.distance(pair, self._within), pair) for pair in self._pairs)
         distance, pair = min((each for each in apart if each[0] > _OVERLAP),
                              default=(float('inf'), (-1, -1)))
         found = []
@@ -211,5 +211,5 @@ class ArmClearance:
         for joints in self._chain.random(np.random.default_rng(0), _SAMPLES):
             self._model.set_joints(dict(zip(self._chain.names, joints)))
             for pair in pairs:
-                counts[pair] += self._model.apart(pair, self._within) < self._within
+                counts[pair] += self._model.distance(pair, self._within) < self._within
         return [pair for pair in pairs if counts[pair] <= _ALWAYS_NEAR * _SAMPLES]

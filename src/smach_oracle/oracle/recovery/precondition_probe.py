@@ -18,7 +18,7 @@ _LAST = {
 }
 
 
-class _Item(NamedTuple):
+class _StatePrecondition(NamedTuple):
     """One precondition of one state."""
 
     state: str
@@ -35,8 +35,10 @@ class LivePreconditionProbe(PreconditionProbe):
         self._node = node
         self._gate = UserdataGate(node.machine)
         self._gate.shut()
-        self._items: List[_Item] = [_Item(label, spec) for label in node.labels()
-                                    for spec in node.record(label).settings.preconditions]
+        self._items: List[_StatePrecondition] = [
+            _StatePrecondition(label, spec) for label in node.labels()
+            for spec in node.record(label).settings.preconditions
+        ]
         self.names = tuple((item.state, item.spec.name) for item in self._items)
 
     def status(self, number: int) -> PreconditionStatus:

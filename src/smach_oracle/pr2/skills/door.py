@@ -73,7 +73,7 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _letting_be(context):
+    with _driving_back_on_failure(context):
         return _open(context, kitchen, arm)
 
 
@@ -99,7 +99,7 @@ def close_door(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _letting_be(context):
+    with _driving_back_on_failure(context):
         _close(context, kitchen, arm)
 
 
@@ -121,7 +121,7 @@ def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
 
 
 @contextmanager
-def _letting_be(context: SkillContext) -> Iterator[None]:
+def _driving_back_on_failure(context: SkillContext) -> Iterator[None]:
     """After a failure, drive back: a hand may be caught behind a part of the door."""
     try:
         yield

@@ -24,6 +24,7 @@ from .answer_rules import check_decision, describe_decision, same_decision
 LEASE_S = 15.0
 LONGEST_LEASE_S = 3600.0
 REMEMBERED = 1000
+_UNKNOWN = 'there is no question'
 _IDENTITY = ('robot', 'container_path', 'failed_state', 'interface')
 
 
@@ -259,10 +260,18 @@ class OpenQuestions:
     def _why_closed(self, query_id: str) -> str:
         settled = self._settled.get(query_id)
         if settled is None:
-            return 'there is no question {!r} here'.format(query_id)
+            return '{} {!r} here'.format(_UNKNOWN, query_id)
         if settled.status == ExpertQueryResult.ANSWERED:
             return '{} was first: {}'.format(settled.decision.by, settled.text)
         return 'the question is closed: {}'.format(settled.text)
+
+
+def is_unknown(message: str) -> bool:
+    """Whether the message of a refused claim says that the server does not know the question.
+
+    ClaimQuery.srv promises that such a message begins so, and no other.
+    """
+    return message.startswith(_UNKNOWN + ' ')
 
 
 def _check_goal(goal: ExpertQueryGoal) -> None:

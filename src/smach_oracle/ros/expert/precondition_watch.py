@@ -32,7 +32,7 @@ class _WatchedPrecondition:
         self._free_threads = free_threads
         self._probe = probe
         self._number = number
-        self._latest = PreconditionStatus(None, 'not looked at yet')
+        self._latest = PreconditionStatus(None, 'not checked yet')
         self._at_s: Optional[float] = None
         self._thread: Optional[threading.Thread] = None
         self._began_s = 0.0
@@ -42,7 +42,7 @@ class _WatchedPrecondition:
         if self._thread is None or not self._thread.is_alive():
             if not self._free_threads.acquire(blocking=False):
                 self._latest = PreconditionStatus(
-                    None, 'not looked at: {} looks have not come back'.format(MOST_HANGING))
+                    None, 'not checked: {} checks have not come back'.format(MOST_HANGING))
                 return
             self._began_s = time.monotonic()
             self._thread = threading.Thread(target=self._check, name='check ' + self.name,

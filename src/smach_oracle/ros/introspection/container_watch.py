@@ -87,8 +87,9 @@ def _children(container: Any) -> Dict[str, Any]:
 class ContainerTree(object):
     """All containers below a root.
 
-    They are found again at each ``refresh``, since machines grow and get wrapped. Nothing is made of what happens while ``is_heard()`` is false, so that a machine nobody looks at
-    runs at its speed.
+    They are found again at each ``refresh``, since machines grow and get wrapped. Nothing is made
+    of what happens while ``is_heard()`` is false, so that a machine nobody looks at runs at its
+    speed.
     """
 
     def __init__(self, report: Report, is_heard: Callable[[], bool] = lambda: True) -> None:

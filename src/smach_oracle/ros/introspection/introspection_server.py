@@ -261,8 +261,8 @@ def _waiting_bytes(topic: Optional[rospy.Publisher]) -> int:
 def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any]) -> bool:
     """Let the container start in ``labels`` with ``data`` from now on.
 
-    Returns False, and logs why, where it has no such states. A StateMachine that runs now goes there at its next transition, as soon as its active state has
-    ended.
+    Returns False, and logs why, where it has no such states. A StateMachine that runs now goes
+    there at its next transition, as soon as its active state has ended.
     """
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]

@@ -26,8 +26,8 @@ class Stopwatch:
         self.spent: Dict[str, float] = {}
         self._since = time.monotonic()
 
-    def lap(self, what: str) -> None:
-        """The time since the last lap went into `what`."""
+    def add_time(self, what: str) -> None:
+        """The time since the last call went into `what`."""
         now = time.monotonic()
         self.spent[what] = self.spent.get(what, 0.0) + now - self._since
         self._since = now
@@ -113,7 +113,7 @@ class WorldLoop:
             elif time.monotonic() - self._busy_until > self._settings.idle_grace:
                 # nothing moves, and those who sleep in simulated time wake up
                 self._clock.skip(IDLE_TICK_S * self._settings.idle_speed)
-            self.watch.lap('idle')
+            self.watch.add_time('idle')
 
     def _run_paced(self) -> None:
         due = time.monotonic()
@@ -123,15 +123,15 @@ class WorldLoop:
             while not self._stopping.is_set() and time.monotonic() < due:
                 self._job_within(due - time.monotonic())
             self._run_jobs()
-            self.watch.lap('idle')
+            self.watch.add_time('idle')
 
     def _tick(self) -> None:
-        self.watch.lap('idle')
+        self.watch.add_time('idle')
         self._motions.tick()
         self._clock.advance(PERIOD_S)
-        self.watch.lap('physics')
+        self.watch.add_time('physics')
         self._after_tick()
-        self.watch.lap('publish')
+        self.watch.add_time('publish')
 
     def _run_jobs(self) -> None:
         while not self._stopping.is_set() and self._job_within(0.0):

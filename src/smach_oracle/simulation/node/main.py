@@ -118,11 +118,11 @@ class WorldNode:
         return stamp
 
     def _publish_image(self, stamp: rospy.Time, counted: bool) -> None:
-        self._loop.watch.lap('publish')
+        self._loop.watch.add_time('publish')
         image = take_image(self._world, counted)
-        self._loop.watch.lap('camera')
+        self._loop.watch.add_time('camera')
         self._camera.publish(image.colour, image.depth, image.intrinsics, stamp)
-        self._loop.watch.lap('publish')
+        self._loop.watch.add_time('publish')
 
     def _snapshot(self, camera: bool) -> rospy.Time:
         if camera:

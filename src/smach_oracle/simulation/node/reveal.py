@@ -22,7 +22,7 @@ from ..scenes.fridge import DOOR_JOINT
 PARTS = {'door': 'box', 'handle': 'cylinder'}  # of a door's link: the first shape of each kind
 
 
-class _Thing(NamedTuple):
+class _BodyPart(NamedTuple):
     """A body, or a part of one."""
 
     body: str  # in the world
@@ -35,25 +35,25 @@ def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[Reveal
 
     :raises ValueError: for a name that is not there, with those that are.
     """
-    things = _things(world)
-    unknown = [name for name in names if name not in things]
+    parts = _body_parts(world)
+    unknown = [name for name in names if name not in parts]
     if unknown:
         raise ValueError('no body {!r} in this scene; there: {}'.format(
-            unknown[0], ', '.join(things) or 'none'))
+            unknown[0], ', '.join(parts) or 'none'))
     seen = RenderedView(world, world.link_pose(CAMERA_FRAME)).bodies
-    return [_message(world, name, things[name], seen, stamp) for name in names or things]
+    return [_message(world, name, parts[name], seen, stamp) for name in names or parts]
 
 
-def _things(world: World) -> Dict[str, _Thing]:
+def _body_parts(world: World) -> Dict[str, _BodyPart]:
     found = {}
     for name in world.body_names:
         body = world.body(name)
         size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
-        found[name] = _Thing(name, world.body_pose(name),
+        found[name] = _BodyPart(name, world.body_pose(name),
                              np.zeros(3) if body.shape == 'urdf' else size)
         if dict(body.joint_friction).get(DOOR_JOINT) is not None:
             for part, (pose, extent) in _door_parts(body.urdf).items():
-                found[part] = _Thing(name, world.body_pose(name, 'door') @ pose, extent)
+                found[part] = _BodyPart(name, world.body_pose(name, 'door') @ pose, extent)
     return found
 
 
@@ -76,24 +76,24 @@ def _extent(solid: ElementTree.Element) -> np.ndarray:
     return np.array([across, across, float(solid.get('length', 0))])
 
 
-def _message(world: World, name: str, thing: _Thing, seen: np.ndarray,
+def _message(world: World, name: str, part: _BodyPart, seen: np.ndarray,
              stamp: rospy.Time) -> RevealedBody:
-    pose = inverse(world.true_base()) @ thing.pose
-    body = world.body(thing.body)
-    region, visible = _region(world, thing, seen) if thing.size.any() else (RegionOfInterest(), 0.0)
+    pose = inverse(world.true_base()) @ part.pose
+    body = world.body(part.body)
+    region, visible = _region(world, part, seen) if part.size.any() else (RegionOfInterest(), 0.0)
     return RevealedBody(
-        name=name, size=Vector3(*thing.size), movable=name in world.movable(), region=region,
+        name=name, size=Vector3(*part.size), movable=name in world.movable(), region=region,
         visible=visible, pose=PoseStamped(Header(stamp=stamp, frame_id=BASE_FRAME),
                                           Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))),
-        held=world.holding(thing.body) if name == thing.body else '', angle=world.body_joint(
-            thing.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
+        held=world.holding(part.body) if name == part.body else '', angle=world.body_joint(
+            part.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
 
 
-def _region(world: World, thing: _Thing, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
+def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
     """Where the camera has it, and the share of its outline that nothing hides."""
-    corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * thing.size
+    corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * part.size
     camera = world.link_pose(CAMERA_FRAME)
-    points = corners @ thing.pose[:3, :3].T + thing.pose[:3, 3]
+    points = corners @ part.pose[:3, :3].T + part.pose[:3, 3]
     pixels = pixels_of(points, INTRINSICS, camera)
     if (pixels[:, 2] <= 0).any():
         return RegionOfInterest(), 0.0
@@ -103,7 +103,7 @@ def _region(world: World, thing: _Thing, seen: np.ndarray) -> Tuple[RegionOfInte
     if right < left or bottom < top:
         return RegionOfInterest(), 0.0
     window = seen[top:bottom + 1, left:right + 1]
-    own = [index for index in np.unique(window) if world.seen_as(int(index)) == thing.body]
+    own = [index for index in np.unique(window) if world.seen_as(int(index)) == part.body]
     rows, columns = np.nonzero(np.isin(window, own))
     if not len(rows):
         return RegionOfInterest(), 0.0

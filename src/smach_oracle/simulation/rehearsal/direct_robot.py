@@ -13,6 +13,10 @@ from ..physics.trajectory import Motion, MotionResult, Trajectory, run
 from ..physics.world import World
 
 
+def no_report(status: str) -> None:
+    """For skills whose progress nobody follows."""
+
+
 class DirectRobot:
     """Drives the PR2 of a world; every call returns when the motion has ended.
 

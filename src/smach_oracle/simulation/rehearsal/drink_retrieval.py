@@ -5,7 +5,6 @@ The steps are those of tasks/drink_retrieval.py, done by the same code as behind
 import math
 from typing import Any, Callable, Dict, List, Tuple
 
-import genpy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
@@ -21,7 +20,7 @@ from smach_oracle.pr2.robot import ODOM_FRAME
 
 from ..physics.world import World
 from ..scenes.person import PALM
-from .direct_robot import DirectRobot
+from .direct_robot import DirectRobot, no_report
 
 TORSO_HEIGHT = 0.25  # m
 MIN_HEIGHT = 0.05  # m
@@ -44,26 +43,23 @@ class DrinkRetrievalRehearsal:
                            Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('RAISE_TORSO', lambda: self.robot.torso(TORSO_HEIGHT)),
-            ('OPEN_FRIDGE', lambda: self._do('open_door', OpenDoorGoal('right'))),
+            ('OPEN_FRIDGE', lambda: self.skills.open_door(OpenDoorGoal('right'), no_report)),
             ('MOVE_IN', lambda: self._drive('MOVE_IN')),
             ('DETECT_DRINK', self._detect),
             ('PICK_DRINK', self._pick),
             ('MOVE_OUT', lambda: self._drive('MOVE_OUT')),
-            ('CLOSE_FRIDGE', lambda: self._do('close_door', CloseDoorGoal('left'))),
+            ('CLOSE_FRIDGE', lambda: self.skills.close_door(CloseDoorGoal('left'), no_report)),
             ('MOVE_HOME', lambda: self._drive('MOVE_HOME')),
-            ('HAND_OVER', lambda: self._do('hand_over', HandOverGoal('right', palm)))]
-
-    def _do(self, skill: str, goal: genpy.Message) -> genpy.Message:
-        return getattr(self.skills, skill)(goal, lambda status: None)
+            ('HAND_OVER', lambda: self.skills.hand_over(HandOverGoal('right', palm), no_report))]
 
     def _drive(self, state: str) -> None:
         x, y, yaw = DRIVES[state]
         self.robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
 
     def _detect(self) -> None:
-        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT), lambda status: None)
+        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT), no_report)
         self.data.update(drink=found.drink, size=found.size)
 
     def _pick(self) -> None:
-        self.data['grasp'] = self._do(
-            'pick', PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)).grasp
+        goal = PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)
+        self.data['grasp'] = self.skills.pick(goal, no_report).grasp

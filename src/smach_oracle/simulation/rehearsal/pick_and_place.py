@@ -5,7 +5,6 @@ The steps are those of tasks/pick_and_place.py, done by the same code as behind 
 import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
-import genpy
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
@@ -30,7 +29,7 @@ from smach_oracle.pr2.robot import RobotError
 from ..physics.judge import judge
 from ..physics.world import World
 from ..scenes.scene import Scene
-from .direct_robot import DirectRobot
+from .direct_robot import DirectRobot, no_report
 
 BASE = 'base_link'
 HEAD = PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75))
@@ -69,16 +68,12 @@ class PickAndPlaceRehearsal:
         self._links = read_joints(self.skills.context.model.urdf)
         self.data: Dict[str, Any] = {}
         self.states: List[Tuple[str, Callable[[], None]]] = [
-            ('MOVE_ARMS_ASIDE', lambda: self._do('move_arms_aside', MoveArmsAsideGoal())),
-            ('POINT_HEAD', lambda: self._do('point_head', PointHeadGoal(HEAD))),
+            ('MOVE_ARMS_ASIDE', lambda: self.skills.move_arms_aside(
+                MoveArmsAsideGoal(), no_report)),
+            ('POINT_HEAD', lambda: self.skills.point_head(PointHeadGoal(HEAD), no_report)),
             ('DETECT_TABLETOP', self._detect), ('BUILD_COLLISION_MAP', self._map),
-            ('PICK', self._pick),
-            ('PLACE', lambda: self._do(
-                'place', PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])))
+            ('PICK', self._pick), ('PLACE', self._place)
         ]
-
-    def _do(self, skill: str, goal: genpy.Message) -> genpy.Message:
-        return getattr(self.skills, skill)(goal, lambda status: None)
 
     def _detect(self) -> None:
         limbs = limbs_of(self._links, self.robot.joints())
@@ -89,12 +84,16 @@ class PickAndPlaceRehearsal:
 
     def _map(self) -> None:
         goal = BuildCollisionMapGoal(self.data['table'], self.data['objects'], self.data['sizes'])
-        self.data['map_id'] = self._do('build_collision_map', goal).map_id
+        self.data['map_id'] = self.skills.build_collision_map(goal, no_report).map_id
 
     def _pick(self) -> None:
         goal = PickGoal('right', self.data['objects'][0], self.data['sizes'][0],
                         self.data['map_id'])
-        self.data['grasp'] = self._do('pick', goal).grasp
+        self.data['grasp'] = self.skills.pick(goal, no_report).grasp
+
+    def _place(self) -> None:
+        goal = PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])
+        self.skills.place(goal, no_report)
 
 
 def rehearse(scene: Scene, world: Optional[World] = None,

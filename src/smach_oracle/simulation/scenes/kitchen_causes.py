@@ -6,6 +6,7 @@ from typing import Callable, Dict, List, NamedTuple, Tuple
 
 import numpy as np
 
+from .drafts import caused
 from .scene import Body, Disturbance, SceneCause, Vector
 
 CHANCE = {
@@ -39,24 +40,19 @@ def with_causes(draft: KitchenDraft, seed: int) -> KitchenDraft:
     return draft
 
 
-def _caused(draft: KitchenDraft, kind: str, text: str, *disturbances: Disturbance) -> KitchenDraft:
-    return draft._replace(disturbances=draft.disturbances + disturbances,
-                          causes=draft.causes + (SceneCause(kind, text),))
-
-
 def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """Every drive ends centimetres off: the base is in the door's way, or too far for the arm."""
     sigma = float(generator.uniform(0.05, 0.075))
-    return _caused(draft._replace(drive_error=(sigma, 0.3 * sigma, 0.25 * sigma)), 'base_misplaced',
-                   'drives end {:.1f} cm too near or too far (sigma)'.format(100 * sigma))
+    return caused(draft._replace(drive_error=(sigma, 0.3 * sigma, 0.25 * sigma)), 'base_misplaced',
+                  'drives end {:.1f} cm too near or too far (sigma)'.format(100 * sigma))
 
 
 def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """The opened door falls back, half shut, while the robot drives in."""
     angle = float(generator.uniform(0.5, 0.9))
-    return _caused(draft, 'door_swings_back',
-                   'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
-                   Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
+    return caused(draft, 'door_swings_back',
+                  'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
+                  Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
 
 
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -69,15 +65,15 @@ def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraf
     moved = other._replace(position=(target.position[0] + far * float(np.cos(heading)),
                                      target.position[1] + far * float(np.sin(heading)),
                                      other.position[2]))
-    return _caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
-                   'two drinks stand {:.1f} cm beside each other'.format(100 * gap))
+    return caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
+                  'two drinks stand {:.1f} cm beside each other'.format(100 * gap))
 
 
 def _glare(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """The camera is dazzled when it turns to the drinks, after it has looked at the door twice."""
     dropout = float(generator.uniform(0.93, 0.99))
     frames = 2 if generator.random() < LONG_GLARE else 1
-    return _caused(
+    return caused(
         draft, 'glare',
         'the sun shines into the camera for {} frames: {:.0f}% of the depth is lost'.format(
             frames, 100 * dropout),
@@ -88,7 +84,7 @@ def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> Kitc
     friction, mass = float(generator.uniform(0.045, 0.08)), float(generator.uniform(0.6, 0.75))
     drinks = tuple(drink._replace(friction=friction, mass=mass)
                    for drink in draft.drinks[:1]) + draft.drinks[1:]
-    return _caused(
+    return caused(
         draft._replace(drinks=drinks), 'slippery_drink',
         'the nearest drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
 
@@ -100,7 +96,7 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
     x, y = draft.drinks[TARGET].position[:2]
     dx, dy = max(ways, key=lambda way: min(ROOM, _room_at(draft, x + way[0], y + way[1])))
     values = (('dx', dx), ('dy', dy), ('duration', 0.8))
-    return _caused(
+    return caused(
         draft, 'drink_moved',
         'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
             100 * float(np.hypot(dx, dy))),

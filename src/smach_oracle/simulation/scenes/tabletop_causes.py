@@ -12,6 +12,7 @@ from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.pr2.model.pr2_model import pr2_urdf
 from smach_oracle.pr2.robot import ARM_JOINTS, BASE_FRAME, TOOL_FRAME
 
+from .drafts import caused
 from .scene import Body, Disturbance, SceneCause
 
 TABLE_TOP = 0.72  # m
@@ -44,12 +45,6 @@ def with_causes(draft: TabletopDraft, seed: int) -> TabletopDraft:
     return draft
 
 
-def _caused(draft: TabletopDraft, kind: str, text: str, *disturbances:
-            Disturbance) -> TabletopDraft:
-    return draft._replace(disturbances=draft.disturbances + disturbances,
-                          causes=draft.causes + (SceneCause(kind, text),))
-
-
 def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
     """Somebody pushes the left arm between the camera and the nearest thing.
 
@@ -68,7 +63,7 @@ def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Option
         if q is not None and point[2] > TABLE_TOP + 0.22:
             turned = chain.nearest_turn(q, np.zeros(len(q)))
             values = tuple(zip(ARM_JOINTS['left'], (float(each) for each in turned)))
-            return _caused(
+            return caused(
                 draft, 'arm_in_view',
                 'the left arm is pushed over the table, its hand {:.0f} cm above it'.format(
                     100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values))
@@ -84,7 +79,7 @@ def _left_arm() -> JointChain:
 def _glare(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
     frames = 2 if generator.random() < 0.15 else 1
     dropout = float(generator.uniform(0.92, 0.99))
-    return _caused(
+    return caused(
         draft, 'glare',
         'light falls into the camera for {} frame(s): {:.0f}% of the depth is lost'.format(
             frames, 100 * dropout),
@@ -93,9 +88,9 @@ def _glare(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraf
 
 def _dim_light(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
     brightness = float(generator.uniform(0.02, 0.12))
-    return _caused(draft, 'dim_light',
-                   'the light fails for one frame, down to {:.0f}%'.format(100 * brightness),
-                   Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', 1))))
+    return caused(draft, 'dim_light',
+                  'the light fails for one frame, down to {:.0f}%'.format(100 * brightness),
+                  Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', 1))))
 
 
 def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -106,15 +101,15 @@ def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDr
     far = _radius(thing) + _radius(other) + gap
     spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
     moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
-    return _caused(draft._replace(things=draft.things[:-1] + (moved,)), 'crowded',
-                   'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap))
+    return caused(draft._replace(things=draft.things[:-1] + (moved,)), 'crowded',
+                  'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap))
 
 
 def _slippery_object(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
     friction = float(generator.uniform(0.04, 0.07))
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
-    return _caused(
+    return caused(
         draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
         'the nearest thing is slippery and heavy: friction {:.2f}, {:.2f} kg'.format(
             friction, mass))
@@ -133,7 +128,7 @@ def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Optio
                 for other in draft.things[1:]):
             values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration',
                                                                                      0.8))
-            return _caused(
+            return caused(
                 draft, 'object_moved',
                 'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(100 *
                                                                                               way),
@@ -150,9 +145,9 @@ def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
         spot = (float(GOAL[0] + away * np.cos(side)), float(GOAL[1] + away * np.sin(side)),
                 other.position[2])
         moved.append(other._replace(position=spot))
-    return _caused(draft._replace(things=draft.things[:-2] + tuple(moved)), 'goal_occupied',
-                   'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
-                       *(100 * away for away in distances)))
+    return caused(draft._replace(things=draft.things[:-2] + tuple(moved)), 'goal_occupied',
+                  'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
+                      *(100 * away for away in distances)))
 
 
 def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -163,8 +158,8 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
     others = tuple(other for other in draft.things[1:]
                    if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
                    and np.hypot(*other.position[:2]) > np.hypot(*spot) + 0.04)
-    return _caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
-                   'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]))
+    return caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
+                  'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]))
 
 
 def _radius(thing: Body) -> float:

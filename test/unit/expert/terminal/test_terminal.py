@@ -18,12 +18,7 @@ from typist import CTRL_C, CTRL_D, CTRL_U, ENTER, typist
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.terminal import terminal
 from smach_oracle.expert.terminal.precondition_status import PreconditionStatusListener
-from smach_oracle.expert.terminal.prompts import (
-    JsonValidator,
-    PromptInterrupted,
-    Prompts,
-    ValidationError,
-)
+from smach_oracle.expert.terminal.prompts import PromptInterrupted, Prompts
 from smach_oracle.expert.terminal.terminal import Terminal
 from smach_oracle.msg import (
     ExpertDecision,
@@ -33,6 +28,7 @@ from smach_oracle.msg import (
     PreconditionChecks,
 )
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
+from smach_oracle.ros.expert.open_questions import OpenQuestions
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
@@ -242,6 +238,24 @@ def test_a_question_settled_elsewhere_ends_the_typing():
     assert 'No open questions; waiting.' in shown
 
 
+def test_a_question_that_a_restarted_server_does_not_know_is_waited_for():
+    front_end = FakeFrontEnd(goal())
+    key = front_end.listed[0].key
+
+    def server_restarts():
+        front_end.settled[key] = OpenQuestions().claim(1, 'q1', 'ann').message
+        front_end.claims.clear()
+
+    def robot_asks_again():
+        front_end.settled.clear()
+        front_end.hold('')
+
+    shown = converse(front_end, '', (ASKS, server_restarts),
+                     (lambda: len(front_end.claims) > 3, robot_asks_again),
+                     (ASKS, ENTER.join(['1', '', 'q', ''])))
+    assert 'there is no question' not in shown and len(front_end.decisions) == 1
+
+
 def test_a_robot_that_dies_is_waited_for_only_so_long(monkeypatch):
     monkeypatch.setattr(terminal, '_RETURN_S', 0.2)
     front_end = FakeFrontEnd(goal())
@@ -301,30 +315,6 @@ def test_a_prompt_ends_when_what_it_asks_about_is_over():
     with create_pipe_input() as keys:
         with pytest.raises(PromptInterrupted, match='over'):
             Prompts(keys, DummyOutput()).ask('? ', lambda: 'bar', lambda: 'over')
-
-
-class FakeDocument:
-    def __init__(self, text):
-        self.text = text
-
-
-def complaint(text):
-    """What is said while somebody types this as JSON, '' for nothing."""
-    try:
-        JsonValidator().validate(FakeDocument(text))
-    except ValidationError as err:
-        return err.message
-    return ''
-
-
-@pytest.mark.parametrize('text', ['', ' ', '1', '"a"', '{"a": [null]}'])
-def test_json_and_nothing_are_taken(text):
-    assert complaint(text) == ''
-
-
-@pytest.mark.parametrize('text', ['mug', '{', 'NaN', "{'a': 1}"])
-def test_what_is_not_json_is_told_while_typing(text):
-    assert 'not JSON' in complaint(text)
 
 
 class FakeInterface:

@@ -4,6 +4,7 @@ a clock of our own.
 import math
 import re
 import tracemalloc
+from pathlib import Path
 
 import pytest
 import rospy
@@ -17,13 +18,19 @@ from smach_oracle.msg import (
     OpenQuery,
     UserdataItem,
 )
-from smach_oracle.ros.expert.open_questions import OpenQuestions, QuestionRefusedError
+from smach_oracle.ros.expert.open_questions import (
+    OpenQuestions,
+    QuestionRefusedError,
+    is_unknown,
+)
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.userdata_codec import encode
 from smach_oracle.srv import ClaimQueryRequest
 
 CLAIM, RENEW, RELEASE, TAKE_OVER = (ClaimQueryRequest.CLAIM, ClaimQueryRequest.RENEW,
                                     ClaimQueryRequest.RELEASE, ClaimQueryRequest.TAKE_OVER)
+
+CLAIM_SRV = Path(__file__).resolve().parents[4] / 'srv' / 'ClaimQuery.srv'
 
 
 class FakeClock:
@@ -316,6 +323,17 @@ def test_the_next_thing_due_is_the_earliest_lease_or_deadline(questions, clock):
     assert questions.next_due_s() == 150.0
     questions.claim(CLAIM, 'q2', 'ann')
     assert questions.next_due_s() == 110.0
+
+
+def test_only_the_refusal_of_an_unknown_question_says_that_it_is_unknown(questions):
+    questions.open(goal('q1'))
+    questions.open(goal('q2'))
+    questions.answer('q1', goto())
+    questions.claim(CLAIM, 'q2', 'bob')
+    assert is_unknown(questions.claim(CLAIM, 'q9', 'ann').message)
+    for query_id in ('q1', 'q2'):
+        assert not is_unknown(questions.claim(CLAIM, query_id, 'ann').message)
+    assert 'begins with "there is no question "' in CLAIM_SRV.read_text(encoding='utf-8')
 
 
 def test_only_so_many_settled_questions_are_remembered(questions):

@@ -32,7 +32,7 @@ class FakePublisher:
         return self.listeners
 
 
-class FakeLook(PreconditionProbe):
+class FakeProbe(PreconditionProbe):
     """Calls functions by their names."""
 
     def __init__(self, **functions):
@@ -72,9 +72,9 @@ def holds():
     return PreconditionStatus(True, 'it does')
 
 
-def test_they_are_looked_at_again_and_again_until_the_question_is_over(watch):
+def test_they_are_checked_again_and_again_until_the_question_is_over(watch):
     found = [PreconditionStatus(False, 'not yet')]
-    look = FakeLook(free=lambda: found[-1])
+    look = FakeProbe(free=lambda: found[-1])
     before = threading.enumerate()
     with watch.while_open(FakeQuestion(look)):
         assert wait_for(lambda: sent(watch))
@@ -88,9 +88,9 @@ def test_they_are_looked_at_again_and_again_until_the_question_is_over(watch):
     assert stays(lambda: len(sent(watch)) == told, 0.2)
 
 
-def test_nobody_looks_where_nobody_listens(watch):
+def test_nothing_is_checked_where_nobody_listens(watch):
     FakePublisher.made.listeners = 0
-    look = FakeLook(free=holds)
+    look = FakeProbe(free=holds)
     with watch.while_open(FakeQuestion(look)):
         assert stays(lambda: not look.called, 0.2)
         FakePublisher.made.listeners = 1
@@ -100,7 +100,7 @@ def test_nobody_looks_where_nobody_listens(watch):
 def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(monkeypatch, watch):
     monkeypatch.setattr(precondition_watch, 'PATIENCE_S', 0.05)
     never = threading.Event()
-    look = FakeLook(door=never.wait, free=holds)
+    look = FakeProbe(door=never.wait, free=holds)
 
     def told():
         """A machine that is busy may be too slow for so little patience with the other, too, now
@@ -122,20 +122,20 @@ def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(monkeypatch, wa
 
 
 def test_what_leaves_the_program_does_not(watch):
-    with watch.while_open(FakeQuestion(FakeLook(quits=lambda: sys.exit(3), free=holds))):
+    with watch.while_open(FakeQuestion(FakeProbe(quits=lambda: sys.exit(3), free=holds))):
         assert wait_for(lambda: sent(watch))
         assert 'raised SystemExit(3)' in sent(watch)[0].checks[0].text
         assert sent(watch)[0].checks[1].result == PreconditionCheck.HOLDS
 
 
-@pytest.mark.parametrize('look', [None, FakeLook()])
+@pytest.mark.parametrize('look', [None, FakeProbe()])
 def test_a_question_without_any_starts_nothing(watch, look):
     before = threading.enumerate()
     with watch.while_open(FakeQuestion(look)):
         assert not set(threading.enumerate()) - set(before)
 
 
-def test_looks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatch, watch):
+def test_checks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatch, watch):
     monkeypatch.setattr(precondition_watch, 'PATIENCE_S', 0.01)
     never, calls = threading.Event(), []
 
@@ -146,9 +146,9 @@ def test_looks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatch
     def all_left_out():
         return {check.text
                 for check in sent(watch)[-1].checks
-                } == {'not looked at: 32 looks have not come back'}
+                } == {'not checked: 32 checks have not come back'}
     for told in (lambda: sent(watch), all_left_out):
-        look = FakeLook(
+        look = FakeProbe(
             **{'door_{}'.format(number): door
                for number in range(precondition_watch.MOST_HANGING)})
         with watch.while_open(FakeQuestion(look)):
@@ -156,6 +156,6 @@ def test_looks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatch
     assert wait_for(lambda: len(calls) >= precondition_watch.MOST_HANGING)
     assert len(calls) == precondition_watch.MOST_HANGING
     never.set()
-    with watch.while_open(FakeQuestion(FakeLook(free=holds))):
+    with watch.while_open(FakeQuestion(FakeProbe(free=holds))):
         assert wait_for(
             lambda: sent(watch) and sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)

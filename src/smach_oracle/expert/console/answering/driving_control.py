@@ -15,7 +15,7 @@ _DRIFT = 1e-3  # s/s by which two clocks may run apart, and more
 Vector = Tuple[float, float, float]
 
 
-class Freshness:
+class DelayCheck:
     """Distinguishes messages that arrive at once from those that a slow link has held back.
 
     The clocks of page and server have nothing in common; the least difference seen stands for a
@@ -26,8 +26,8 @@ class Freshness:
         self._least_s = math.inf
         self._seen_s = 0.0
 
-    def fresh(self, sent_s: float, now_s: float) -> bool:
-        """Whether a message that its page has sent at `sent_s`, by its own clock, is fresh."""
+    def is_in_time(self, sent_s: float, now_s: float) -> bool:
+        """Whether a message that its page has sent at `sent_s`, by its own clock, came at once."""
         offset_s = now_s - sent_s
         drifted_s = self._least_s + _DRIFT * (now_s - self._seen_s)
         self._least_s, self._seen_s = min(offset_s, drifted_s), now_s
@@ -49,7 +49,7 @@ class DrivingControl:
 
     def __init__(self) -> None:
         self.session: Optional[DrivingSession] = None
-        self._freshness = Freshness()
+        self._delay_check = DelayCheck()
         self._heard_s = -math.inf
         self._counts: Dict[str, int] = {}
         self.held = False
@@ -60,7 +60,7 @@ class DrivingControl:
                 now_s):
             return '{} drives; one at a time'.format(self.session.person.expert)
         self.session, self._heard_s, self.held = session, now_s, False
-        self._freshness, self._counts = Freshness(), {'relayed': 0, 'late': 0}
+        self._delay_check, self._counts = DelayCheck(), {'relayed': 0, 'late': 0}
         return ''
 
     def silent(self, now_s: float) -> bool:
@@ -70,10 +70,10 @@ class DrivingControl:
     def accept(self, sent_s: float, held: bool, now_s: float) -> bool:
         """Take in a command of the page; whether to carry it out as one that is held."""
         self._heard_s = now_s
-        fresh = self._freshness.fresh(sent_s, now_s)
+        in_time = self._delay_check.is_in_time(sent_s, now_s)
         if held:
-            self._counts['relayed' if fresh else 'late'] += 1
-        self.held = held and fresh
+            self._counts['relayed' if in_time else 'late'] += 1
+        self.held = held and in_time
         return self.held
 
     def leave(self, now_s: float) -> Dict[str, Any]:

@@ -26,7 +26,7 @@ from smach_oracle.srv import (
 )
 
 from ...followed_server import ListedQuestion
-from ..commands.commands import Command, CommandReply
+from ..commands.commands import CommandReply, PageCommand
 from ..commands.marking import FRESH
 from ..sensors.clouds import Cloud, CloudError, encode_points, thinned
 from ..web.audit import Person
@@ -64,7 +64,8 @@ class InterfaceCommands:
         """The commands by name, for QuestionCommands."""
         return {name: self.carry_out for name in self._carry_out}
 
-    def carry_out(self, command: Command, person: Person, listed: ListedQuestion) -> CommandReply:
+    def carry_out(self, command: PageCommand, person: Person,
+                  listed: ListedQuestion) -> CommandReply:
         """Do one of them.
 
         :raises ServerGoneError: where the interface does not answer.

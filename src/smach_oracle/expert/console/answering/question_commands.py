@@ -18,7 +18,7 @@ from ...claims import LEASE_S, Claim, ClaimKeeper
 from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
 from ..commands.checks import TypedOutput
-from ..commands.commands import KINDS, Command, CommandReply
+from ..commands.commands import KINDS, CommandReply, PageCommand
 from ..web.audit import Audit, Person
 
 _KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,
@@ -29,7 +29,7 @@ _FIELD = {'goto': 'state', 'supersede': 'outcome', 'give_up': 'outcome', 'interf
 
 
 # may raise ServerGoneError
-CommandWorker = Callable[[Command, Person, ListedQuestion], CommandReply]
+CommandWorker = Callable[[PageCommand, Person, ListedQuestion], CommandReply]
 
 
 class OutputError(OracleError):
@@ -47,7 +47,7 @@ class QuestionCommands:
         self._audit = audit
         self.claims = ClaimKeeper(front_end)  # held by the pages that show the questions
 
-    def carry_out(self, command: Command, person: Person, page: int) -> CommandReply:
+    def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
         """Do one of claim, take_over, release, answer and the others, and record it."""
         listed = self._front_end.find(command.arguments['question'])
         reply = self._try(command, person, page, listed)
@@ -59,7 +59,7 @@ class QuestionCommands:
         """A page is gone: its claims are renewed no longer, and run out unless it comes back."""
         self.claims.leave_all(page)
 
-    def _try(self, command: Command, person: Person, page: int,
+    def _try(self, command: PageCommand, person: Person, page: int,
              listed: Optional[ListedQuestion]) -> CommandReply:
         if listed is None:
             return CommandReply(False, 'This question is open no longer.')
@@ -81,7 +81,7 @@ class QuestionCommands:
             self.claims.keep(listed, person.expert, page)
         return CommandReply(response.ok, response.message)
 
-    def _answer(self, command: Command, person: Person, listed: ListedQuestion) -> CommandReply:
+    def _answer(self, command: PageCommand, person: Person, listed: ListedQuestion) -> CommandReply:
         arguments = command.arguments
         decision = ExpertDecision(kind=_KIND[arguments['kind']], by=person.expert,
                                   why=arguments['why'])

@@ -18,7 +18,7 @@ from ..web.sections import PageSections
 from .interface_actions import action_of, interface_actions
 
 DISCOVERY_PERIOD_S = 1.0
-TEND_PERIOD_S = 0.1
+UPDATE_PERIOD_S = 0.1
 _SEGMENT = '/segment'
 
 
@@ -37,8 +37,8 @@ class SensorDiscovery:
 
     def start(self) -> None:
         """Begin; the threads end with the node."""
-        for step, period_s in ((self.discover, DISCOVERY_PERIOD_S), (self._tend, TEND_PERIOD_S)):
-            repeat(step, period_s)
+        repeat(self.discover, DISCOVERY_PERIOD_S)
+        repeat(self._update, UPDATE_PERIOD_S)
 
     def discover(self) -> None:
         """Ask the master once."""
@@ -56,10 +56,12 @@ class SensorDiscovery:
 
     def write_sections(self) -> None:
         """Bring the section up to date."""
-        self._sections.put('eye', {'sensors': self.sensors.view(), 'perception': self._running()})
+        self._sections.put('sensors', {
+            'sensors': self.sensors.view(), 'perception': self._running()
+        })
 
-    def _tend(self) -> None:
-        self.sensors.tend()
+    def _update(self) -> None:
+        self.sensors.update_subscriptions()
         self.write_sections()
 
     def _running(self) -> Dict[str, Any]:

@@ -14,14 +14,14 @@ from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
 from ...interface_outputs import InterfaceOutputs
 from ..commands.checks import shown
-from ..commands.commands import Command, CommandReply
+from ..commands.commands import CommandReply, PageCommand
 from ..feeds.repeating import repeat
 from ..feeds.views import number
 from ..web.audit import Audit, Person
 from ..web.sections import PageSections
 from .driving_control import DrivingSession
 from .interface_actions import action_of, interface_actions
-from .interface_outputs import interface_output_view
+from .interface_output_view import interface_output_view
 from .teleop_client import TeleopClient
 
 DISCOVERY_PERIOD_S = 0.5
@@ -60,7 +60,7 @@ class Teleoperation:
         return any(client.control.session is not None and client.control.session.page == page
                    for client in list(self._clients.values()))
 
-    def drive(self, command: Command, page: int) -> CommandReply:
+    def drive(self, command: PageCommand, page: int) -> CommandReply:
         """Relay one command of the page in control; a command that comes late stops the arm."""
         arguments = command.arguments
         client = self._clients.get(arguments['question'])
@@ -83,7 +83,7 @@ class Teleoperation:
                 client.release(_operator(session))
         return CommandReply(True)
 
-    def carry_out(self, command: Command, person: Person, page: int) -> CommandReply:
+    def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
         """Take control or leave it, and record it in the audit."""
         key = command.arguments['question']
         client, listed = self._clients.get(key), self._front_end.find(key)
@@ -149,11 +149,11 @@ class Teleoperation:
         for key, client in list(self._clients.items()):
             if client.control.session is not None and client.control.silent(time.monotonic()):
                 self._leave(key, None, 'the page has fallen silent')
-        self._sections.put('hand',
+        self._sections.put('manipulation',
                            {key: _view(client)
                             for key, client in list(self._clients.items())})
         self._sections.put(
-            'output', {
+            'interface_output', {
                 listed.key: interface_output_view(self._outputs.newest(listed.goal.query_id))
                 for listed in self._front_end.questions() if self._known(listed)
             })

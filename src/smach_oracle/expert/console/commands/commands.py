@@ -28,7 +28,7 @@ class CommandError(OracleError):
         self.number = number
 
 
-class Command(NamedTuple):
+class PageCommand(NamedTuple):
     """A command that has the right form."""
 
     number: int
@@ -44,7 +44,7 @@ class CommandReply(NamedTuple):
     data: Optional[Mapping[str, object]] = None  # plain; None where there is no more to it
 
 
-def parse(text: object) -> Command:
+def parse(text: object) -> PageCommand:
     """Check one message of a browser.
 
     :raises BadCommand: saying what is wrong, and what is allowed.
@@ -64,9 +64,9 @@ def parse(text: object) -> Command:
     if unknown:
         raise CommandError('{} takes no {}'.format(name, shown(unknown[0])), number)
     try:
-        return Command(number, name,
-                       {field: check(data.get(field))
-                        for field, check in checks.items()})
+        return PageCommand(number, name,
+                           {field: check(data.get(field))
+                            for field, check in checks.items()})
     except ValueError as err:
         raise CommandError('{}: {}'.format(name, err), number) from err
 

@@ -21,7 +21,7 @@ from ..web.sections import PageSections
 from .images import BrowserFile, encode_image
 from .sensor_streams import SensorStreams
 
-SECTION = 'stills'
+SECTION = 'images'
 MOST_KEPT = 200
 MOST_BYTES = 40 * 2 ** 20  # of all together
 MOST_QUESTIONS = 64

@@ -84,7 +84,7 @@ class RobotAppearanceHandler(SensorHandler):
 
 
 class SampleHandler(SensorHandler):
-    """GET /frame/NUMBER?after=SEQUENCE&width=PIXELS: a sample other than SEQUENCE (0: any).
+    """GET /sample/NUMBER?after=SEQUENCE&width=PIXELS: a sample other than SEQUENCE (0: any).
 
     With `robot=NUMBER` its facts have `place`, the pose of its tf frame at that robot, 12 numbers
     of (3, 4), or `astray`, why that is not known. 204 where none came within 5 s, 404 for no such

@@ -79,7 +79,7 @@ class SensorStream:
                 self._encoded[key] = self._made(sample, width)
             return self._encoded[key]
 
-    def tend(self, may_listen: bool) -> None:
+    def update_subscription(self, may_listen: bool) -> None:
         """Subscribe while somebody watches, unsubscribe when nobody does.
 
         One thread calls it; a master may hang it.
@@ -164,11 +164,11 @@ class SensorStreams:
                 self._by_number[number] = make(number) if make else SensorStream(
                     number, topic, kind)
 
-    def tend(self) -> None:
+    def update_subscriptions(self) -> None:
         """Subscribe and unsubscribe as needed; to be called often, by one thread."""
         for sensor in self._all():
             listened = sum(each.listened for each in self._all())
-            sensor.tend(listened < MOST_LISTENED)
+            sensor.update_subscription(listened < MOST_LISTENED)
 
     def view(self) -> List[Dict[str, Any]]:
         """As plain data, by topic."""

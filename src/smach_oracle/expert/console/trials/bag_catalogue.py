@@ -265,7 +265,8 @@ def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
         return []
     rows = []
     for variant in count_variants(list(summaries)):
-        rows.append({'experiment': variant.experiment, 'arm': variant.name, 'runs': variant.trials,
+        rows.append({'experiment': variant.experiment, 'arm': variant.name,
+                     'trials': variant.trials,
                      'endings': {key: variant.of(name).trials for key, name in _ENDINGS.items()},
                      'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()}})
     return rows

@@ -32,7 +32,7 @@ def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
 def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[str, Any]:
     endings = Counter(trial.ending for trial in trials)
     return {
-        'experiment': experiment, 'oracle': oracle, 'runs': len(trials),
+        'experiment': experiment, 'oracle': oracle, 'trials': len(trials),
         'endings': {ending.value: endings[ending] for ending in ENDINGS},
         'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED}
     }

@@ -49,7 +49,7 @@ class RecordedHandler(_HistoryHandler):
 
 
 class QuestionImageHandler(_HistoryHandler):
-    """GET /still/NUMBER: a camera image of a question; 404 where it is not kept any more."""
+    """GET /image/NUMBER: a camera image of a question; 404 where it is not kept any more."""
 
     def get(self, number: str) -> None:
         """Answer."""

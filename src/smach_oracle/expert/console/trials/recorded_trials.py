@@ -42,7 +42,7 @@ class RecordedTrials:
         self._known: 'OrderedDict[Tuple[int, Tuple[str, ...]], str]' = OrderedDict()
 
     def text(self, number: int) -> str:
-        """The trial of that number as JSON: `events`, `graphs` by path, `stills` by query id.
+        """The trial of that number as JSON: `events`, `graphs` by path, `images` by query id.
 
         :raises RecordedTrialError: where it cannot be had.
         """
@@ -69,7 +69,7 @@ class RecordedTrials:
                       for path in sorted({event.path for event in events if event.path})[:200]}
         return {
             'events': [event_view(event) for event in events], 'graphs': self._graphs(structures),
-            'stills': images
+            'images': images
         }
 
     def _machines(self, bags: Sequence[str],

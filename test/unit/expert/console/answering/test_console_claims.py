@@ -9,7 +9,7 @@ from expert_fixtures import make_question
 
 from smach_oracle.expert.claims import MOST_MISSED, ClaimKeeper
 from smach_oracle.expert.console.answering.question_commands import QuestionCommands
-from smach_oracle.expert.console.commands.commands import Command
+from smach_oracle.expert.console.commands.commands import PageCommand
 from smach_oracle.expert.console.web.audit import Person
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import OpenQuery
@@ -66,7 +66,7 @@ def make_commands(monkeypatch):
     front = Front(['/a', '/b', '/c'])
     made = QuestionCommands(front, Silent(), {})
     for listed in front.open.values():
-        assert made.carry_out(Command(1, 'claim', {'question': listed.key}), ANN, 1).ok
+        assert made.carry_out(PageCommand(1, 'claim', {'question': listed.key}), ANN, 1).ok
     return made, front
 
 

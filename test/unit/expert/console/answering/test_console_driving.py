@@ -11,9 +11,9 @@ import tornado.websocket
 from smach_oracle.expert.console.answering.driving_control import (
     LATE_S,
     SILENT_S,
+    DelayCheck,
     DrivingControl,
     DrivingSession,
-    Freshness,
     along,
 )
 from smach_oracle.expert.console.commands.commands import CommandError, parse
@@ -55,22 +55,22 @@ def test_no_speed_without_end(number):
 
 
 def test_what_a_slow_link_has_held_back_is_not_fresh():
-    freshness = Freshness()
+    check = DelayCheck()
     # a stall of a second, and what comes after it in a burst
     delays = [0.005, 0.02, 0.004, 0.05, 1.0, 0.9, 0.1, 0.03]
     shown = [
-        freshness.fresh(5000.0 + 0.03 * at, 20.0 + 0.03 * at + delay)
+        check.is_in_time(5000.0 + 0.03 * at, 20.0 + 0.03 * at + delay)
         for at, delay in enumerate(delays)
     ]
     assert shown == [True, True, True, True, False, False, False, True]
 
 
 def test_clocks_that_run_apart_do_no_harm():
-    freshness = Freshness()
-    assert all(freshness.fresh(0.03 * at * 1.0003, 7.0 + 0.03 * at) for at in range(20000))
-    freshness = Freshness()
-    assert all(freshness.fresh(0.03 * at, 7.0 + 0.03 * at * 1.0003) for at in range(20000))
-    assert not freshness.fresh(600.0, 7.0 + 600.18 + LATE_S + 0.05)
+    check = DelayCheck()
+    assert all(check.is_in_time(0.03 * at * 1.0003, 7.0 + 0.03 * at) for at in range(20000))
+    check = DelayCheck()
+    assert all(check.is_in_time(0.03 * at, 7.0 + 0.03 * at * 1.0003) for at in range(20000))
+    assert not check.is_in_time(600.0, 7.0 + 600.18 + LATE_S + 0.05)
 
 
 def drive(page, name='ann'):

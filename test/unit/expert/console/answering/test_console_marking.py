@@ -193,9 +193,9 @@ def test_an_interface_is_found_by_the_types_beside_its_action(monkeypatch):
     watching.sensors.follow(published)
     watching.write_sections()
     image = watching.sensors.on('/alpha/perception/image').number
-    assert sections.get('eye')['perception'] == {
+    assert sections.get('sensors')['perception'] == {
         '/alpha/expert_query q': {'image': image, 'cloud': None}
     }
     watching._follow_interfaces(published, {'/alpha/fake/segment'})
     watching.write_sections()
-    assert sections.get('eye')['perception'] == {}
+    assert sections.get('sensors')['perception'] == {}

@@ -8,7 +8,7 @@ import rospy
 
 from smach_oracle.expert.console.answering import teleop_client, teleoperation
 from smach_oracle.expert.console.answering.driving_control import SILENT_S, DrivingSession
-from smach_oracle.expert.console.commands.commands import Command
+from smach_oracle.expert.console.commands.commands import PageCommand
 from smach_oracle.expert.console.web.audit import Person
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.interfaces.manipulation.cartesian_drive import GRIPPER_OPEN
@@ -66,7 +66,7 @@ def make_hands(monkeypatch):
 def drive(made, sent_s=None, page=1, **more):
     """As a page says it; `sent_s` by its own clock, now where it is not told."""
     sent_s = time.monotonic() if sent_s is None else sent_s
-    return made.drive(Command(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), page)
+    return made.drive(PageCommand(1, 'drive', dict(SAID, sent=1e3 * sent_s, **more)), page)
 
 
 def test_the_arm_is_the_interface_s_own_choice_until_another_is_named(make):

@@ -8,8 +8,8 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
 from smach_oracle.expert import robot_topics
-from smach_oracle.expert.console.answering import precondition_status as conditions
-from smach_oracle.expert.console.answering.precondition_status import PreconditionStatuses
+from smach_oracle.expert.console.answering import precondition_sections
+from smach_oracle.expert.console.answering.precondition_sections import PreconditionStatuses
 from smach_oracle.expert.console.sensors import question_images
 from smach_oracle.expert.console.sensors.images import BrowserFile
 from smach_oracle.expert.console.sensors.question_images import (
@@ -58,7 +58,7 @@ def seen(*topics):
 def shown(board, question):
     sections = PageSections()
     board.write_sections(sections, [question])
-    return sections.get('stills').get(question.key, [])
+    return sections.get('images').get(question.key, [])
 
 
 def test_the_console_takes_the_first_frame_after_the_question(monkeypatch):
@@ -140,12 +140,12 @@ def test_preconditions_are_kept_by_question_and_robot(monkeypatch):
     board, sections, question = PreconditionStatuses(), PageSections(), listed(monkeypatch)
     checks = [PreconditionCheck('PICK', 'free', PreconditionCheck.HOLDS, 'yes', 2.0),
               PreconditionCheck('PICK', 'door', PreconditionCheck.UNKNOWN, '', -1.0)]
-    monkeypatch.setattr(conditions.time, 'time', lambda: 1000.0)
+    monkeypatch.setattr(precondition_sections.time, 'time', lambda: 1000.0)
     board.taker('/beta')(PreconditionChecks(query_id='q1', checks=checks))
     board.write_sections(sections, [question])
-    assert sections.get('conditions') == {}
+    assert sections.get('preconditions') == {}
     board.taker('/alpha')(PreconditionChecks(query_id='q1', checks=checks))
     board.write_sections(sections, [question])
-    assert sections.get('conditions') == {question.key: {'PICK': [
-        {'name': 'free', 'holds': True, 'text': 'yes', 'looked': 998.0},
-        {'name': 'door', 'holds': None, 'text': '', 'looked': None}]}}
+    assert sections.get('preconditions') == {question.key: {'PICK': [
+        {'name': 'free', 'holds': True, 'text': 'yes', 'checked': 998.0},
+        {'name': 'door', 'holds': None, 'text': '', 'checked': None}]}}

@@ -174,7 +174,7 @@ def quiet(monkeypatch):
 def looked_at(parameter='/robot_description', urdf=BALL_HANDED, number=1):
     robot = RobotStream(number, parameter, {parameter: urdf}.__getitem__)
     robot.newer(0)
-    robot.tend(True)
+    robot.update_subscription(True)
     return robot
 
 
@@ -194,15 +194,15 @@ def test_a_robot_is_seen_before_its_joints_speak_and_moves_with_them(quiet):
 def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(
         quiet, monkeypatch, make, topics):
     sensor = make()
-    sensor.tend(True)
+    sensor.update_subscription(True)
     assert Silent.alive == 0
     sensor.newer(0)
-    sensor.tend(True)
-    sensor.tend(True)
+    sensor.update_subscription(True)
+    sensor.update_subscription(True)
     assert Silent.alive == topics
     later = time.monotonic() + sensor_streams.IDLE_S
     monkeypatch.setattr(sensor_streams.time, 'monotonic', lambda: later)
-    sensor.tend(True)
+    sensor.update_subscription(True)
     assert Silent.alive == 0 and sensor.newer(0) is None
 
 
@@ -277,7 +277,7 @@ def test_depth_without_a_calibration_or_of_another_kind_is_told(quiet):
     sensor = DepthCloudStream(3, DepthCamera('/cam/depth/image_raw', '/cam/depth/camera_info',
                                              None))
     sensor.newer(0)
-    sensor.tend(True)
+    sensor.update_subscription(True)
     sensor.take(depth_image(np.ones((4, 4)), Header()))
     with pytest.raises(ImageError, match='nothing comes on /cam/depth/camera_info'):
         sensor.file_of(sensor.newer(0), 640)
@@ -334,7 +334,7 @@ class TestModels(console_case.ConsoleCase):
     def test_a_cloud_is_told_with_its_place_at_a_robot(self):
         self.robot.appearance()
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='hand')))
-        path = '/frame/{}?robot={}'.format(self.cloud.number, self.number)
+        path = '/sample/{}?robot={}'.format(self.cloud.number, self.number)
         assert json.loads(
             self.get(path).headers['X-Facts'])['place'] == [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='nowhere')))
@@ -342,6 +342,6 @@ class TestModels(console_case.ConsoleCase):
             self.get(path).headers['X-Facts'])['astray'] == 'No transform from nowhere to base.'
         for robot, code in ((self.cloud.number, 404), (99, 404), ('x', 400), ('1&robot=1', 400),
                             ('-1', 400)):
-            assert self.get('/frame/{}?robot={}'.format(self.cloud.number,
+            assert self.get('/sample/{}?robot={}'.format(self.cloud.number,
                                                         robot)).code == code, robot
         assert isinstance(self.cloud._sample.message, PointCloud2)

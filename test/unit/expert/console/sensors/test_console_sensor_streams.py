@@ -70,17 +70,17 @@ def test_there_are_only_so_many():
 
 def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(monkeypatch):
     found = known()
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 0
     sensor = found.on('/camera/image')
     assert sensor.newer(0) is None
-    found.tend()
-    found.tend()
+    found.update_subscriptions()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 1
     sensor.take(picture())
     later = time.monotonic() + sensor_streams.IDLE_S
     monkeypatch.setattr(sensor_streams.time, 'monotonic', lambda: later)
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == 0
     assert sensor.newer(0) is None, 'what was seen long ago is not shown as new'
 
@@ -90,7 +90,7 @@ def test_only_so_many_are_listened_to_at_a_time():
     found.follow([['/camera{}'.format(number), 'sensor_msgs/Image'] for number in range(50)])
     for each in found.view():
         found.find(each['id']).newer(0)
-    found.tend()
+    found.update_subscriptions()
     assert FakeSubscriber.alive == sensor_streams.MOST_LISTENED
 
 
@@ -107,7 +107,7 @@ def test_the_newest_frame_alone_is_kept_and_encoded_once_for_all():
     assert len(sensor._encoded) == 1
 
 
-class TestFrames(console_case.ConsoleCase):
+class TestSamples(console_case.ConsoleCase):
 
     def setUp(self):
         super().setUp()
@@ -115,14 +115,14 @@ class TestFrames(console_case.ConsoleCase):
         self.camera = self.sensors.on('/camera/image')
         self.cookie, self.info = self.sign_in('viewer')
 
-    def frame(self, path=None, **headers):
+    def sample(self, path=None, **headers):
         given = dict({'Cookie': self.cookie, 'X_Xsrf': self.info['xsrf']}, **headers)
-        return self.ask(path or '/frame/{}'.format(self.camera.number), **given)
+        return self.ask(path or '/sample/{}'.format(self.camera.number), **given)
 
     def test_a_viewer_gets_the_newest_frame(self):
         self.camera.take(picture(1))
         self.camera.take(picture(2))
-        answer = self.frame()
+        answer = self.sample()
         assert (answer.code, answer.headers['Content-Type']) == (200, 'image/jpeg')
         assert answer.headers['Cache-Control'] == 'no-store' and answer.headers[
             'X-Content-Type-Options'] == 'nosniff'
@@ -135,60 +135,60 @@ class TestFrames(console_case.ConsoleCase):
                                                         401), ({'X_Xsrf': None}, 403),
                               ({'X_Xsrf': '0' * 64}, 403), ({'Origin': 'http://evil.example'},
                                                             403), ({'Host': 'evil.example'}, 421)):
-            answer = self.frame(**headers)
+            answer = self.sample(**headers)
             assert answer.code == code and 'X-Facts' not in answer.headers, headers
 
     def test_no_topic_can_be_named(self):
-        for path in ('/frame/cmd_vel', '/frame//cmd_vel', '/frame/%2fsecret', '/frame/99',
-                     '/frame/-1', '/frame/0x1', '/frame/1/../2', '/frame/', '/frame/12345678901'):
-            assert self.frame(path).code == 404, path
-        path = '/frame/{}?'.format(self.camera.number)
+        for path in ('/sample/cmd_vel', '/sample//cmd_vel', '/sample/%2fsecret', '/sample/99',
+                     '/sample/-1', '/sample/0x1', '/sample/1/../2', '/sample/', '/sample/12345678901'):
+            assert self.sample(path).code == 404, path
+        path = '/sample/{}?'.format(self.camera.number)
         for query in ('topic=/secret', 'after=-1', 'after=x', 'after=1&after=2', 'width=100000',
                       'width=1e3', 'width=', 'after=' + '9' * 30, 'after=%c2%b2'):
-            assert self.frame(path + query).code == 400, query
+            assert self.sample(path + query).code == 400, query
         assert FakeSubscriber.alive == 0
 
     def test_a_page_that_has_the_newest_waits_for_the_next(self):
         self.camera.take(picture())
         self.io_loop.call_later(0.3, self.camera.take, picture(9))
         begun_s = time.monotonic()
-        answer = self.frame('/frame/{}?after=1'.format(self.camera.number))
+        answer = self.sample('/sample/{}?after=1'.format(self.camera.number))
         assert json.loads(
             answer.headers['X-Facts'])['sequence'] == 2 and time.monotonic() - begun_s >= 0.25
 
     def test_where_nothing_comes_the_answer_is_empty(self):
         sample_handlers.WAIT_S, before = 0.1, sample_handlers.WAIT_S
         try:
-            answer = self.frame()
+            answer = self.sample()
         finally:
             sample_handlers.WAIT_S = before
         assert (answer.code, answer.body) == (204, b'')
 
     def test_what_cannot_be_shown_is_told_as_text(self):
         self.camera.take(Image(encoding='<script>', height=1, width=1))
-        answer = self.frame()
+        answer = self.sample()
         assert answer.code == 422 and answer.headers['Content-Type'].startswith('text/plain')
 
     def test_joints_are_json(self):
         joints = self.sensors.on('/joint_states')
         joints.take(JointState(name=['elbow'], position=[1.0]))
-        answer = self.frame('/frame/{}'.format(joints.number))
+        answer = self.sample('/sample/{}'.format(joints.number))
         assert json.loads(answer.body)['joints'] == [['elbow', 1.0, None, None]]
 
     def test_a_flood_is_cut_off_and_does_not_shut_out_other_requests(self):
         self.camera.take(picture())
         self._app_room().limits = ClientRateLimits(rate=0.0, burst=3.0, for_all=5.0)
-        assert [self.frame().code for _ in range(4)] == [200, 200, 200, 429]
+        assert [self.sample().code for _ in range(4)] == [200, 200, 200, 429]
         assert self.ask('/session').code == 200
 
     def test_changing_methods_do_nothing(self):
         for method in ('POST', 'PUT', 'DELETE'):
-            assert self.ask('/frame/{}'.format(self.camera.number), method, '', Origin=self.origin,
+            assert self.ask('/sample/{}'.format(self.camera.number), method, '', Origin=self.origin,
                             Cookie=self.cookie, X_Xsrf=self.info['xsrf']).code == 405
 
     @tornado.testing.gen_test
     async def test_only_so_many_wait_at_a_time(self):
-        url = self.get_url('/frame/{}'.format(self.camera.number))
+        url = self.get_url('/sample/{}'.format(self.camera.number))
         shared = self._app_room()
         shared.waiting['127.0.0.1'] = sample_handlers.MOST_WAITING_EACH
         answer = await self.http_client.fetch(

@@ -58,7 +58,7 @@ def test_they_are_counted_as_the_analysis_counts_them(folder):
     found = load_trials([folder]).trials
     group = count_variants(found)[0]
     row = section()['table'][0]
-    assert (row['experiment'], row['arm'], row['runs']) == (group.experiment, group.name, TRIALS)
+    assert (row['experiment'], row['arm'], row['trials']) == (group.experiment, group.name, TRIALS)
     assert row['counts']['recoveries'] == {'trials': group.of('oracle recoveries').trials,
                                            'events': group.of('oracle recoveries').events}
     assert row['endings']['failure'] == group.of('ended in failure').trials
@@ -112,7 +112,7 @@ def test_number_and_size_are_bounded(folder, monkeypatch):
     monkeypatch.setattr(bag_catalogue, 'MOST_BAGS', 5)
     monkeypatch.setattr(bag_catalogue, 'SHOWN_TRIALS', 3)
     _, section = catalogue_of(folder)
-    assert section()['table'][0]['runs'] == 5 and len(section()['trials']) == 3
+    assert section()['table'][0]['trials'] == 5 and len(section()['trials']) == 3
     assert section(
     )['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
     monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 10)
@@ -197,14 +197,14 @@ class TestServed(console_case.ConsoleCase):
 
     def test_nobody_else_does(self):
         number = self.trial()
-        for path in ('/recorded/{}'.format(number), '/still/1'):
+        for path in ('/recorded/{}'.format(number), '/image/1'):
             assert self.ask(path).code == 401
             assert self.get(path, xsrf=False).code == 403
 
     def test_a_browser_can_name_neither_path_nor_anything_but_a_number(self):
         for path in ('/recorded/../{}'.format(self.place), '/recorded/' + self.place,
                      '/recorded/1e3', '/recorded/-1', '/recorded/', '/recorded/%2e%2e%2fetc',
-                     '/recorded/12345678901', '/still/a', '/still/1/2'):
+                     '/recorded/12345678901', '/image/a', '/image/1/2'):
             assert self.get(path).code == 404, path
         assert self.get('/recorded/1?path=/etc/passwd').code == 400
         answer = self.get('/recorded/999')
@@ -213,7 +213,7 @@ class TestServed(console_case.ConsoleCase):
     def test_they_are_limited_in_rate(self):
         cookie, info = self.sign_in('viewer')
         began = time.monotonic()
-        codes = [self.ask('/still/1', Cookie=cookie, X_Xsrf=info['xsrf']).code for _ in range(100)]
+        codes = [self.ask('/image/1', Cookie=cookie, X_Xsrf=info['xsrf']).code for _ in range(100)]
         if time.monotonic() - began < 3.0:
             assert 429 in codes
         assert set(codes) <= {404, 429}

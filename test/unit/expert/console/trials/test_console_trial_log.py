@@ -106,7 +106,7 @@ def test_the_table_counts_trials_in_which_it_happened_and_how_often():
     trials = run_trials(40)
     row, = counts_table(map(count, trials))
     of_bags = [summarise(events) for events in trials]
-    assert row['runs'] == 40
+    assert row['trials'] == 40
     for name in ('failures', 'recoveries', 'questions', 'answered'):
         numbers = [getattr(summary, name) for summary in of_bags]
         assert row['counts'][name] == {'trials': sum(map(bool, numbers)),
@@ -127,7 +127,7 @@ def test_a_trial_whose_start_was_not_heard_counts_as_one_with_an_oracle():
     late = count([event(EventKind.STATE_START), event(EventKind.TRIAL_END, outcome='succeeded')])
     assert late.recovers is None and has_oracle(late)
     row, = counts_table([late])
-    assert row['oracle'] is True and row['runs'] == 1
+    assert row['oracle'] is True and row['trials'] == 1
 
 
 def event(kind, state='PICK', trial='t', path='TASK', **fields):

@@ -28,14 +28,14 @@ export interface Batch {
 export interface Sections {
   questions: Question[];
   servers: QueryServer[];
-  conditions: ByKey<ByState<PreconditionCheck[]>>;
-  stills: ByKey<KeptImage[]>;
+  preconditions: ByKey<ByState<PreconditionStatus[]>>;
+  images: ByKey<KeptImage[]>;
   robots: string[]; // names of their nodes
   trials: TrialOverview;
   bags: BagOverview;
-  eye: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
-  hand: ByKey<Manipulation>;
-  output: ByKey<InterfaceOutput>;
+  sensors: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
+  manipulation: ByKey<Manipulation>;
+  interface_output: ByKey<InterfaceOutput>;
   [name: `live ${string}`]: LiveMachines; // by robot
   [name: `graph ${string}`]: Graph; // by robot and container path
 }
@@ -111,11 +111,11 @@ export interface UserdataItem {
 
 export interface QueryServer { name: string; connected: boolean }
 
-export interface PreconditionCheck {
+export interface PreconditionStatus {
   name: string;
   holds: boolean | null; // null: unknown
   text: string;
-  looked: number | null; // null: never
+  checked: number | null; // when; null: never
 }
 
 /** An image that the server keeps: what a camera gave when a question was put. */
@@ -236,7 +236,7 @@ export interface CountsRow {
   experiment: string;
   oracle?: boolean; // of trials that were heard
   arm?: string; // of trials of bags: the variant
-  runs: number;
+  trials: number;
   endings: { success: number; failure: number; preempted: number; unfinished?: number };
   counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
 }
@@ -256,7 +256,7 @@ export interface BagOverview {
 export interface RecordedTrial {
   events: TrialEvent[];
   graphs: ByPath<Graph>;
-  stills: { [query: string]: KeptImage[] | undefined };
+  images: { [query: string]: KeptImage[] | undefined };
 }
 
 // --- sensors
@@ -268,7 +268,7 @@ export interface Sensor { id: number; topic: string; kind: SensorKind; type: str
 /** Numbers of the sensors of a perception interface's image and cloud; null: there is none yet. */
 export interface PerceptionSensors { image: number | null; cloud: number | null }
 
-/** GET /frame/NUMBER: what is told beside the newest message of a sensor. */
+/** GET /sample/NUMBER: what is told beside the newest message of a sensor. */
 export interface SensorFacts { sequence: number }
 
 export interface StampedFacts extends SensorFacts {

@@ -10,7 +10,7 @@ import { likeliest, stateLines } from './state_choices.js';
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Answer} Answer */
 /** @typedef {import('../server').AnswerKind} AnswerKind */
-/** @typedef {import('../server').PreconditionCheck} PreconditionCheck */
+/** @typedef {import('../server').PreconditionStatus} PreconditionStatus */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').StateChoice} StateChoice */
 
@@ -50,12 +50,12 @@ export class AnswerForm {
 
   /**
    * Whether the preconditions of states hold.
-   * @param {{ [state: string]: PreconditionCheck[] | undefined }} checks
+   * @param {{ [state: string]: PreconditionStatus[] | undefined }} statuses
    * @param {number} now by the server's clock
    */
-  showPreconditions(checks, now) {
+  showPreconditions(statuses, now) {
     whenLetGo(this.root, () => {
-      for (const [state, list] of this.preconditions) list.show(checks[state], now);
+      for (const [state, list] of this.preconditions) list.show(statuses[state], now);
     });
   }
 

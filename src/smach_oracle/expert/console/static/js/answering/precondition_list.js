@@ -3,7 +3,7 @@
 import { h, setText } from '../page/dom.js';
 import { duration } from '../page/format.js';
 
-/** @typedef {import('../server').PreconditionCheck} PreconditionCheck */
+/** @typedef {import('../server').PreconditionStatus} PreconditionStatus */
 /** @typedef {{ [part in 'root' | 'sign' | 'word' | 'why']: HTMLElement }} Item */
 
 const STALE_S = 8;
@@ -12,20 +12,20 @@ const DOES_NOT_HOLD = { sign: '✗', word: 'does not hold', kind: 'bad' };
 const UNKNOWN = { sign: '?', word: 'unknown', kind: '' };
 const UNTOLD = { sign: '', word: '', kind: '' };
 
-/** @param {PreconditionCheck | undefined} check */
-function wordsOf(check) {
-  if (!check) return UNTOLD;
-  if (check.holds === null) return UNKNOWN;
-  return check.holds ? HOLDS : DOES_NOT_HOLD;
+/** @param {PreconditionStatus | undefined} status */
+function wordsOf(status) {
+  if (!status) return UNTOLD;
+  if (status.holds === null) return UNKNOWN;
+  return status.holds ? HOLDS : DOES_NOT_HOLD;
 }
 
 /**
  * Without the name, which stands before it.
- * @param {PreconditionCheck | undefined} check
+ * @param {PreconditionStatus | undefined} status
  */
-function reasonOf(check) {
-  if (!check || check.holds === true || !check.text) return '';
-  const { name, text } = check;
+function reasonOf(status) {
+  if (!status || status.holds === true || !status.text) return '';
+  const { name, text } = status;
   const rest = text.startsWith(name + ' ') ? text.slice(name.length + 1) : text;
   return ': ' + rest.replace('running ' + name + ' ', 'running it ');
 }
@@ -42,15 +42,15 @@ export class PreconditionList {
 
   /**
    * Only their names where the robot publishes nothing.
-   * @param {PreconditionCheck[] | undefined} checks in the same order
+   * @param {PreconditionStatus[] | undefined} statuses in the same order
    * @param {number} now by the server's clock
    */
-  show(checks, now) {
-    const looked = (checks || []).map((check) => check.looked ?? Infinity);
-    const oldest = Math.min(...looked);
+  show(statuses, now) {
+    const checked = (statuses || []).map((status) => status.checked ?? Infinity);
+    const oldest = Math.min(...checked);
     const age = now - oldest;
     const stale = age > STALE_S ? ' stale' : '';
-    this.items.forEach((item, index) => showCheck(item, checks && checks[index], stale));
+    this.items.forEach((item, index) => showStatus(item, statuses && statuses[index], stale));
     const when = age < 1 ? 'as of now' : 'as of ' + duration(age) + ' ago';
     setText(this.age, oldest < Infinity ? when : '');
   }
@@ -70,14 +70,14 @@ function itemOf(name) {
 
 /**
  * @param {Item} item
- * @param {PreconditionCheck | undefined} check
+ * @param {PreconditionStatus | undefined} status
  * @param {string} stale a class
  */
-function showCheck(item, check, stale) {
-  const { sign, word, kind } = wordsOf(check);
+function showStatus(item, status, stale) {
+  const { sign, word, kind } = wordsOf(status);
   setText(item.sign, sign);
   setText(item.word, word);
   const shown = 'precondition ' + kind + stale;
   if (item.root.className !== shown) item.root.className = shown;
-  setText(item.why, reasonOf(check));
+  setText(item.why, reasonOf(status));
 }

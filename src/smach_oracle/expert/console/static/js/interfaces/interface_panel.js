@@ -69,13 +69,13 @@ export class InterfacePanel {
     const { key } = this.question;
     const { store, mayAnswer } = this.app;
     if (this.manipulation) this.manipulation.update();
-    else if (key in (store.get('hand') || {})) {
+    else if (key in (store.get('manipulation') || {})) {
       this.manipulation = new ManipulationPanel(this.app, this.question);
       replace(this.place, this.manipulation.root);
     }
-    this.end.hidden = key in (store.get('eye')?.perception || {}); // that one has its own
+    this.end.hidden = key in (store.get('sensors')?.perception || {}); // that one has its own
     this.finish.disabled = this.quit.disabled = !mayAnswer || this.busy;
-    this.showOutput(store.get('output')?.[key]);
+    this.showOutput(store.get('interface_output')?.[key]);
   }
 
   /** @param {InterfaceOutput | undefined} output */

@@ -125,7 +125,7 @@ export class ManipulationPanel {
   }
 
   /** The interface as it stands; undefined where it is gone. */
-  get manipulation() { return this.app.store.get('hand')?.[this.question.key]; }
+  get manipulation() { return this.app.store.get('manipulation')?.[this.question.key]; }
 
   /** Whether this page drives. */
   get mine() {

@@ -52,9 +52,9 @@ export class PerceptionPanel {
     this.warning = '';
     this.resultKey = ''; // of what is shown of it
     this.image = h('canvas', { class: 'image', width: 4, height: 3,
-      'aria-label': 'The frame to draw on' });
+      'aria-label': 'The image to draw on' });
     this.canvas = this.makeCanvas();
-    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the frame…');
+    this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the image…');
     /** @type {Map<Tool, HTMLButtonElement>} */
     this.tools = new Map(TOOLS.map(({ tool, text, title }) => [tool, h('button', { class: 'tool',
       'data-tool': tool, title, onclick: () => this.take(tool) }, text)]));
@@ -68,7 +68,7 @@ export class PerceptionPanel {
     /** @type {SensorFeed<ImageFacts>} */
     this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
-        say: (text) => this.say(text) });
+        say: (text, missing) => this.say(text, missing) });
     this.refresh();
   }
 
@@ -86,8 +86,8 @@ export class PerceptionPanel {
     return {
       undo: button('Undo', () => this.undo()),
       clear: button('Clear', () => this.clear()),
-      failed: button('Frame of the failure', () => this.useFrame('at_goal')),
-      fresh: button('New frame', () => this.useFrame('fresh')),
+      failed: button('Image of the failure', () => this.useFrame('at_goal')),
+      fresh: button('New image', () => this.useFrame('fresh')),
       accept: button('Accept the object', () => this.accept(), 'primary accept'),
       quit: button('Give up', () => this.giveUp(), 'quit'),
     };
@@ -121,7 +121,7 @@ export class PerceptionPanel {
 
   /** Numbers of the sensors of its image and of the cloud of that, null before there are any. */
   get sensors() {
-    const running = this.app.store.get('eye')?.perception || {};
+    const running = this.app.store.get('sensors')?.perception || {};
     return running[this.question.key] || { image: null, cloud: null };
   }
 
@@ -137,9 +137,12 @@ export class PerceptionPanel {
     }
   }
 
-  /** @param {string} text */
-  say(text) {
-    if (text === 'Nothing new comes.') return; // one image is all there is to come
+  /**
+   * @param {string} text
+   * @param {import('../sensors/sensor_feed.js').Missing} missing
+   */
+  say(text, missing) {
+    if (missing === 'next') return; // one image is all there is to come
     setText(this.note, this.stamp ? '' : text);
     this.note.hidden = !this.note.textContent;
   }

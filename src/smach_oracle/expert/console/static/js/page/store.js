@@ -25,7 +25,7 @@ export class Store {
 
   get questions() { return this.get('questions') || []; }
 
-  get sensors() { return this.get('eye')?.sensors || []; }
+  get sensors() { return this.get('sensors')?.sensors || []; }
 
   /**
    * The server's clock.

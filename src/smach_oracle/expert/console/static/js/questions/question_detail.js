@@ -166,7 +166,7 @@ export class QuestionDetail {
     }
     const clock = this.app.store.now();
     const left = now.deadline === null ? Infinity : now.deadline - clock;
-    this.form.showPreconditions(this.app.store.get('conditions')?.[this.key] || {}, clock);
+    this.form.showPreconditions(this.app.store.get('preconditions')?.[this.key] || {}, clock);
     setText(this.time, 'asked ' + duration(clock - now.asked) + ' ago · '
       + (left === Infinity ? 'no time limit' : duration(left) + ' left'));
     this.time.classList.toggle('urgent', left < URGENT_S);
@@ -174,7 +174,7 @@ export class QuestionDetail {
 
   /** The tools of a perception interface, for as long as one runs for this question. */
   showPerception() {
-    const running = this.key in (this.app.store.get('eye')?.perception || {});
+    const running = this.key in (this.app.store.get('sensors')?.perception || {});
     if (running && !this.perceptionPanel && !this.ended) {
       this.perceptionPanel = new PerceptionPanel(this.app, this.question, () => this.follow());
       replace(this.perceptionPlace, this.perceptionPanel.root);
@@ -240,10 +240,10 @@ export class QuestionDetail {
   update(names) {
     /** @param {...string} wanted */
     const changed = (...wanted) => wanted.some((name) => names.includes(name));
-    if (changed('questions', 'hand', 'output', 'eye')) this.showInterface();
-    if (changed('conditions')) this.tick();
-    if (changed('stills', 'eye')) this.camera.update();
-    if (changed('eye')) this.showPerception();
+    if (changed('questions', 'manipulation', 'interface_output', 'sensors')) this.showInterface();
+    if (changed('preconditions')) this.tick();
+    if (changed('images', 'sensors')) this.camera.update();
+    if (changed('sensors')) this.showPerception();
     if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
     if (machines || changed('questions')) this.machine.update();

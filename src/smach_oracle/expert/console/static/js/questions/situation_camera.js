@@ -75,7 +75,7 @@ export class SituationCamera {
   }
 
   update() {
-    this.images = this.app.store.get('stills')?.[this.question.key] || this.images;
+    this.images = this.app.store.get('images')?.[this.question.key] || this.images;
     const topics = [...new Set([...this.images.map((image) => image.topic),
       ...camerasOf(this.app, this.question.robot)])];
     this.root.hidden = !topics.length;

@@ -12,7 +12,7 @@ export class CloudView extends LiveScene {
    * @param {string} type
    */
   constructor(app, topic, type) {
-    super(app, topic, 'Robot in the picture');
+    super(app, topic, 'Robot in the view');
     this.startClouds(topic, type);
     this.begin();
   }

@@ -33,7 +33,7 @@ export class FailureImageView {
   async fetch(app, id) {
     let problem = '';
     try {
-      const answer = await app.connection.fetch('still/' + id);
+      const answer = await app.connection.fetch('image/' + id);
       if (answer.ok) await drawImage(this.canvas, answer);
       else if (answer.status === 404) problem = 'It is not kept any more.';
       else problem = 'It cannot be had (' + answer.status + ').';

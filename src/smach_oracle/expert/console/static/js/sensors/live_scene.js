@@ -14,6 +14,7 @@ import { SensorFeed, numberOf } from './sensor_feed.js';
 
 const PERIOD_MS = 150;
 const OFFER_MS = 1000; // how often it is looked for what else may be shown
+const NO_JOINTS = 'No joint states come.';
 const NEAR = 1.2; // m: what of a cloud is near a robot
 
 /** @abstract */
@@ -86,8 +87,8 @@ export class LiveScene {
   /** @param {string} topic '' for none */
   startRobot(topic) {
     if (this.robot) this.robot.stop();
-    this.robot = topic ? new RobotFeed(this.app, topic, this.root,
-      { moved: () => this.changed(), say: (text) => this.sayOfRobot(text) }) : null;
+    this.robot = topic ? new RobotFeed(this.app, topic, this.root, { moved: () => this.changed(),
+      say: (text, missing) => this.sayOfRobot(missing ? NO_JOINTS : text) }) : null;
     this.sayOfRobot('');
     this.changed();
   }
@@ -163,7 +164,7 @@ export class LiveScene {
 
   /** @param {string} text */
   sayOfRobot(text) {
-    this.said.robot = text.startsWith('Nothing') ? 'No joint states come.' : text;
+    this.said.robot = text;
     this.showLack();
   }
 

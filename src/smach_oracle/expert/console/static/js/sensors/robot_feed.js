@@ -11,6 +11,7 @@ import { SensorFeed, numberOf } from './sensor_feed.js';
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').ModelHeader} ModelHeader */
 /** @typedef {import('../server').RobotFacts} RobotFacts */
+/** @typedef {import('./sensor_feed.js').Missing} Missing */
 
 export const ROBOT = 'robot_description';
 const PERIOD_MS = 120;
@@ -38,7 +39,8 @@ export class RobotFeed {
    * @param {App} app
    * @param {string} topic the parameter with its description
    * @param {Element} root nothing is asked for while it is not on the page
-   * @param {{ moved: () => void, say: (text: string) => void }} use moved: there is something new
+   * @param {{ moved: () => void, say: (text: string, missing: Missing) => void }} use moved: there
+   *   is something new
    */
   constructor(app, topic, root, { moved, say }) {
     this.app = app;

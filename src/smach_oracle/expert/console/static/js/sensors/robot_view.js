@@ -11,7 +11,7 @@ export class RobotView extends LiveScene {
    * @param {string} topic
    */
   constructor(app, topic) {
-    super(app, topic, 'Point cloud in the picture');
+    super(app, topic, 'Point cloud in the view');
     this.startRobot(topic);
     this.begin();
   }

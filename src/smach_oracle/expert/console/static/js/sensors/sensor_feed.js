@@ -9,7 +9,7 @@ const LEAST_PAUSE_MS = 60;
 const TROUBLE_PAUSE_MS = 1000;
 const AWAY_PAUSE_MS = 250;
 const RATE_OVER_MS = 3000;
-const TOO_MANY = 'Too many pictures at a time.';
+const TOO_MANY = 'Too many sensors at a time.';
 /** @type {{ [status: number]: string | undefined }} */
 const REFUSALS = { 404: 'It is gone.', 429: TOO_MANY, 503: TOO_MANY };
 
@@ -26,10 +26,15 @@ export function numberOf(app, topic, type) {
 }
 
 /**
+ * The message that does not come: the first one, or one after it; '' where that is not the trouble.
+ * @typedef {'' | 'first' | 'next'} Missing
+ */
+
+/**
  * @template {SensorFacts} Facts what is told beside the messages of this kind of sensor
  * @typedef {object} Use
  * @property {(answer: Response, facts: Facts) => Promise<void> | void} take shows a message
- * @property {(text: string) => void} say '' where all is well
+ * @property {(text: string, missing: Missing) => void} say '' where all is well
  * @property {number} [width] px of images
  * @property {number} [every] ms between two of them, at least
  * @property {() => number | undefined} [beside] the number of a robot at which the facts shall tell
@@ -84,7 +89,7 @@ export class SensorFeed {
       if (asked !== last) after = 0;
       last = asked;
       if (document.hidden || !this.reachable || id === undefined || id === null) {
-        if (id === undefined && this.reachable) this.use.say('It is gone.');
+        if (id === undefined && this.reachable) this.use.say('It is gone.', '');
         await pause(AWAY_PAUSE_MS);
         continue;
       }
@@ -115,17 +120,18 @@ export class SensorFeed {
     this.controller = new AbortController();
     const { signal } = this.controller;
     const query = 'after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : '');
-    const answer = await this.app.connection.fetch('frame/' + id + '?' + query, { signal });
+    const answer = await this.app.connection.fetch('sample/' + id + '?' + query, { signal });
     if (answer.status === 204) {
-      this.use.say(after ? 'Nothing new comes.' : 'Nothing comes.');
+      if (after) this.use.say('Nothing new comes.', 'next');
+      else this.use.say('Nothing comes.', 'first');
       return this.lost ? 0 : after; // the last one again: its place may be known by now
     }
     if (answer.status === 422) {
-      this.use.say(await answer.text());
+      this.use.say(await answer.text(), '');
       return Number(answer.headers.get('X-Sequence')) || 0;
     }
     if (!answer.ok) {
-      this.use.say(REFUSALS[answer.status] || 'Refused (' + answer.status + ').');
+      this.use.say(REFUSALS[answer.status] || 'Refused (' + answer.status + ').', '');
       throw new Error(String(answer.status));
     }
     return this.show(answer);
@@ -139,7 +145,7 @@ export class SensorFeed {
     this.lost = 'astray' in facts;
     await this.use.take(answer, facts);
     this.times.push(performance.now());
-    this.use.say('');
+    this.use.say('', '');
     return facts.sequence;
   }
 }

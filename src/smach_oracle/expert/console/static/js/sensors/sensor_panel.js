@@ -48,7 +48,7 @@ class SensorPanel {
   shown() { this.showList(); }
 
   /** @param {string[]} names */
-  update(names) { if (names.includes('eye')) this.showList(); }
+  update(names) { if (names.includes('sensors')) this.showList(); }
 
   showList() {
     const { known } = this;

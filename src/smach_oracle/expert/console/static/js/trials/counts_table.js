@@ -5,7 +5,7 @@ import { percent } from '../page/format.js';
 
 /** @typedef {import('../server').CountsRow} CountsRow */
 
-const COLUMNS = ['Experiment', 'Variant', 'Runs', 'Failures', 'Oracle recoveries', 'Questions',
+const COLUMNS = ['Experiment', 'Variant', 'Trials', 'Failures', 'Oracle recoveries', 'Questions',
   'Expert interventions', 'Ended in failure'];
 
 /**
@@ -19,13 +19,13 @@ export function countsTable(caption, rows) {
 }
 
 /** @param {CountsRow} row */
-function rowOf({ experiment, arm, oracle, runs, counts, endings }) {
-  /** @param {number} trials */
-  const share = (trials) => h('td', { class: 'number' }, trials,
-    h('span', { class: 'dim' }, ' ' + percent(trials / runs)));
+function rowOf({ experiment, arm, oracle, trials, counts, endings }) {
+  /** @param {number} found of the trials */
+  const share = (found) => h('td', { class: 'number' }, found,
+    h('span', { class: 'dim' }, ' ' + percent(found / trials)));
   return h('tr', {}, h('th', { scope: 'row' }, experiment),
     h('td', {}, arm || (oracle ? 'with oracle' : 'without oracle')),
-    h('td', { class: 'number' }, runs),
+    h('td', { class: 'number' }, trials),
     share(counts.failures.trials), share(counts.recoveries.trials), share(counts.questions.trials),
     share(counts.answered.trials), share(endings.failure));
 }

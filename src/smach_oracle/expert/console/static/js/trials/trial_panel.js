@@ -202,7 +202,7 @@ class TrialPanel {
     if (!this.bag || !opened) {
       return { graph: (path) => store.get(`graph ${robot} ${path}`), images: {} };
     }
-    return { graph: (path) => opened.graphs[path], images: opened.stills };
+    return { graph: (path) => opened.graphs[path], images: opened.images };
   }
 
   tick() { if (this.trial && !this.bag && isRunning(this.trial)) this.showFacts(this.trial); }

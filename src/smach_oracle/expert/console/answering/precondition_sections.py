@@ -10,7 +10,7 @@ from ...followed_server import ListedQuestion
 from ...robot_topics import RobotTopics
 from ..web.sections import PageSections
 
-SECTION = 'conditions'
+SECTION = 'preconditions'
 MOST_QUESTIONS = 64
 LONGEST_TEXT = 400
 StatusByState = Dict[str, List[Dict[str, Any]]]
@@ -40,7 +40,7 @@ class PreconditionStatuses:
     def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
         """The callback for a robot's messages."""
         def take(message: PreconditionChecks) -> None:
-            view = checks_view(message, time.time())
+            view = status_view(message, time.time())
             with self._lock:
                 self._newest[(robot, message.query_id)] = view
                 self._newest.move_to_end((robot, message.query_id))
@@ -49,7 +49,7 @@ class PreconditionStatuses:
         return take
 
 
-def checks_view(message: PreconditionChecks, now: float) -> StatusByState:
+def status_view(message: PreconditionChecks, now: float) -> StatusByState:
     """The status of each precondition, by state.
 
     Its name, whether it holds (None: unknown), why, and when that was checked, in s since the
@@ -57,9 +57,9 @@ def checks_view(message: PreconditionChecks, now: float) -> StatusByState:
     """
     found: StatusByState = {}
     for check in message.checks:
-        looked = round(now - check.age, 1) if check.age >= 0 else None
+        checked = round(now - check.age, 1) if check.age >= 0 else None
         found.setdefault(check.state, []).append({
             'name': check.name, 'holds': _HOLDS.get(check.result),
-            'text': check.text[:LONGEST_TEXT], 'looked': looked
+            'text': check.text[:LONGEST_TEXT], 'checked': checked
         })
     return found
