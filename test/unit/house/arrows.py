@@ -6,23 +6,28 @@ from house import ROOT, imports, python_files, shown
 
 PACKAGE = ROOT / 'src/smach_oracle'
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
-# room: the other rooms that it may import
+# room: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
-    'ros': {'oracle'},
+    'ros': {'oracle.asking', 'oracle.container', 'oracle.decision', 'oracle.errors',
+            'oracle.records', 'oracle.settings', 'oracle.OracleContainer', 'oracle.oracle_of'},
     'geometry': set(),
-    'analysis': {'oracle'},
-    'interfaces': {'oracle', 'ros', 'geometry'},
-    'expert': {'oracle', 'ros', 'geometry', 'analysis', 'interfaces'},
-    'pr2': {'oracle', 'ros', 'geometry'},
-    'simulation': {'oracle', 'ros', 'geometry', 'pr2'},
-    'scripted_operator': {'oracle', 'ros', 'geometry', 'expert'},
-    'experiment': {'oracle', 'analysis'},
+    'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings'},
+    'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
+    'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
+               'geometry', 'analysis', 'interfaces'},
+    'pr2': {'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
+    'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
+    'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert'},
+    'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
+                   'analysis'},
     'tasks': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
 # modules of the top: how commands start, and the packages that they need
 TOP = {'commands', 'packages'}
+# what the executive keeps to itself
+INSIDE = {'oracle.execution', 'oracle.recovery', 'oracle.machine'}
 Layer = Union[str, Set[str]]
 # the packages and modules of a room that has packages, from the top down. Each may import those
 # below it alone: names in one set do not know each other.
@@ -54,9 +59,16 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
 }
+# what runs where no ROS is installed
+ROS_FREE = [
+    'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
+    'pr2/skills', 'simulation/physics', 'simulation/scenes'
+]
+WITH_SMACH = {'oracle', 'ros', 'tasks'}
 OF_ROS = re.compile(
     r'ros(?!bags)\w*|smach(?:_ros|_msgs)?|actionlib|genpy|tf|tf2_\w+|message_filters|'
     r'\w+_(?:msgs|srvs)')
+ENGINE = re.compile('smach(?:_ros|_msgs)?')
 
 
 def below(place: str, names: Iterable[str]) -> bool:
@@ -82,6 +94,17 @@ def ours(folder: str) -> Iterator[Tuple[str, str]]:
 def told(wrong: Iterable[Tuple[str, str]]) -> List[str]:
     """The wrong imports as messages show them."""
     return ['{} imports {}'.format(where, name or 'smach_oracle') for where, name in wrong]
+
+
+def needs_ros(name: str) -> bool:
+    """Whether a dotted name is a module of ROS, or a message of ours."""
+    return bool(OF_ROS.fullmatch(name.split('.')[0])) or below(
+        name, ['smach_oracle.' + each for each in MESSAGES])
+
+
+def needs_engine(name: str) -> bool:
+    """Whether a dotted name is a module of SMACH."""
+    return bool(ENGINE.fullmatch(name.split('.')[0]))
 
 
 def members(layers: Iterable[Layer]) -> FrozenSet[str]:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from arrows import INSIDE, ROOMS, below, found, needs_engine, needs_ros, told
 from house import ROOT
 
 SOURCES = ROOT / 'src/smach_oracle'
@@ -14,6 +15,20 @@ STEP = re.compile(r'^\| `([\w/.]+\.(?:py|js))` \| `(\w+)` \| (\w+) \|$', re.MULT
 # how one function hands over to the next without naming it
 BORDERS = {'observer', 'queue', 'callback', 'socket', 'thread', 'service', 'action', 'topic',
            'returns', 'end'}
+
+ROWS = dict(re.findall(r'^\| `(\w+)` \| [^|]+ \| ([^|]+) \|$', PAGE, re.MULTILINE))
+# what the page means by a thing that a room must not know: does an import know it?
+MEANINGS = {
+    'ROS': lambda name: needs_ros(name) and not below(name, ['smach']),
+    'SMACH': needs_engine,
+    'numpy': lambda name: below(name, ['numpy']),
+    'front ends': lambda name: below(name, ['smach_oracle.expert']),
+    'the robot': lambda name: below(name, ['smach_oracle.pr2']),
+    'the simulation': lambda name: below(name, ['smach_oracle.simulation']),
+    'the executive\'s inside': lambda name: below(name, ['smach_oracle.' + each
+                                                         for each in INSIDE]),
+    'other rooms': lambda name: below(name, ['smach_oracle.' + each for each in ROOMS]),
+}
 
 
 def ways():
@@ -69,5 +84,18 @@ def test_the_picture_is_drawn_from_the_imports():
 
 
 def test_every_room_is_on_the_page():
-    rooms = {path.parent.name for path in SOURCES.glob('*/__init__.py')}
-    assert rooms <= set(re.findall(r'^\| `(\w+)` \|', PAGE, re.MULTILINE))
+    assert sorted(ROWS) == ROOMS
+
+
+@pytest.mark.parametrize('room', ROOMS)
+def test_a_room_does_not_know_what_the_page_says(room):
+    own = ['smach_oracle.' + room]
+    for what in ROWS[room].split(', '):
+        knows = MEANINGS[what]
+        assert not told((where, name) for where, name in found(room)
+                        if knows(name) and not below(name, own)), what
+
+
+def test_the_page_says_what_the_inside_is():
+    said, = re.findall(r'^The executive\'s inside is (.*)\. ', PAGE, re.MULTILINE)
+    assert {'oracle.' + name for name in re.findall('`(.*?)`', said)} == INSIDE

@@ -12,14 +12,20 @@ from typing import Dict, List, Set
 import pytest
 from arrows import (
     ARROWS,
+    INSIDE,
     LAYERS,
     MESSAGES,
     OF_ROS,
     PACKAGE,
     ROOMS,
+    ROS_FREE,
     TOP,
+    WITH_SMACH,
     below,
+    found,
     members,
+    needs_engine,
+    needs_ros,
     ours,
     told,
 )
@@ -43,13 +49,32 @@ def imported_by(room: str) -> Set[str]:
 
 
 @pytest.mark.parametrize('room', ROOMS)
-def test_a_room_imports_only_the_rooms_that_it_may(room):
+def test_a_room_imports_only_what_it_may(room):
     may = ARROWS[room] | MESSAGES | TOP | {room}
     assert not told((where, name) for where, name in ours(room) if not below(name, may))
 
 
 def test_every_room_has_its_arrows():
     assert set(ROOMS) == set(ARROWS)
+
+
+@pytest.mark.parametrize('room', [room for room in ROOMS if room != 'oracle'])
+def test_the_executive_keeps_its_inside_to_itself(room):
+    assert not told((where, name) for where, name in ours(room) if below(name, INSIDE))
+
+
+@pytest.mark.parametrize('folder', ROS_FREE)
+def test_what_is_free_of_ros_imports_none(folder):
+    # SMACH itself needs no ROS
+    assert not told((where, name) for where, name in found(folder)
+                    if needs_ros(name) and not (folder == 'oracle' and below(name, ['smach'])))
+
+
+@pytest.mark.parametrize('room', [room for room in ROOMS if room not in WITH_SMACH])
+def test_smach_is_known_where_machines_are_run_alone(room):
+    # the console shows the machines that smach_msgs speak of
+    assert not told((where, name) for where, name in found(room) if needs_engine(name)
+                    and not (room == 'expert' and below(name, ['smach_msgs'])))
 
 
 @pytest.mark.parametrize('room', sorted(LAYERS))
