@@ -6,26 +6,29 @@ from house import ROOT, imports, python_files, shown
 
 PACKAGE = ROOT / 'src/smach_oracle'
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
-# room: the other rooms, packages and modules that it may import
+# room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
     'ros': {'oracle.asking', 'oracle.container', 'oracle.decision', 'oracle.errors',
             'oracle.records', 'oracle.settings', 'oracle.OracleContainer', 'oracle.oracle_of'},
     'geometry': set(),
-    'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings'},
+    'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
+                 'packages'},
     'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
     'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
-               'geometry', 'analysis', 'interfaces'},
+               'geometry', 'analysis', 'interfaces', 'packages'},
     'pr2': {'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert'},
     'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
-                   'analysis'},
+                   'analysis', 'packages'},
     'tasks': set(),
+    '__init__': {'oracle.OracleContainer', 'ros.container'},
+    'commands': {'packages'},  # it starts modules of the rooms by their names
+    'packages': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
-# modules of the top: how commands start, and the packages that they need
-TOP = {'commands', 'packages'}
+TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))
 # what the executive keeps to itself
 INSIDE = {'oracle.execution', 'oracle.recovery', 'oracle.machine'}
 Layer = Union[str, Set[str]]
@@ -62,7 +65,7 @@ LAYERS: Dict[str, List[Layer]] = {
 # what runs where no ROS is installed
 ROS_FREE = [
     'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
-    'pr2/skills', 'simulation/physics', 'simulation/scenes'
+    'pr2/skills', 'simulation/physics', 'simulation/scenes', 'commands', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks'}
 OF_ROS = re.compile(
