@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from arrows import INSIDE, ROOMS, below, found, needs_engine, needs_ros, told
+from arrows import INSIDE, LAYERS, ROOMS, below, found, needs_engine, needs_ros, told
 from house import ROOT, imports
 
 SOURCES = ROOT / 'src/smach_oracle'
@@ -205,3 +205,8 @@ def test_a_room_does_not_know_what_the_page_says(room):
 def test_the_page_says_what_the_inside_is():
     said, = re.findall(r'^The executive\'s inside is (.*)\. ', PAGE, re.MULTILINE)
     assert {'oracle.' + name for name in re.findall('`(.*?)`', said)} == INSIDE
+
+
+def test_the_executive_has_the_layers_of_the_page():
+    table = PAGE[PAGE.index('Inside `oracle`'):].split('\n\n')[1]
+    assert re.findall(r'^\| `(\w+)(?:\.py)?` \|', table, re.MULTILINE) == LAYERS['oracle']
