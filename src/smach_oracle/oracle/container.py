@@ -14,12 +14,13 @@ from .execution.trial import run_container
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.nesting import nodes_of
-from .machine.oracle import StateRateRow, TransitionRow, oracle_of
+from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode
 from .machine.userdata_view import StateView
 from .records.events import EventKind
+from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
 

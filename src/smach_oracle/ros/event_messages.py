@@ -1,6 +1,6 @@
 """Translates the executive's events and rates to OracleEvent and OracleRates messages."""
 import json
-from typing import TYPE_CHECKING, Iterable, Optional
+from typing import Iterable, Optional
 
 import genpy
 import rospy
@@ -8,11 +8,9 @@ from std_msgs.msg import Header
 
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
 from smach_oracle.oracle.records.events import Event
+from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
 from .sendable_text import sendable_text
-
-if TYPE_CHECKING:  # the oracle imports smach, which a reader of events can do without
-    from smach_oracle.oracle.machine.oracle import StateRateRow, TransitionRow
 
 
 def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
@@ -29,8 +27,8 @@ def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
                        bool(event.continuous), *map(sendable_text, words), _json(event.data))
 
 
-def rates_to_msg(trial_id: str, rates: Iterable['StateRateRow'],
-                 transitions: Iterable['TransitionRow']) -> OracleRates:
+def rates_to_msg(trial_id: str, rates: Iterable[StateRateRow],
+                 transitions: Iterable[TransitionRow]) -> OracleRates:
     """Translate what has been learned of one wrapped machine.
 
     :param rates: rows of `OracleContainer.rates()`.

@@ -13,8 +13,8 @@ import rospy
 
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.machine.oracle import StateRateRow, TransitionRow
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource
+from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
 from .event_messages import rates_to_msg, to_msg
 

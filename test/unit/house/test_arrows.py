@@ -10,49 +10,31 @@ from pathlib import Path
 from typing import Dict, List, Set
 
 import pytest
+from arrows import (
+    ARROWS,
+    INSIDE,
+    LAYERS,
+    MESSAGES,
+    OF_ROS,
+    PACKAGE,
+    ROOMS,
+    ROS_FREE,
+    TOP,
+    WITH_SMACH,
+    below,
+    found,
+    members,
+    needs_engine,
+    needs_ros,
+    ours,
+    told,
+)
 from house import ROOT, imports, parse, python_files, shown
 
-INTERFACES = {'msg', 'srv'}
-# modules of the top: how commands start, and the packages that they need
-TOP = {'commands', 'packages'}
-# room: the other rooms that it may import
-ARROWS = {
-    'oracle': set(),
-    'ros': {'oracle'},
-    'geometry': set(),
-    'analysis': {'oracle'},
-    'interfaces': {'oracle', 'ros', 'geometry'},
-    'expert': {'oracle', 'ros', 'geometry', 'analysis', 'interfaces'},
-    'pr2': {'oracle', 'ros', 'geometry'},
-    'simulation': {'oracle', 'ros', 'geometry', 'pr2'},
-    'scripted_operator': {'oracle', 'ros', 'geometry', 'expert'},
-    'experiment': {'oracle', 'analysis'},
-    'tasks': set(),
-}
-ROOMS = sorted(ARROWS)
-# the packages of a room that has several, from the top down: each may import those below it alone
-LAYERS = {
-    'oracle': ['execution', 'recovery', 'machine', 'asking', 'records', 'settings', 'decision'],
-    'ros': ['oracle_run', 'expert', 'interfaces', 'recording', 'introspection'],
-    'expert': ['console', 'terminal'],
-    'expert/console': [
-        'answering', 'robots', 'trials', 'sensors', 'graphs', 'feeds', 'commands', 'web'
-    ],
-    'interfaces': ['perception', 'manipulation'],
-    'pr2': ['nodes', 'skills', 'planning', 'perception', 'model'],
-    'simulation': ['rehearsal', 'node', 'physics', 'scenes'],
-}
-MAX_MODULES = 20  # in a package, its __init__ not counted
-ROS = {
-    'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros',
-    'smach_msgs'
-}
-ROS_PACKAGES = ROS - {'rospkg'} | {
-    'smach', 'actionlib_msgs', 'control_msgs', 'geometry_msgs', 'move_base_msgs', 'rosgraph_msgs',
-    'roslaunch', 'rosservice', 'rostest', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
-    'tf2_ros', 'trajectory_msgs', 'visualization_msgs'
-}
 INTROSPECTION = 'smach_oracle.ros.introspection'
+MAX_MODULES = 20  # in a package, its __init__ not counted
+ROS = {'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros',
+       'smach_msgs'}
 STAND_INS = {'smach', 'smach_ros', 'smach_msgs', 'control_msgs'}
 PINNED = {
     'cv2': 'opencv-python-headless', 'ompl': 'ompl', 'pybullet': 'pybullet', 'rosbags': 'rosbags'
@@ -67,34 +49,55 @@ def imported_by(room: str) -> Set[str]:
     return {name for path in python_files('src/smach_oracle/' + room) for _, name in imports(path)}
 
 
-@pytest.mark.parametrize('room', ROOMS)
-def test_a_room_imports_only_the_rooms_that_it_may(room):
-    wrong = []
-    for path in python_files('src/smach_oracle/' + room):
-        for line, name in imports(path):
-            parts = name.split('.')
-            if parts[0] == 'smach_oracle' and parts[1] not in ARROWS[room] | INTERFACES | TOP | {
-                    room
-            }:
-                wrong.append('{}:{} imports {}'.format(shown(path), line, name))
-    assert not wrong
+@pytest.mark.parametrize('place', ROOMS + TOP)
+def test_a_room_imports_only_what_it_may(place):
+    own = {place} | (MESSAGES if place in ROOMS else set())
+    wrong = [(where, name) for where, name in ours(place) if not below(name, ARROWS[place] | own)]
+    assert not told(wrong)
+
+
+def test_every_room_and_module_of_the_top_has_its_arrows():
+    assert set(ROOMS) | set(TOP) == set(ARROWS)
+
+
+@pytest.mark.parametrize('room', [room for room in ROOMS if room != 'oracle'])
+def test_the_executive_keeps_its_inside_to_itself(room):
+    assert not told((where, name) for where, name in ours(room) if below(name, INSIDE))
+
+
+@pytest.mark.parametrize('folder', ROS_FREE)
+def test_what_is_free_of_ros_imports_none(folder):
+    # SMACH itself needs no ROS
+    assert not told((where, name) for where, name in found(folder)
+                    if needs_ros(name) and not (folder == 'oracle' and below(name, ['smach'])))
+
+
+@pytest.mark.parametrize('room', [room for room in ROOMS if room not in WITH_SMACH])
+def test_smach_is_known_where_machines_are_run_alone(room):
+    # the console shows the machines that smach_msgs speak of
+    assert not told((where, name) for where, name in found(room) if needs_engine(name)
+                    and not (room == 'expert' and below(name, ['smach_msgs'])))
 
 
 @pytest.mark.parametrize('room', sorted(LAYERS))
-def test_the_packages_of_a_room_import_downwards_alone(room):
-    layers = LAYERS[room]
-    base = 'smach_oracle.{}.'.format(room.replace('/', '.'))
-    assert {path.parent.name
-            for path in (ROOT / 'src/smach_oracle' / room).glob('*/__init__.py')} == set(layers)
+def test_the_packages_and_modules_of_a_room_are_all_in_its_layers(room):
+    folder = PACKAGE / room
+    there = {path.parent.name for path in folder.glob('*/__init__.py')}
+    there |= {path.stem for path in folder.glob('*.py')} - {'__init__'}
+    assert there == members(LAYERS[room])
+
+
+@pytest.mark.parametrize('room', sorted(LAYERS))
+def test_the_packages_and_modules_of_a_room_import_downwards_alone(room):
+    base = room.replace('/', '.')
     wrong = []
-    for height, layer in enumerate(layers):
-        above = tuple(base + other + '.' for other in layers[:height])
-        for path in python_files('src/smach_oracle/{}/{}'.format(room, layer)):
-            wrong += [
-                '{}:{} imports {}'.format(shown(path), line, name) for line, name in imports(path)
-                if name.startswith(above)
-            ]
-    assert not wrong
+    for height, layer in enumerate(LAYERS[room]):
+        lower = members(LAYERS[room][height + 1:])
+        for unit in members([layer]):
+            may = {'{}.{}'.format(base, each) for each in lower | {unit}}
+            wrong += [(where, name) for where, name in ours('{}/{}'.format(room, unit))
+                      if below(name, [base]) and not below(name, may)]
+    assert not told(wrong)
 
 
 def test_no_package_has_too_many_modules():
@@ -111,11 +114,6 @@ def test_neither_executive_nor_task_nor_subsystem_asks_for_the_truth_or_its_caus
             r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',
             path.read_text(encoding='utf-8'))
         assert not found, '{} speaks of {}'.format(shown(path), found)
-
-
-def test_every_room_is_known_here():
-    folders = {path.parent.name for path in (ROOT / 'src/smach_oracle').glob('*/__init__.py')}
-    assert folders == set(ROOMS)
 
 
 def modules_of(room: str) -> Dict[str, Path]:
@@ -223,7 +221,8 @@ def test_the_analysis_names_neither_ros_nor_smach():
 
 def test_the_use_cases_are_scripts_as_any_smach_user_writes_them():
     of_ours = {name for name in imported_by('tasks') if name.startswith('smach_oracle')}
-    assert all(name.split('.')[1] in INTERFACES for name in of_ours), of_ours
+    messages = ['smach_oracle.' + each for each in MESSAGES]
+    assert all(below(name, messages) for name in of_ours), of_ours
 
 
 def test_the_analysis_runs_where_neither_ros_nor_smach_is_installed():
@@ -247,8 +246,8 @@ def test_every_ros_package_that_is_imported_is_a_declared_dependency():
         for _, name in imports(path)
     }
     # rospkg comes with roslib, and is no ROS package itself
-    declared = {name for name in used & ROS_PACKAGES if 'depend>{}<'.format(name) in manifest}
-    assert used & ROS_PACKAGES == declared
+    packages = {name for name in used if OF_ROS.fullmatch(name)} - {'rospkg'}
+    assert packages == {name for name in packages if 'depend>{}<'.format(name) in manifest}
 
 
 @without_stdlib_names

@@ -1,37 +1,15 @@
 """The oracle of one container as adapters see it: who publishes, records or prints what it does."""
-from typing import Callable, List, NamedTuple, Optional
+from typing import Callable, List, Optional
 
 import smach
 
 from ..asking.question import Expert
 from ..errors import TrialError
 from ..records.events import EventSource
+from ..records.rate_rows import StateRateRow, TransitionRow
 from ..settings.settings import Settings
 from .nesting import nodes_of
 from .tree_node import TreeNode, WrappedMachine
-
-
-class StateRateRow(NamedTuple):
-    """What was learned of one state; the fields are those of StateRate.msg."""
-
-    path: str
-    state: str
-    rate: float
-    failure_class: int
-    successes: int
-    failures: int
-    recoveries: int
-    has_preconditions: bool
-
-
-class TransitionRow(NamedTuple):
-    """How often one edge was taken; the fields are those of TransitionCount.msg."""
-
-    path: str
-    state: str
-    outcome: str
-    to: str
-    count: int  # type: ignore[assignment]  # as the message says, not what a tuple does
 
 
 def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:

@@ -1,5 +1,6 @@
 // What the page sends: commands with their arguments, and what the replies hold. The server's
-// commands.py checks every bit of it; test/unit/console/test_console_types.py compares the two.
+// commands.py checks every bit of it; test/unit/expert/console/test_console_types.py compares the
+// two.
 // Lengths are metres unless something else is written beside them.
 import { Vector } from './drawing/types';
 import { DriveFrame } from './server';

@@ -1,5 +1,6 @@
 // What the server sends: every shape of JSON, as the server makes it. What the page sends is in
-// commands.d.ts. test/unit/console/test_console_types.py compares both with what the server does.
+// commands.d.ts. test/unit/expert/console/test_console_types.py compares both with what
+// the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 import { Colour, Vector } from './drawing/types';
 

@@ -1,0 +1,25 @@
+"""What was learned, as rows for those who publish it."""
+from typing import NamedTuple
+
+
+class StateRateRow(NamedTuple):
+    """What was learned of one state; the fields are those of StateRate.msg."""
+
+    path: str
+    state: str
+    rate: float
+    failure_class: int
+    successes: int
+    failures: int
+    recoveries: int
+    has_preconditions: bool
+
+
+class TransitionRow(NamedTuple):
+    """How often one edge was taken; the fields are those of TransitionCount.msg."""
+
+    path: str
+    state: str
+    outcome: str
+    to: str
+    count: int  # type: ignore[assignment]  # as the message says, not what a tuple does

@@ -1,0 +1,116 @@
+"""Who may import whom in src/smach_oracle: the tables, and how an import is read against them."""
+import re
+from typing import Dict, FrozenSet, Iterable, Iterator, List, Set, Tuple, Union
+
+from house import ROOT, imports, python_files, shown
+
+PACKAGE = ROOT / 'src/smach_oracle'
+MESSAGES = {'msg', 'srv'}  # built from ours by catkin
+# room, or module of the top: the other rooms, packages and modules that it may import
+ARROWS: Dict[str, Set[str]] = {
+    'oracle': set(),
+    'ros': {'oracle.asking', 'oracle.container', 'oracle.decision', 'oracle.errors',
+            'oracle.records', 'oracle.settings', 'oracle.OracleContainer', 'oracle.oracle_of'},
+    'geometry': set(),
+    'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
+                 'packages'},
+    'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
+    'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
+               'geometry', 'analysis', 'interfaces', 'packages'},
+    'pr2': {'oracle.errors', 'oracle.number_checks', 'oracle.settings', 'ros', 'geometry'},
+    'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
+    'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert'},
+    'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
+                   'analysis', 'packages'},
+    'tasks': set(),
+    '__init__': {'oracle.OracleContainer', 'ros.container'},
+    'commands': {'packages'},  # it starts modules of the rooms by their names
+    'packages': set(),
+}
+ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
+TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))
+# what the executive keeps to itself
+INSIDE = {'oracle.execution', 'oracle.recovery', 'oracle.machine'}
+Layer = Union[str, Set[str]]
+# the packages and modules of a room that has packages, from the top down. Each may import those
+# below it alone: names in one set do not know each other.
+LAYERS: Dict[str, List[Layer]] = {
+    'oracle': [
+        'container', 'question', 'execution', 'recovery', 'machine', 'asking', 'records',
+        'settings', 'decision', 'number_checks', 'errors'
+    ],
+    'ros': [
+        'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers'},
+        {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
+        {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
+         'parameters', 'command_line', 'service_calls', 'introspection'},
+        'sendable_text'
+    ],
+    'expert': [
+        {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',
+        {'followed_server', 'interface_outputs', 'rules', 'wording', 'interface_goal'},
+        'robot_topics'
+    ],
+    'expert/console': [
+        'server', 'page_socket', {'answering', 'robots'}, 'trials', 'sensors',
+        {'graphs', 'feeds', 'commands', 'web'}
+    ],
+    'interfaces': [{'perception', 'manipulation'}, 'interface_goal'],
+    'pr2': [
+        'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
+        {'model', 'robot', 'kitchen'}
+    ],
+    'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
+}
+# what runs where no ROS is installed
+ROS_FREE = [
+    'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
+    'pr2/skills', 'simulation/physics', 'simulation/scenes', 'commands', 'packages'
+]
+WITH_SMACH = {'oracle', 'ros', 'tasks'}
+OF_ROS = re.compile(
+    r'ros(?!bags)\w*|smach(?:_ros|_msgs)?|actionlib|genpy|tf|tf2_\w+|message_filters|'
+    r'\w+_(?:msgs|srvs)')
+ENGINE = re.compile('smach(?:_ros|_msgs)?')
+
+
+def below(place: str, names: Iterable[str]) -> bool:
+    """Whether a dotted name is one of the names, or within one of them."""
+    return (place + '.').startswith(tuple(name + '.' for name in names))
+
+
+def found(folder: str) -> Iterator[Tuple[str, str]]:
+    """What a module or the files of a folder import, as (FILE:LINE, dotted name)."""
+    module = PACKAGE / (folder + '.py')
+    for each in [module] if module.is_file() else python_files('src/smach_oracle/' + folder):
+        for line, name in imports(each):
+            yield '{}:{}'.format(shown(each), line), name
+
+
+def ours(folder: str) -> Iterator[Tuple[str, str]]:
+    """What they import of smach_oracle, as (FILE:LINE, name within it); '' is the top itself."""
+    for where, name in found(folder):
+        if below(name, ['smach_oracle']):
+            yield where, name[len('smach_oracle.'):]
+
+
+def told(wrong: Iterable[Tuple[str, str]]) -> List[str]:
+    """The wrong imports as messages show them."""
+    return ['{} imports {}'.format(where, name or 'smach_oracle') for where, name in wrong]
+
+
+def needs_ros(name: str) -> bool:
+    """Whether a dotted name is a module of ROS, or a message of ours."""
+    return bool(OF_ROS.fullmatch(name.split('.')[0])) or below(
+        name, ['smach_oracle.' + each for each in MESSAGES])
+
+
+def needs_engine(name: str) -> bool:
+    """Whether a dotted name is a module of SMACH."""
+    return bool(ENGINE.fullmatch(name.split('.')[0]))
+
+
+def members(layers: Iterable[Layer]) -> FrozenSet[str]:
+    """All names of some layers."""
+    return frozenset(name for layer in layers
+                     for name in ({layer} if isinstance(layer, str) else layer))
