@@ -9,10 +9,12 @@ import os
 import threading
 import time
 import weakref
+from contextlib import contextmanager
 from typing import (
     Any,
     Callable,
     Dict,
+    Iterator,
     List,
     MutableSet,
     NamedTuple,
@@ -37,7 +39,9 @@ from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
 
-PREEMPT_WAIT_S = 1.0  # for machines to end, before their bags are closed under them
+# for trials to tell their end, before their bags are closed under them; roslaunch gives a node 15 s
+TRIAL_END_WAIT_S = 10.0
+CLOSE_S = 1.0
 
 
 class RecordingOptions(NamedTuple):
@@ -60,6 +64,7 @@ class Attachments:
         self.options = RecordingOptions()
         self._lock = threading.RLock()
         self._machines: MutableSet[OracleContainer] = weakref.WeakSet()  # all that ever ran
+        self._trials: List[OracleContainer] = []  # within execute, their last events included
         # those of them that are attached to the node
         self._on_ros: MutableSet[OracleContainer] = weakref.WeakSet()
         # our servers, by path; each holds its machine
@@ -70,6 +75,19 @@ class Attachments:
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
         self._node_started = False
+
+    def has(self, machine: OracleContainer) -> bool:
+        """Whether a machine is attached to the node."""
+        return machine in self._on_ros
+
+    @contextmanager
+    def trial(self, machine: OracleContainer) -> Iterator[None]:
+        """Within it the bags stay open, until the trial has told its end."""
+        self._trials.append(machine)
+        try:
+            yield
+        finally:
+            self._trials.remove(machine)
 
     def attach(self, machine: OracleContainer) -> None:
         """Attach a top-level machine; does nothing the second time.
@@ -187,10 +205,11 @@ class Attachments:
         threading.Thread(target=self._close_when_ended, name='shutdown_close', daemon=True).start()
 
     def _close_when_ended(self) -> None:
-        until = time.monotonic() + PREEMPT_WAIT_S
-        while self._running() and time.monotonic() < until:
+        """Close the bags once the trials have told their end, or do not end at all."""
+        until = time.monotonic() + TRIAL_END_WAIT_S
+        while self._trials and time.monotonic() < until:
             time.sleep(0.02)
-        self.close(PREEMPT_WAIT_S)
+        self.close(CLOSE_S)
 
 
 def has_introspection(machine: OracleContainer) -> bool:

@@ -6,6 +6,7 @@ expert (action server `~expert_query`, or the one that `~expert_query_server` na
 `~oracle/events` and `~oracle/rates`, an introspection server (`~introspection`, default true) and a
 recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves as the bare one.
 """
+import functools
 import weakref
 from typing import Any, List, Mapping, MutableMapping, NamedTuple, Optional, Sequence
 
@@ -22,6 +23,7 @@ from smach_oracle.oracle.settings.settings import Settings
 from .attachment import attachments
 from .expert.failure_text import describe_failure
 from .loaded_settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_python
+from .main_thread import outside_main_thread
 
 PreconditionLists = Optional[Mapping[str, List[Any]]]
 
@@ -82,11 +84,13 @@ class OracleContainer(BareContainer):
         :raises OSError: where the folder for the bags cannot be made or written.
         """
         oracle = oracle_of(self)
-        if oracle.is_top and not self.is_running():
-            oracle.describe_failure = describe_failure
-            _take_parameters(self)
-            attachments().attach(self)
-        return super().execute(*args, **kwargs)
+        if not oracle.is_top or self.is_running():
+            return super().execute(*args, **kwargs)
+        oracle.describe_failure = describe_failure
+        if not attachments().has(self):
+            outside_main_thread(functools.partial(_attach, self))
+        with attachments().trial(self):
+            return super().execute(*args, **kwargs)
 
 
 def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> Settings:
@@ -115,6 +119,11 @@ def _remember(machine: BareContainer, settings: SettingsLike, preconditions: Pre
         _given.pop(machine, None)
     else:
         _given[machine] = _GivenSettings(settings, preconditions, nested)
+
+
+def _attach(machine: OracleContainer) -> None:
+    _take_parameters(machine)
+    attachments().attach(machine)
 
 
 def _take_parameters(machine: BareContainer) -> None:

@@ -1,0 +1,59 @@
+"""Calls to the ROS master, kept out of the main thread.
+
+rospy's proxy of the master has one lock, which is not re-entrant, and rospy's own handler of a
+signal takes it: a signal that meets the main thread within a call to the master hangs the process
+for good. In another thread the call ends while the handler waits for the lock.
+"""
+import threading
+from typing import Callable, Generic, List, TypeVar
+
+import rospy
+
+_LOOK_S = 0.1
+SHUTDOWN_WAIT_S = 2.0  # for a call that had begun before the shutdown was requested
+
+Result = TypeVar('Result')
+
+
+def outside_main_thread(function: Callable[[], Result]) -> Result:
+    """Return what a function returns, or raise what it raises; wait for it.
+
+    It runs in a thread of its own where the caller is the main thread, and else in the caller's.
+
+    :raises rospy.ROSInterruptException: where the node shuts down, and the function has not
+        returned 2 s later.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return function()
+    call = _Call(function)
+    thread = threading.Thread(target=call.run, name='calls the master', daemon=True)
+    thread.start()
+    looks_left = SHUTDOWN_WAIT_S / _LOOK_S
+    while not call.done.wait(_LOOK_S):
+        looks_left -= rospy.core.is_shutdown_requested()
+        if looks_left <= 0:
+            raise rospy.ROSInterruptException('the node shuts down; the master has not answered')
+    return call.result()
+
+
+class _Call(Generic[Result]):
+    """One call: what it returned, or raised."""
+
+    def __init__(self, function: Callable[[], Result]) -> None:
+        self.done = threading.Event()
+        self._function = function
+        self._returned: List[Result] = []
+        self._raised: List[BaseException] = []
+
+    def run(self) -> None:
+        try:
+            self._returned.append(self._function())
+        except BaseException as err:  # it belongs to the caller
+            self._raised.append(err)
+        finally:
+            self.done.set()
+
+    def result(self) -> Result:
+        if self._raised:
+            raise self._raised[0]
+        return self._returned[0]
