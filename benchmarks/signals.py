@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""How often a program hangs that meets a signal around its first execute: bare, wrapped as a
+library, and under oracle_run, in one run.
+
+    benchmarks/signals.py [--signals N] [--seed S] [--check]
+
+Each process gets one SIGINT or SIGTERM, at an instant drawn from the seed within a second of its
+first execute, on a master of its own. A process that has not ended 20 s later counts as hung. A bag
+counts as whole where rosbag reads it to its end. --check fails where a bag is not whole, where
+oracle_run hangs, or where the library hangs more often than the bare script: rospy's own clean-up
+can hang a node.
+"""
+import argparse
+import collections
+import os
+import signal
+import subprocess
+import sys
+import time
+import xmlrpc.client
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'rostest'))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--signals', type=int, default=40,
+                        help='to processes of each kind (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=1, help='of the instants (default: %(default)s)')
+    parser.add_argument('--check', action='store_true', help='fail where it is as told above')
+    options = parser.parse_args()
+    from signalled_programs import KINDS, signal_many
+
+    from smach_oracle.experiment.launching import free_port
+    port = free_port()
+    os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
+    master = subprocess.Popen(['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL)
+    try:
+        wait_for_master(os.environ['ROS_MASTER_URI'])
+        endings = signal_many(options.signals, options.seed)
+    finally:
+        master.send_signal(signal.SIGINT)
+        master.wait(10)
+    hung = collections.Counter(ending.kind for ending in endings if ending.code is None)
+    broken = [text for ending in endings for text in ending.broken_bags]
+    for kind in KINDS:
+        print('{:10s} {:3d} of {} hung'.format(kind, hung[kind], options.signals))
+    print('bags that are not whole: {}'.format(len(broken)))
+    for text in broken:
+        print('  ' + text)
+    good = not broken and not hung['oracle_run'] and hung['library'] <= hung['bare']
+    return int(options.check and not good)
+
+
+def wait_for_master(uri):
+    for _ in range(300):
+        try:
+            xmlrpc.client.ServerProxy(uri).getPid('/signals')
+            return
+        except OSError:
+            time.sleep(0.1)
+    raise RuntimeError('no master came up at ' + uri)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
