@@ -1,8 +1,9 @@
-# Stage smach, smach_ros, smach_msgs and control_msgs where upstream's are absent, each judged on its own. Where upstream's
-# package is there, nothing of ours gets in front of it, and what an earlier build staged is taken away again.
+# Stage smach, smach_ros, smach_msgs and control_msgs where upstream's are absent, each judged on
+# its own. Where upstream's package is there, nothing of ours gets in front of it, and what an
+# earlier build staged is taken away again.
 #
-# Include after generate_messages(), which defines GENMSG_PY_BIN (from genpy) and MSG_I_FLAGS, and catkin_package().
-# GENACTION_BIN is from actionlib_msgs.
+# Include after generate_messages(), which defines GENMSG_PY_BIN (from genpy) and MSG_I_FLAGS, and
+# catkin_package(). GENACTION_BIN is from actionlib_msgs.
 
 set(STAND_IN_MARKER .${PROJECT_NAME}_stand_in)
 set(STAND_IN_FIND ${CMAKE_CURRENT_LIST_DIR}/find_upstream.py)
@@ -12,7 +13,7 @@ set(STAND_IN_DEVEL_PYTHON ${CATKIN_DEVEL_PREFIX}/${CATKIN_GLOBAL_PYTHON_DESTINAT
 
 # stand_in_find_upstream(NAME RESULT): where upstream's NAME is, or an empty string
 function(stand_in_find_upstream name result)
-  # CATKIN_ORDERED_PACKAGES: the packages that a catkin_make workspace builds side by side with this one
+  # CATKIN_ORDERED_PACKAGES: the packages that a catkin_make workspace builds beside this one
   list(FIND CATKIN_ORDERED_PACKAGES ${name} index)
   if(NOT index EQUAL -1)
     set(${result} "this workspace" PARENT_SCOPE)
@@ -25,7 +26,8 @@ function(stand_in_find_upstream name result)
   execute_process(COMMAND ${PYTHON_EXECUTABLE} ${STAND_IN_FIND} ${name} ${folders}
     OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed)
   if(failed)
-    message(FATAL_ERROR "${PYTHON_EXECUTABLE} cannot look for the Python package '${name}': ${failed}")
+    message(FATAL_ERROR
+      "${PYTHON_EXECUTABLE} cannot look for the Python package '${name}': ${failed}")
   endif()
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()
@@ -46,7 +48,8 @@ function(stand_in_remove name)
       file(REMOVE_RECURSE ${package})
     endif()
     file(REMOVE ${package}/${STAND_IN_MARKER} ${CATKIN_DEVEL_PREFIX}/share/${name}/package.xml)
-    file(REMOVE_RECURSE ${CATKIN_DEVEL_PREFIX}/share/${name}/msg ${CATKIN_DEVEL_PREFIX}/share/${name}/action)
+    file(REMOVE_RECURSE
+      ${CATKIN_DEVEL_PREFIX}/share/${name}/msg ${CATKIN_DEVEL_PREFIX}/share/${name}/action)
   endif()
   install(CODE "
     set(prefix \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}\")
@@ -64,12 +67,14 @@ function(stand_in_add name)
     install(DIRECTORY src/${name}/ DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name}
       FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
   else()
-    # all generated: an __init__.py in src/ would hide the generated classes from whoever has src/ first in the path
+    # all generated: an __init__.py in src/ would hide the generated classes from whoever has src/
+    # first in the path
     file(WRITE ${package}/__init__.py "")
     install(FILES ${package}/__init__.py DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name})
   endif()
   file(WRITE ${package}/${STAND_IN_MARKER} "staged by ${PROJECT_NAME} ${${PROJECT_NAME}_VERSION}\n")
-  install(FILES ${package}/${STAND_IN_MARKER} DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name})
+  install(FILES ${package}/${STAND_IN_MARKER}
+    DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name})
   set(STAND_IN_NAME ${name})
   set(STAND_IN_DEPENDS)
   foreach(dependency ${ARGN})
@@ -80,8 +85,8 @@ function(stand_in_add name)
     DESTINATION ${CATKIN_GLOBAL_SHARE_DESTINATION}/${name})
 endfunction()
 
-# stand_in_collect_messages(NAME): put the messages of src/NAME/msg, and those that src/NAME/action means, into the devel
-# space, where rosmsg finds them
+# stand_in_collect_messages(NAME): put the messages of src/NAME/msg, and those that src/NAME/action
+# means, into the devel space, where rosmsg finds them
 function(stand_in_collect_messages name)
   set(source ${CMAKE_CURRENT_SOURCE_DIR}/src/${name})
   set(share ${CATKIN_DEVEL_PREFIX}/share/${name})
@@ -91,7 +96,8 @@ function(stand_in_collect_messages name)
   file(GLOB actions ${source}/action/*.action)
   foreach(action ${actions})
     file(COPY ${action} DESTINATION ${share}/action)
-    execute_process(COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE} ${GENACTION_BIN} ${action} -o ${share}/msg
+    execute_process(
+      COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE} ${GENACTION_BIN} ${action} -o ${share}/msg
       RESULT_VARIABLE failed)
     if(failed)
       message(FATAL_ERROR "${GENACTION_BIN} cannot make messages of ${action}: ${failed}")
@@ -105,7 +111,7 @@ function(stand_in_collect_messages name)
   endif()
 endfunction()
 
-# stand_in_messages(NAME): generate the Python classes of NAME's messages under the package name NAME
+# stand_in_messages(NAME): generate the Python classes of NAME's messages under the package's name
 function(stand_in_messages name)
   stand_in_collect_messages(${name})
   set(source ${CATKIN_DEVEL_PREFIX}/share/${name}/msg)
@@ -124,7 +130,8 @@ function(stand_in_messages name)
     COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE} ${GENMSG_PY_BIN} -o ${python} --initpy
     COMMENT "Generating Python msg __init__.py for ${name}")
   add_custom_target(${PROJECT_NAME}_${name} ALL DEPENDS ${classes} ${python}/__init__.py)
-  install(DIRECTORY ${python} DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name} PATTERN "__pycache__" EXCLUDE)
+  install(DIRECTORY ${python} DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/${name}
+    PATTERN "__pycache__" EXCLUDE)
 endfunction()
 
 set(STAND_INS)
@@ -148,7 +155,8 @@ foreach(name control_msgs smach smach_msgs smach_ros)
 endforeach()
 
 if(STAND_INS)
-  catkin_add_env_hooks(50.stand_ins SHELLS sh SKIP_INSTALL DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/env-hooks)
+  catkin_add_env_hooks(50.stand_ins SHELLS sh SKIP_INSTALL
+    DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/env-hooks)
 else()
   file(REMOVE ${CATKIN_DEVEL_PREFIX}/etc/catkin/profile.d/50.stand_ins.sh)
 endif()
@@ -157,6 +165,8 @@ set(SMACH_STAND_INS ${STAND_INS})
 list(REMOVE_ITEM SMACH_STAND_INS control_msgs)
 list(LENGTH SMACH_STAND_INS count)
 if(count GREATER 0 AND count LESS 3)
-  message(WARNING "Upstream's smach, smach_msgs and smach_ros are only partly there. Ours stand in for "
-    "${SMACH_STAND_INS}, beside upstream's others. Install the missing ones if you did not mean that.")
+  message(WARNING
+    "Upstream's smach, smach_msgs and smach_ros are only partly there. Ours stand in for "
+    "${SMACH_STAND_INS}, beside upstream's others. "
+    "Install the missing ones if you did not mean that.")
 endif()

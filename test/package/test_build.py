@@ -70,7 +70,8 @@ def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
     # without a master, as before the robot is switched on, is not what oracle_run is for: start one
     # on a free port
     command = '''
-        port=$(python3 -c 'from smach_oracle.experiment.launching import free_port; print(free_port())')
+        free_port='from smach_oracle.experiment.launching import free_port; print(free_port())'
+        port=$(python3 -c "$free_port")
         export ROS_MASTER_URI=http://localhost:$port ROS_HOSTNAME=localhost ROS_LOG_DIR="$PWD/log"
         roscore -p $port >/dev/null 2>&1 & core=$!; trap 'kill -INT $core; wait $core || true' EXIT
         until rosnode list >/dev/null 2>&1; do sleep 0.2; done
@@ -108,7 +109,8 @@ def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     assert output.count("upstream's is used, from this workspace") == len(NAMES)
     where = run(WHERE, tmp_path, str(tmp_path / 'devel/setup.bash'))
     assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
-    check = 'import smach_oracle, smach, smach_ros, smach_msgs; print(smach.upstream, smach_ros.upstream)'
+    check = ('import smach_oracle, smach, smach_ros, smach_msgs; '
+             'print(smach.upstream, smach_ros.upstream)')
     assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path,
                               str(tmp_path / 'devel/setup.bash'))
 

@@ -39,8 +39,8 @@ while not rospy.is_shutdown():
     queries = rospy.wait_for_message('/task/expert_query/open', OpenQueries, 20.0).queries
     if queries:
         answer.wait_for_service(20.0)
-        reply = answer(queries[0].query.query_id, ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='succeeded',
-                                                                 by='Ann'))
+        decision = ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann')
+        reply = answer(queries[0].query.query_id, decision)
         print('ANSWERED', reply.ok, reply.message, flush=True)
         break
     rospy.sleep(0.1)
@@ -49,7 +49,8 @@ LISTENER = '''
 import rospy
 from smach_oracle.msg import OracleEvent
 rospy.init_node('listener')
-events = rospy.Subscriber('/task/oracle/events', OracleEvent, lambda event: print('EVENT', event.kind, flush=True))
+events = rospy.Subscriber('/task/oracle/events', OracleEvent,
+                          lambda event: print('EVENT', event.kind, flush=True))
 while not events.get_num_connections():
     rospy.sleep(0.05)
 print('LISTENING', flush=True)

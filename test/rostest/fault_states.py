@@ -36,8 +36,8 @@ def raises():
 def hangs():
     while True:
         time.sleep(0.1)
-first = {'raises': raises, 'returns_none': lambda: None, 'hangs': hangs, 'fine': lambda: 'succeeded',
-         'aborts': lambda: 'aborted'}[sys.argv[1]]
+first = {'raises': raises, 'returns_none': lambda: None, 'hangs': hangs,
+         'fine': lambda: 'succeeded', 'aborts': lambda: 'aborted'}[sys.argv[1]]
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('PICK', Odd(first), {'succeeded': 'PLACE'})
@@ -62,7 +62,8 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('MOVE', move)
 while not ready():
-    time.sleep(0.02)  # a state's limit counts from its entry: it is for the goal, not for the connections
+    # a state's limit counts from its entry: it is for the goal, not for the connections
+    time.sleep(0.02)
 sys.stdin.readline()
 print('OUTCOME', sm.execute(), flush=True)
 '''

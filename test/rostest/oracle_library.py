@@ -39,7 +39,8 @@ WRAPPED_BEFORE_THE_NODE = PRELUDE + '''
 sm = smach.StateMachine(outcomes=OUTCOMES)
 with sm:
     smach.StateMachine.add('PICK', Turn('aborted'))
-assert OracleContainer.wrap(sm, settings={'max_recoveries': 3, 'deadline_s': 30.0}, name='ROBOT') is sm
+settings = {'max_recoveries': 3, 'deadline_s': 30.0}
+assert OracleContainer.wrap(sm, settings=settings, name='ROBOT') is sm
 rospy.init_node('task')
 run(sm)
 '''
@@ -48,7 +49,8 @@ rospy.init_node('task')
 view = []
 sm = OracleContainer(OUTCOMES, name='HAND_MADE')
 with sm:
-    OracleContainer.add('PICK', Turn('aborted'), preconditions=[lambda userdata: not view.append('looked')], prior=0.2)
+    OracleContainer.add('PICK', Turn('aborted'), prior=0.2,
+                        preconditions=[lambda userdata: not view.append('looked')])
 run(sm)
 print('LOOKED', len(view), flush=True)
 '''
@@ -67,7 +69,8 @@ heard = []
 smach.set_loggers(*[lambda text, *args: heard.append(text)] * 4)
 sm = smach.StateMachine(outcomes=['succeeded'])
 with sm:
-    smach.StateMachine.add('PICK', smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded']))
+    smach.StateMachine.add('PICK', smach.CBState(lambda userdata: 'succeeded',
+                                                 outcomes=['succeeded']))
 OracleContainer.wrap(sm).execute()
 print('HEARD', any('terminating' in text for text in heard), flush=True)
 '''
@@ -102,7 +105,8 @@ sm = smach.StateMachine(outcomes=OUTCOMES)
 with sm:
     smach.StateMachine.add('PICK', Turn('aborted'))
 wrapper = smach_ros.ActionServerWrapper('task_server', MoveArmsAsideAction, wrapped_container=sm,
-                                        succeeded_outcomes=['succeeded'], aborted_outcomes=['aborted'],
+                                        succeeded_outcomes=['succeeded'],
+                                        aborted_outcomes=['aborted'],
                                         preempted_outcomes=['preempted'])
 wrapper.run_server()
 rospy.spin()

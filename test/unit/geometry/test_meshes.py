@@ -10,13 +10,16 @@ from smach_oracle.geometry.meshes import Mesh, MeshError, read_mesh, reduced
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
 OBJ = b'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3 -1\n'
-DAE = '''<?xml version="1.0" encoding="utf-8"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
+DAE = '''<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
 <asset><unit meter="0.01"/></asset><library_geometries><geometry id="g"><mesh>
 <source id="p"><float_array count="12">0 0 0 100 0 0 100 100 0 0 100 0</float_array></source>
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/><input semantic="NORMAL" source="#n" offset="1"/>
+<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="NORMAL" source="#n" offset="1"/>
 <vcount>4</vcount><p>0 0 1 0 2 0 3 0</p></polylist></mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene><node><translate>0 0 100</translate><node><rotate>0 0 1 90</rotate>
+<library_visual_scenes><visual_scene><node><translate>0 0 100</translate>
+<node><rotate>0 0 1 90</rotate>
 <instance_geometry url="#g"/></node></node></visual_scene></library_visual_scenes></COLLADA>'''
 
 

@@ -7,17 +7,20 @@ from smach_oracle.geometry.robot_shapes import read_shapes
 
 ARM = '''<robot name="arm">
   <material name="red"><color rgba="1 0 0 1"/></material>
-  <link name="base"><visual><geometry><box size="1 2 3"/></geometry><material name="red"/></visual></link>
+  <link name="base">
+    <visual><geometry><box size="1 2 3"/></geometry><material name="red"/></visual></link>
   <link name="upper">
-    <visual><origin xyz="0 0 0.5"/><geometry><mesh filename="package://arm/upper.stl" scale="0.001 0.001 0.001"/>
-      </geometry></visual>
+    <visual><origin xyz="0 0 0.5"/><geometry>
+      <mesh filename="package://arm/upper.stl" scale="0.001 0.001 0.001"/></geometry></visual>
     <collision><geometry><cylinder radius="0.1" length="1"/></geometry></collision></link>
   <link name="finger"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
   <link name="thumb"/>
-  <joint name="turn" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/>
-  </joint>
-  <joint name="slide" type="prismatic"><parent link="upper"/><child link="finger"/><axis xyz="1 0 0"/></joint>
-  <joint name="other" type="prismatic"><parent link="upper"/><child link="thumb"/><axis xyz="1 0 0"/>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="upper"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/></joint>
+  <joint name="slide" type="prismatic">
+    <parent link="upper"/><child link="finger"/><axis xyz="1 0 0"/></joint>
+  <joint name="other" type="prismatic">
+    <parent link="upper"/><child link="thumb"/><axis xyz="1 0 0"/>
     <mimic joint="slide" multiplier="-2" offset="0.5"/></joint>
 </robot>'''
 

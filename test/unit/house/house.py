@@ -1,6 +1,7 @@
 """The source tree, for the tests that hold the house rules."""
 import ast
 import functools
+import subprocess
 from pathlib import Path
 from typing import Iterator, List, Tuple
 
@@ -24,6 +25,20 @@ def python_files(*folders: str) -> List[Path]:
     ]
     assert found, 'no Python files in {}'.format(folders)
     return found
+
+
+def tracked_text() -> List[Path]:
+    """Every text file of the checkout that git knows."""
+    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE,
+                            check=False).stdout
+    names = [name for name in listed.decode().split('\0') if name]
+    # an unpacked archive has no git; its sources have the same rule
+    paths = [ROOT / name for name in names
+             ] or [path for folder in SOURCES for path in (ROOT / folder).rglob('*')]
+    return [
+        path for path in paths
+        if path.is_file() and path.suffix not in ('.png', '.svg', '.bag', '.pyc')
+    ]
 
 
 def shown(path: Path) -> str:

@@ -4,9 +4,8 @@ runs foreign code.
 import ast
 import collections
 import re
-import subprocess
 
-from house import ROOT, SOURCES, parse, python_files, shown
+from house import ROOT, parse, python_files, shown, tracked_text
 
 EVERYTHING = python_files()
 PRODUCT = python_files('src', 'scripts', 'benchmarks')
@@ -89,19 +88,6 @@ def test_commands_are_executable_and_short():
         assert path.stat().st_mode & 0o111, shown(path)
         assert path.read_text().startswith('#!/usr/bin/env python3\n'), shown(path)
         assert len(path.read_text().splitlines()) <= 20, shown(path)
-
-
-def tracked_text():
-    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE,
-                            check=False).stdout
-    names = [name for name in listed.decode().split('\0') if name]
-    # an unpacked archive has no git; its sources have the same rule
-    paths = [ROOT / name for name in names
-             ] or [path for folder in SOURCES for path in (ROOT / folder).rglob('*')]
-    return [
-        path for path in paths
-        if path.is_file() and path.suffix not in ('.png', '.svg', '.bag', '.pyc')
-    ]
 
 
 def test_no_file_names_a_place_on_somebodys_machine():

@@ -4,13 +4,13 @@ from typing import Optional, Sequence, cast
 import smach
 
 from ..decision.policy import FailureContext
-from ..machine.failure import Failure, route_of
 from ..machine.learned_rates import save_rates
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
+from ..recovery.failure import Failure, route_of
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
 from ..recovery.verdict import Verdict, VerdictKind

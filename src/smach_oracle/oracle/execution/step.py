@@ -3,7 +3,13 @@ from typing import Any, Optional
 
 import smach
 
-from ..machine.failure import (
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_gate import UserdataGate
+from ..machine.userdata_view import view_behind
+from ..records.events import EventKind, FailureKind
+from ..records.state_record import StateRecord
+from ..records.visits import VisitResult
+from ..recovery.failure import (
     ContainerEnding,
     Failure,
     Route,
@@ -11,12 +17,6 @@ from ..machine.failure import (
     natural_ending,
     visit_result,
 )
-from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import UserdataGate
-from ..machine.userdata_view import view_behind
-from ..records.events import EventKind, FailureKind
-from ..records.state_record import StateRecord
-from ..records.visits import VisitResult
 from ..recovery.judging import Overrun, judge
 from ..settings.failing_outcomes import PREEMPTED
 from .oracle_visit import OracleVisit

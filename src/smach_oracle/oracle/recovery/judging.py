@@ -4,7 +4,10 @@ from typing import Any, NamedTuple, Optional, Union
 
 import smach
 
-from ..machine.failure import (
+from ..machine.tree_node import TreeNode
+from ..records.events import FailureKind
+from ..records.state_record import StateRecord
+from .failure import (
     Failure,
     Route,
     failure_kind,
@@ -14,9 +17,6 @@ from ..machine.failure import (
     unbound_text,
     unregistered_text,
 )
-from ..machine.tree_node import TreeNode
-from ..records.events import FailureKind
-from ..records.state_record import StateRecord
 
 
 class Overrun(NamedTuple):

@@ -7,7 +7,6 @@ from typing import Any, Optional
 
 import smach
 
-from ..machine.failure import failure_kind, route_of
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
 from ..machine.userdata_view import view_behind
@@ -15,6 +14,7 @@ from ..machine.write_watch import WriteWatch
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
+from .failure import failure_kind, route_of
 
 
 class NotMet(Exception):

@@ -4,11 +4,11 @@ from typing import Any, Collection, Dict, Iterator, NamedTuple, Tuple
 import smach
 
 from ..asking.question import OutcomeChoice, Question, StateChoice
-from ..machine.failure import Failure, route_of
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of, keys_after_jump, missing_keys
 from ..records.state_record import StateRecord
+from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
 
 

@@ -8,7 +8,6 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
-from ..machine.failure import ContainerEnding, Failure, natural_ending
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
@@ -16,6 +15,7 @@ from ..records.facts import DECIDED_BY, Decider
 from ..records.state_record import StateRecord
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.preconditions import PreconditionSpec
+from .failure import ContainerEnding, Failure, natural_ending
 from .precondition_runner import PreconditionRunner
 from .question_making import Account, make_question
 from .verdict import Verdict, VerdictKind

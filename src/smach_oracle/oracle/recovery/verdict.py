@@ -2,7 +2,7 @@
 from enum import Enum
 from typing import FrozenSet, NamedTuple
 
-from ..machine.failure import ContainerEnding
+from .failure import ContainerEnding
 
 
 class VerdictKind(Enum):

@@ -34,10 +34,12 @@ from smach_oracle.geometry.meshes import MeshError
 from smach_oracle.ros.images import ImageError, cloud_message, colour_image, depth_image
 
 OBJ = b'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n'
-ROBOT = '''<robot name="arm"><link name="base"><visual><geometry><box size="1 2 4"/></geometry></visual></link>
+ROBOT = '''<robot name="arm">
+<link name="base"><visual><geometry><box size="1 2 4"/></geometry></visual></link>
 <link name="hand"><visual><geometry><mesh filename="{}"/></geometry></visual>
 <collision><geometry><sphere radius="0.5"/></geometry></collision></link>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="hand"/><axis xyz="1 0 0"/></joint></robot>'''
+<joint name="slide" type="prismatic">
+<parent link="base"/><child link="hand"/><axis xyz="1 0 0"/></joint></robot>'''
 BALL_HANDED = ROBOT.format('none')  # its mesh is missing
 
 

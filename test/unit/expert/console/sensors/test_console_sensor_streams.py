@@ -140,7 +140,8 @@ class TestSamples(console_case.ConsoleCase):
 
     def test_no_topic_can_be_named(self):
         for path in ('/sample/cmd_vel', '/sample//cmd_vel', '/sample/%2fsecret', '/sample/99',
-                     '/sample/-1', '/sample/0x1', '/sample/1/../2', '/sample/', '/sample/12345678901'):
+                     '/sample/-1', '/sample/0x1', '/sample/1/../2', '/sample/',
+                     '/sample/12345678901'):
             assert self.sample(path).code == 404, path
         path = '/sample/{}?'.format(self.camera.number)
         for query in ('topic=/secret', 'after=-1', 'after=x', 'after=1&after=2', 'width=100000',

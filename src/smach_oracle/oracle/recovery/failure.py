@@ -9,10 +9,10 @@ from typing import Any, Callable, NamedTuple, Optional, Tuple
 import smach
 
 from ..asking.question import names
+from ..machine.protocols import Machine
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..settings.failing_outcomes import FailingNames, is_preempted
-from .protocols import Machine
 
 
 class Route(NamedTuple):
