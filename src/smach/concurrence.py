@@ -1,6 +1,6 @@
 """A container that executes all its states at the same time, one thread each."""
 import traceback
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import smach
 from smach.container import Container, Edge
@@ -77,10 +77,10 @@ class Concurrence(Container):
 
     def check_consistency(self) -> None:
         """Raise KeyError for an unknown label in the outcome map, InvalidTransitionError for an
-        unknown outcome.
+        unknown outcome, TypeError where the map or its conditions are no mapping.
         """
-        for conditions in self._outcome_map.values():
-            for label, outcome in conditions.items():
+        for _, conditions in _entries(self._outcome_map):
+            for label, outcome in _entries(conditions):
                 registered = self[label].get_registered_outcomes()
                 if outcome not in registered:
                     raise smach.InvalidTransitionError(
@@ -198,10 +198,11 @@ class Concurrence(Container):
 
     def _mapped_outcome(self, outcomes: Outcomes) -> Optional[str]:
         """The entry of the outcome map with most conditions of those that hold; the first of
-        several such.
+        several such. An entry without conditions never holds.
         """
-        holding = [(len(conditions), outcome) for outcome, conditions in self._outcome_map.items()
-                   if all(outcomes[label] == wanted for label, wanted in conditions.items())]
+        holding = [(len(conditions), outcome) for outcome, conditions in _entries(self._outcome_map)
+                   if conditions and all(outcomes[label] == wanted
+                                         for label, wanted in _entries(conditions))]
         return max(holding, key=lambda entry: entry[0])[1] if holding else None
 
     def request_preempt(self) -> None:
@@ -243,10 +244,23 @@ class Concurrence(Container):
     def get_internal_edges(self) -> List[Edge]:
         """Each condition of the outcome map as (child outcome, label, container outcome)."""
         return [(outcome, label, container_outcome)
-                for container_outcome, conditions in self._outcome_map.items()
-                for label, outcome in conditions.items()]
+                for container_outcome, conditions in _entries(self._outcome_map)
+                for label, outcome in _entries(conditions)]
 
     # -- copies
 
     def __getstate__(self) -> Dict[str, Any]:
         return dict(self.__dict__, _run=None)
+
+
+def _entries(conditions: Any) -> List[Tuple[Any, Any]]:
+    """The entries of an outcome map, or of the conditions in it; whatever is empty has none.
+
+    :raises TypeError: where it is no mapping.
+    """
+    if isinstance(conditions, Mapping):
+        return list(conditions.items())
+    if isinstance(conditions, Collection) and not conditions:
+        return []
+    raise TypeError("An outcome map is written {outcome: {label: child's outcome}}; %r is no "
+                    'mapping.' % (conditions,))

@@ -8,7 +8,7 @@ import collections
 import copy
 import enum
 import types
-from typing import Any, Iterator, NoReturn, Tuple
+from typing import Any, Dict, Iterator, Mapping, Set, Tuple
 
 import smach
 
@@ -23,15 +23,25 @@ _COME_AS_THEY_ARE: Tuple[type,
                                  types.BuiltinFunctionType, types.MethodType, types.ModuleType)
 
 
+# What was said of attributes that were set on a view: (class of the object, attribute).
+_warned_of: Set[Tuple[str, str]] = set()
+
+
 class Const(object):
-    """A view of an object that refuses to set or delete attributes, and so do the objects reached
-    through it.
+    """A view of an object, which stays as it is whatever is set on the view; so do the objects
+    reached through it.
+
+    An attribute that is set is kept with this view alone: who read the object through it reads what
+    it has set, and nobody else does. Attributes cannot be deleted.
     """
 
-    __slots__ = ('_obj',)
+    __slots__ = ('_obj', '_set_here')
+
+    _set_here: Dict[str, Any]  # the attributes set on this view, by name
 
     def __init__(self, obj: Any) -> None:
         object.__setattr__(self, '_obj', obj)
+        object.__setattr__(self, '_set_here', {})
 
     @property  # type: ignore[misc]
     def __class__(self) -> type:
@@ -41,18 +51,24 @@ class Const(object):
         return type(self._obj)
 
     def __getattr__(self, name: str) -> Any:
-        if name == '_obj':
+        if name in ('_obj', '_set_here'):  # not initialised yet: while being copied
             raise AttributeError(name)
+        if name in self._set_here:
+            return self._set_here[name]
         return get_const(getattr(self._obj, name))
 
     def __setattr__(self, name: str, value: Any) -> None:
-        self._refuse('set', name)
+        self._set_here[name] = value
+        of = type(self._obj)
+        what = ('%s.%s' % (of.__module__, of.__qualname__), name)
+        if what not in _warned_of:
+            _warned_of.add(what)
+            smach.logwarn("A state has set attribute '%s' of a %s that it gets as input only. The "
+                          'object in userdata stays as it was; to change it, declare its key as '
+                          'output, too. This is said once.' % (name, of.__name__))
 
     def __delattr__(self, name: str) -> None:
-        self._refuse('delete', name)
-
-    def _refuse(self, verb: str, name: str) -> NoReturn:
-        text = "Cannot %s attribute '%s': objects of input keys are read-only." % (verb, name)
+        text = "Cannot delete attribute '%s': objects of input keys are read-only." % name
         smach.logerr(text)
         raise TypeError(text)
 
@@ -87,13 +103,14 @@ class Const(object):
         return repr(self._obj)
 
     def __copy__(self) -> Any:
-        return copy.copy(self._obj)
+        return _completed(copy.copy(self._obj), self._set_here)
 
     def __deepcopy__(self, memo: Any) -> Any:
-        return copy.deepcopy(self._obj, memo)
+        return _completed(copy.deepcopy(self._obj, memo), copy.deepcopy(self._set_here, memo))
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        return self._obj.__reduce_ex__(protocol)
+        obj = copy.copy(self) if self._set_here else self._obj
+        return obj.__reduce_ex__(protocol)
 
 
 class CallableConst(Const):
@@ -105,6 +122,12 @@ class CallableConst(Const):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         return self._obj(*args, **kwargs)
+
+
+def _completed(twin: Any, attributes: Mapping[str, Any]) -> Any:
+    for name, value in attributes.items():
+        setattr(twin, name, value)
+    return twin
 
 
 def _behind(obj: Any) -> Any:

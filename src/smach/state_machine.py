@@ -62,8 +62,8 @@ class StateMachine(Container):
 
         ``transitions`` maps outcomes of the state to labels or to outcomes of the machine; outcomes
         left out, or mapped to None, end the machine with its outcome of the same name.
-        ``remapping`` maps the state's userdata keys to the machine's; ``constants`` gives some of
-        its input keys fixed values.
+        ``remapping`` maps the state's userdata keys to the machine's. ``constants`` maps keys of
+        the machine to values: they are written before each visit of the state, and stay.
 
         :raises InvalidStateError: for a label already used.
         :raises InvalidTransitionError: for a transition from an outcome the state does not have.
@@ -92,7 +92,7 @@ class StateMachine(Container):
         self._states[label] = state
         self._transitions[label] = transitions
         self._remappings[label] = {} if remapping is None else remapping
-        self._constants[label] = {} if constants is None else dict(constants)
+        self._constants[label] = {} if constants is None else constants
         if self._connector_outcomes and self._last_added_label is not None:
             for outcome in self._connector_outcomes:
                 self._transitions[self._last_added_label][outcome] = label
@@ -102,10 +102,11 @@ class StateMachine(Container):
     @staticmethod
     def add_auto(label: str, state: State, connector_outcomes: Sequence[str],
                  transitions: Optional[Mapping[str, Optional[str]]] = None,
-                 remapping: Optional[Mapping[str, str]] = None) -> State:
+                 remapping: Optional[Mapping[str, str]] = None,
+                 constants: Optional[Mapping[str, Any]] = None) -> State:
         """Add a state whose ``connector_outcomes`` lead to the state that is added next."""
         machine = StateMachine._currently_opened_container()
-        StateMachine.add(label, state, transitions, remapping)
+        StateMachine.add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
         if not all(outcome in registered for outcome in connector_outcomes):
             raise smach.InvalidStateError(
@@ -117,23 +118,18 @@ class StateMachine(Container):
 
     def check_state_spec(self, label: str, state: State,
                          transitions: Mapping[str, Optional[str]]) -> None:
-        """Raise InvalidStateError for a used label, InvalidTransitionError for an outcome the state
-        does not have.
-        """
+        """Raise InvalidStateError for a used label, InvalidTransitionError for a wrong outcome."""
         if label in self._states:
             raise smach.InvalidStateError("This state machine has a state '%s' already." % label)
         registered = state.get_registered_outcomes()
         for outcome in transitions:
             if outcome not in registered:
                 raise smach.InvalidTransitionError(
-                    "There is a transition from outcome '%s' of state '%s', which has registered "
-                    "only %s"
+                    "There is a transition from outcome '%s' of state '%s', which has only %s"
                     % (outcome, label, registered))
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is no initial state or a transition leads
-        nowhere.
-        """
+        """Raise InvalidTransitionError where there is no initial state, or a dead transition."""
         errors = inconsistencies(self._states, self._transitions, self._initial_state_label,
                                  self.get_registered_outcomes())
         if errors:
@@ -220,6 +216,10 @@ class StateMachine(Container):
         lock = self._state_transitioning_lock
         lock.release()
         try:
+            constants = self._constants.get(label)
+            if constants:
+                for key, value in constants.items():
+                    self.userdata[key] = value
             outcome = state.execute(visit.remapper)
         except smach.InvalidUserCodeError:
             smach.logerr("State '%s' ended in an error." % label)
@@ -262,8 +262,7 @@ class StateMachine(Container):
         if label not in self._states:
             raise smach.InvalidStateError(
                 "The current state '%s' is none of %s" % (label, list(self._states)))
-        visit = StateVisit(state, self.userdata, self._remappings[label],
-                           self._constants.get(label))
+        visit = StateVisit(state, self.userdata, self._remappings[label])
         if visit.may_be_kept:
             self._visits[label] = visit
         return visit

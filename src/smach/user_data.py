@@ -186,53 +186,6 @@ _parts_of: Callable[[Remapper], Any] = Remapper._parts.__get__  # type: ignore[a
 _set_parts: Callable[[Remapper, Any], None] = Remapper._parts.__set__  # type: ignore[attr-defined]
 
 
-class ConstantsRemapper(Remapper):
-    """A view in which some keys have values fixed when the state was added; they can be read, never
-    written.
-    """
-
-    __slots__ = ('_fixed',)
-
-    def __init__(self, ud: Any, input_keys: Collection[str], output_keys: Collection[str],
-                 remapping: Mapping[str, str], constants: Mapping[str, Any]) -> None:
-        Remapper.__init__(self, ud, input_keys, output_keys, remapping)
-        _set_fixed(self, constants)
-
-    def __getattribute__(self, key: str) -> Any:
-        constants = _fixed_of(self)
-        return get_const(constants[key]) if key in constants else Remapper.__getattribute__(
-            self, key)
-
-    def __getitem__(self, key: str) -> Any:
-        constants = _fixed_of(self)
-        return get_const(constants[key]) if key in constants else Remapper.__getitem__(self, key)
-
-    def __setattr__(self, key: str, value: Any) -> None:
-        if key in _fixed_of(self):
-            smach.logerr("Userdata key '%s' is not written: it is a constant of this state." % key)
-        else:
-            Remapper.__setattr__(self, key, value)
-
-    __setitem__ = __setattr__
-
-    def __contains__(self, key: str) -> bool:
-        return key in _fixed_of(self) or Remapper.__contains__(self, key)
-
-    def keys(self) -> List[str]:
-        """The constants and the input keys that have a value."""
-        constants = _fixed_of(self)
-        return list(constants) + [key for key in Remapper.keys(self) if key not in constants]
-
-    def __reduce__(self) -> Any:
-        return type(self), _parts_of(self)[:4] + (_fixed_of(self),)
-
-
-_fixed_of: Callable[[ConstantsRemapper],
-                    Any] = ConstantsRemapper._fixed.__get__  # type: ignore[attr-defined]
-_set_fixed: Callable[[ConstantsRemapper, Any],
-                     None] = ConstantsRemapper._fixed.__set__  # type: ignore[attr-defined]
-
-
 def _no_such_key(ud: UserData, key: object) -> str:
     return "There is no userdata key '%s', only %s" % (key, ud.keys())
 

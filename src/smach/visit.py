@@ -2,7 +2,7 @@
 from typing import Any, Dict, Mapping, Optional
 
 from smach.state import State
-from smach.user_data import ConstantsRemapper, Remapper
+from smach.user_data import Remapper
 
 
 class StateVisit(object):
@@ -13,8 +13,7 @@ class StateVisit(object):
     __slots__ = ('state', 'userdata', 'input_keys', 'output_keys', 'remapping', 'remapper',
                  'may_be_kept', 'texts')
 
-    def __init__(self, state: Any, userdata: Any, remapping: Mapping[str, str],
-                 constants: Optional[Mapping[str, Any]]) -> None:
+    def __init__(self, state: Any, userdata: Any, remapping: Mapping[str, str]) -> None:
         # A state that computes its keys is asked for them at every visit.
         self.may_be_kept = (type(state).get_registered_input_keys is State.get_registered_input_keys
                             and type(state).get_registered_output_keys
@@ -27,9 +26,8 @@ class StateVisit(object):
             self.input_keys = state.get_registered_input_keys()
             self.output_keys = state.get_registered_output_keys()
         self.remapping = remapping
-        parts = (userdata, self.input_keys, self.output_keys, remapping)
         self.texts: Dict[Any, Any] = {}  # (target, log line of the transition to it) by outcome
-        self.remapper = ConstantsRemapper(*parts, constants) if constants else Remapper(*parts)
+        self.remapper = Remapper(userdata, self.input_keys, self.output_keys, remapping)
 
     def text_of(self, label: str, outcome: str, target: Optional[str]) -> str:
         """The log line of a transition, made once and kept."""

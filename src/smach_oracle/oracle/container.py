@@ -18,7 +18,7 @@ from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode
-from .machine.userdata_view import StateView
+from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
@@ -43,6 +43,8 @@ class OracleContainer(smach.StateMachine):
     It is built like any state machine, or made of one with `wrap`. All that it keeps beside the
     machine is behind one attribute, `_oracle`, so that it meets no name of a subclass.
     """
+
+    _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none; never written
 
     def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
@@ -213,8 +215,6 @@ class OracleContainer(smach.StateMachine):
         if meta is None:
             meta = OracleState()
             self._remappings[label] = {}
-            if hasattr(self, '_constants'):
-                self._constants[label] = {}
         if set(self._transitions.get(label, ())) != set(states).union(outcomes).difference(
             (label,)):
             self._transitions[label] = meta.lead_to(
@@ -225,10 +225,7 @@ class OracleContainer(smach.StateMachine):
     def _remove_oracle(self) -> None:
         label = self._oracle.settings.oracle_label
         if isinstance(self._states.get(label), OracleState):
-            tables: List[Any] = [
-                self._states, self._transitions, self._remappings,
-                getattr(self, '_constants', {})
-            ]
+            tables: List[Any] = [self._states, self._transitions, self._remappings]
             for table in tables:
                 table.pop(label, None)
 
@@ -280,6 +277,9 @@ class OracleContainer(smach.StateMachine):
             lock.release()
         try:
             try:
+                constants = self._constants.get(label)
+                if constants:
+                    write_constants(userdata, constants)
                 if observed or record.special or node.abandoned:
                     outcome = Step(node, record).execute(state, view.remapper)
                 else:

@@ -5,10 +5,12 @@ import itertools
 import os
 import subprocess
 import sys
+import threading
 
 import pytest
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, watched
 
+import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policy import (
     POLICIES,
@@ -19,6 +21,8 @@ from smach_oracle.oracle.decision.policy import (
 )
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.history import History
+from smach_oracle.oracle.records.visits import Visit, VisitResult
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
@@ -143,7 +147,6 @@ def test_algorithm1_calls_a_failure_continuous_though_the_state_succeeded_in_bet
 
 
 def loop_of(a, b):
-    import smach
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', a, {'ok': 'B'})
@@ -167,7 +170,6 @@ def test_prose_steps_back_to_the_state_that_succeeded_last_before_the_failing_be
 
 def test_prose_keeps_its_goal_while_the_state_keeps_failing():
     """From the goal another way may lead back: what succeeds on it is no goal."""
-    import smach
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')),
@@ -180,7 +182,6 @@ def test_prose_keeps_its_goal_while_the_state_keeps_failing():
 
 
 def test_prose_steps_back_to_a_new_goal_once_the_state_has_succeeded():
-    import smach
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', Scripted(), {'ok': 'B'})
@@ -198,6 +199,97 @@ def test_prose_steps_back_to_the_initial_state_where_nothing_succeeded_before():
     machine = failing('prose', Scripted('aborted', 'aborted'), Scripted())
     machine.run()
     assert machine.decisions() == [('revisit', 'A'), ('step_back', 'A')]
+
+
+def machine_of(*states, outcomes=('done', 'aborted', 'preempted')):
+    """A machine of (label, state, transitions) triples."""
+    machine = smach.StateMachine(outcomes=list(outcomes))
+    with machine:
+        for label, state, transitions in states:
+            smach.StateMachine.add(label, state, transitions)
+    return machine
+
+
+def continuous_failures(machine, label):
+    return [event.continuous for event in machine.of(EventKind.FAILURE) if event.state == label]
+
+
+@pytest.mark.parametrize('policy', sorted(POLICIES))
+def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
+    """The first example of the page."""
+    reached_twice, driven = threading.Event(), threading.Event()
+
+    def reach_again(state, ud):
+        reached_twice.set()
+        assert driven.wait(20)
+        return 'aborted'
+
+    def drive(state, ud):
+        assert reached_twice.wait(20)
+        return 'aborted'
+
+    def drive_again(state, ud):
+        driven.set()
+        return 'ok'
+    both = smach.Concurrence(outcomes=['done'], default_outcome='done')
+    with both:
+        smach.Concurrence.add('ARM', machine_of(
+            ('REACH', Scripted('aborted', reach_again), {'ok': 'done'})))
+        smach.Concurrence.add('BASE', machine_of(
+            ('DRIVE', Scripted(drive, drive_again), {'ok': 'done'})))
+    machine = Watched(machine_of(('BOTH', both, {'done': 'done'})), settings={'policy': policy})
+    assert machine.run() == 'done'
+    assert [event.state for event in machine.of(EventKind.FAILURE)] == ['REACH', 'DRIVE', 'REACH']
+    assert continuous_failures(machine, 'REACH') == [False, True]
+    assert continuous_failures(machine, 'DRIVE') == [False]
+
+
+@pytest.mark.parametrize('policy', sorted(POLICIES))
+def test_a_failure_of_the_machine_around_breaks_no_continuity(policy):
+    arm = machine_of(('REACH', Scripted('aborted', 'aborted'), {'ok': 'done'}))
+    machine = Watched(machine_of(('ARM', arm, {'done': 'done'})), settings={
+        'policy': policy, 'states': {'REACH': {'max_recoveries': 0}}})
+    assert machine.run() == 'done'
+    assert [event.state for event in machine.of(EventKind.FAILURE)][:3] == ['REACH', 'ARM', 'REACH']
+    assert continuous_failures(machine, 'REACH') == [False, True]
+
+
+def test_prose_keeps_the_initial_state_as_its_goal_whatever_succeeds_while_the_state_fails():
+    machine = Watched(machine_of(
+        ('S', Scripted('lost', 'aborted', 'aborted', outcomes=('ok', 'lost', 'aborted')),
+         {'ok': 'done', 'lost': 'SEARCH'}),
+        ('SEARCH', Scripted(outcomes=('ok',)), {'ok': 'S'})),
+        settings={'policy': 'prose', 'memory': 1000,
+                  'states': {'S': {'failure_outcomes': ['lost']}}})
+    assert machine.run() == 'done'
+    assert continuous_failures(machine, 'S') == [False, True, True]
+    assert machine.decisions() == [('step_back', 'S'), ('step_back', 'S')]
+
+
+def test_prose_looks_its_goal_up_anew_where_the_container_is_executed_again():
+    history = History(10)
+
+    def visit(state, result=VisitResult.SUCCESS):
+        history.visited(Visit(state, '', result), False)
+
+    def fails(state):
+        goal = history.failure_context(state, 'INIT', 0).succeeded_before
+        history.failed(state, 0)
+        visit(state, VisitResult.FAILURE)
+        return goal
+    history.begin_trial()
+    visit('A')
+    assert (fails('S'), fails('S')) == ('A', 'A')
+    history.begin_execution()
+    assert history.failing_since('S', 0), 'it is the same trial'
+    visit('B')
+    first = fails('S')
+    visit('C')
+    assert (first, fails('S')) == ('B', 'B')
+    history.begin_execution()
+    assert fails('S') is None
+    visit('D')
+    assert fails('S') is None
 
 
 def test_a_preempted_or_failed_visit_is_no_goal_of_a_step_back():

@@ -1,12 +1,17 @@
 """Wrapped machines that are changed afterwards, and machines that cannot be wrapped."""
+import inspect
 
 import pytest
-from machines import Scripted, chain_of, watched
+from machines import FakeExpert, Scripted, chain_of, contents, goto, supersede, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
+
+needs_constants = pytest.mark.skipif(
+    'constants' not in inspect.signature(smach.StateMachine.add).parameters,
+    reason='this engine has no constants')
 
 
 def test_a_transition_changed_while_running_is_taken_and_counted():
@@ -32,10 +37,8 @@ def test_keys_registered_late_are_seen():
     assert machine.machine.userdata.late == 1
 
 
+@needs_constants
 def test_constants_are_handed_to_the_state():
-    import inspect
-    if 'constants' not in inspect.signature(smach.StateMachine.add).parameters:
-        pytest.skip('this engine has no constants')
     seen = []
     machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])
     with machine:
@@ -49,6 +52,119 @@ def test_constants_are_handed_to_the_state():
     assert machine.execute() == 'done'
     assert seen == [(1, 2)]
     assert [event.data['missing_keys'] for event in events if event.kind is EventKind.JUMP] == [[]]
+
+
+def machine_with(*states):
+    """A machine of (label, state, arguments of add) triples."""
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        for label, state, arguments in states:
+            smach.StateMachine.add(label, state, **arguments)
+    return machine
+
+
+def remapped_constant(seen):
+    """A state A that reads its n, the machine's constant `answer`, and changes it."""
+    def read(state, ud):
+        seen.append((ud.n, state.parent.userdata.answer))
+        ud.n = -1
+        return 'ok' if len(seen) > 2 else 'again'
+    state = Scripted(read, read, read, outcomes=('ok', 'again', 'aborted'), input_keys=['n'],
+                     output_keys=['n'])
+    machine = state.parent = machine_with(
+        ('A', state, {'transitions': {'ok': 'B', 'again': 'A'}, 'remapping': {'n': 'answer'},
+                      'constants': {'answer': 42}}),
+        ('B', Scripted(), {'transitions': {'ok': 'done'}}))
+    return machine
+
+
+@needs_constants
+@pytest.mark.parametrize('settings', [{}, {'states': {'A': {'time_limit_s': 20}}},
+                                      {'deep_copy_keys': ['answer']}], ids=str)
+@pytest.mark.parametrize('recover', [True, False])
+def test_constants_are_keys_of_the_machine_bare_and_wrapped(settings, recover):
+    seen, wrapped_seen = [], []
+    bare, wrapped = remapped_constant(seen), remapped_constant(wrapped_seen)
+    OracleContainer.wrap(wrapped, settings=settings, recover=recover)
+    assert bare.execute() == wrapped.execute() == 'done'
+    assert seen == wrapped_seen == [(42, 42)] * 3
+    assert contents(bare.userdata) == contents(wrapped.userdata) == {'answer': -1}
+
+
+@needs_constants
+def test_constants_exchanged_between_visits_count():
+    seen = []
+    machine = OracleContainer.wrap(machine_with(
+        ('A', Scripted(*[lambda state, ud: seen.append(ud.x) or 'ok'] * 2, input_keys=['x']),
+         {'transitions': {'ok': 'done'}})))
+    for value in (1, 2):
+        machine._constants['A'] = {'x': value}
+        machine.execute()
+    assert seen == [1, 2]
+
+
+def test_machines_of_an_engine_without_constants_run_too():
+    machine = chain_of(Scripted('aborted'))
+    if '_constants' in machine.__dict__:
+        del machine._constants
+    OracleContainer.wrap(machine)
+    assert machine.execute() == 'done'
+    assert not OracleContainer._constants, 'which all machines would share'
+
+
+@needs_constants
+def test_constants_that_cannot_be_written_fail_the_state():
+    machine = OracleContainer.wrap(
+        machine_with(('A', Scripted(), {'transitions': {'ok': 'done'}, 'constants': ['x']})),
+        settings={'max_recoveries': 1})
+    with pytest.raises(smach.InvalidUserCodeError, match='items'):
+        machine.execute()
+    assert machine.rates()[0].failures > 0 and not machine.is_running()
+
+
+@needs_constants
+def test_a_precondition_gets_the_constants_of_its_state():
+    seen = []
+    look = Scripted('ok', lambda state, ud: seen.append(ud.mode) or 'ok', input_keys=['mode'])
+    machine = OracleContainer.wrap(
+        machine_with(('LOOK', look, {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}}),
+                     ('GRASP', Scripted(lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted',
+                                        output_keys=['mode']), {'transitions': {'ok': 'done'}})),
+        settings={'policy': 'prose', 'states': {'GRASP': {'preconditions': ['LOOK']}}})
+    assert machine.execute() == 'done'
+    assert seen == ['far'] and machine.userdata.mode == 'far'
+
+
+@needs_constants
+def test_constants_of_a_precondition_that_is_not_met_are_taken_back():
+    machine = OracleContainer.wrap(
+        machine_with(('LOOK', Scripted('ok', 'aborted'),
+                      {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}}),
+                     ('GRASP', Scripted(lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted',
+                                        lambda state, ud: ud.mode == 'near' and 'ok',
+                                        input_keys=['mode'], output_keys=['mode']),
+                      {'transitions': {'ok': 'done'}})),
+        settings={'userdata': 'keep',
+                  'states': {'GRASP': {'preconditions': ['LOOK'], 'prior': 0.5, 'memory': 100}}},
+        expert=FakeExpert(goto('GRASP')))
+    assert machine.execute() == 'done' and machine.userdata.mode == 'near'
+
+
+@needs_constants
+def test_a_question_shows_constants_by_the_names_of_the_state():
+    expert = FakeExpert(supersede('ok'))
+    machine = OracleContainer.wrap(
+        machine_with(('A', Scripted('aborted', input_keys=['n']),
+                      {'transitions': {'ok': 'B'}, 'remapping': {'n': 'answer'},
+                       'constants': {'answer': 42, 'beside': 1}}),
+                     ('B', Scripted(input_keys=['m']),
+                      {'transitions': {'ok': 'done'}, 'remapping': {'m': 'later'},
+                       'constants': {'later': 3}})),
+        settings={'max_recoveries': 0}, expert=expert)
+    assert machine.execute() == 'done'
+    question, = expert.questions
+    assert question.input_userdata == {'n': 42}
+    assert {choice.state: choice.missing_keys for choice in question.choices} == {'A': (), 'B': ()}
 
 
 def test_a_machine_that_could_not_be_wrapped_is_as_it_was():

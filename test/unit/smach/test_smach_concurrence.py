@@ -49,6 +49,32 @@ def test_the_satisfied_entry_with_most_conditions_wins():
     assert concurrence(children, default='preempted', outcome_map=outcome_map).execute() == 'failed'
 
 
+@pytest.mark.parametrize('outcome_map', [['done'], ('done',), {'done': 'A'}, {'done': ['A']},
+                                         {'done': None}, {'done': 3}, {'done': [('A', 'done')]}])
+def test_an_outcome_map_that_is_no_mapping_is_a_type_error_when_the_with_block_ends(outcome_map):
+    made = smach.Concurrence(['done', 'failed'], 'failed', outcome_map=outcome_map)
+    with pytest.raises(TypeError):
+        with made:
+            smach.Concurrence.add('A', Fixed())
+
+
+def test_an_outcome_map_that_cannot_be_gone_through_is_a_type_error_at_once():
+    with pytest.raises(TypeError):
+        smach.Concurrence(['done', 'failed'], 'failed', outcome_map=5)
+
+
+@pytest.mark.improvement
+def test_the_type_error_of_an_outcome_map_says_how_it_is_written():
+    with pytest.raises(TypeError, match=r"\{outcome: \{label: child's outcome\}\}; 'A' is no"):
+        concurrence({'A': Fixed()}, outcome_map={'failed': 'A'})
+
+
+@pytest.mark.parametrize('outcome_map', [{}, [], '', {'done': {}}, {'done': ''}, {'done': []}])
+def test_an_entry_without_conditions_never_holds(outcome_map):
+    made = concurrence({'A': Fixed()}, default='failed', outcome_map=outcome_map)
+    assert made.execute() == 'failed' and made.get_internal_edges() == []
+
+
 def test_the_default_counts_when_nothing_else_does():
     children = {'A': Fixed('done'), 'B': Fixed('failed')}
     outcome_map = {'done': {'B': 'failed', 'A': 'done'}}

@@ -33,7 +33,7 @@ class FailureContext(NamedTuple):
 
     state: str
     initial: str  # the container's initial state
-    failed_last: bool  # the most recent failure of this trial was of `state`
+    failed_last: bool  # the container's most recent failure of this trial was of `state`
     failing_since: bool  # and `state` has not succeeded since
     unconditioned: Optional[str]  # state of the latest earlier visit that has no preconditions
     succeeded_before: Optional[str]  # other state that succeeded last before `state` began to fail

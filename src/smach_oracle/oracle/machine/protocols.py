@@ -36,6 +36,7 @@ class Machine(Protocol):
     _states: Dict[str, smach.State]
     _transitions: Dict[str, Transitions]
     _remappings: Dict[str, Mapping[str, str]]
+    _constants: Dict[str, Mapping[str, Any]]
     _initial_state_label: Optional[str]
     _current_label: Optional[str]
     _current_state: Optional[smach.State]

@@ -1,6 +1,5 @@
 """What a state reads and writes: the container's userdata by the state's own key names."""
-from collections.abc import MutableMapping
-from typing import Any, Collection, Iterable, Iterator, Mapping, Tuple
+from typing import Any, Collection, Iterable, Mapping, Tuple
 
 import smach
 
@@ -9,32 +8,18 @@ from .tree_node import TreeNode
 from .userdata_gate import UserdataGate, behind
 
 
-class _WithConstants(MutableMapping):
-    """A userdata dictionary in which some keys read as constants; writes go to the dictionary."""
-
-    def __init__(self, userdata: smach.UserData, fixed: Mapping[str, Any]) -> None:
-        self._userdata = userdata
-        self._fixed = fixed
-
-    def __getitem__(self, key: str) -> object:
-        return self._fixed[key] if key in self._fixed else self._userdata._data[key]
-
-    def __setitem__(self, key: str, value: object) -> None:
-        self._userdata._data[key] = value
-
-    def __delitem__(self, key: str) -> None:
-        del self._userdata._data[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(set(self._fixed).union(self._userdata._data))
-
-    def __len__(self) -> int:
-        return len(set(self._fixed).union(self._userdata._data))
-
-
 def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
-    """Return the constants given with a state; engines without constants have none."""
-    return (getattr(machine, '_constants', None) or {}).get(label) or {}
+    """Return the constants given with a state, by keys of the container.
+
+    Engines without constants have none.
+    """
+    return machine._constants.get(label) or {}
+
+
+def write_constants(userdata: smach.UserData, constants: Mapping[str, Any]) -> None:
+    """Write a state's constants before it runs, as the engine does; they stay."""
+    for key, value in constants.items():
+        userdata[key] = value
 
 
 def view_of(machine: Machine, label: str, state: smach.State,
@@ -44,13 +29,6 @@ def view_of(machine: Machine, label: str, state: smach.State,
     `label` is '' for a state that is not in the machine.
     """
     remapping = machine._remappings.get(label) or {} if label else {}
-    constants = constants_of(machine, label)
-    if constants:
-        shown: Any = smach.UserData()
-        shown._data = _WithConstants(
-            userdata, {remapping.get(key, key): value
-                       for key, value in constants.items()})
-        userdata = shown
     return smach.Remapper(userdata, state.get_registered_input_keys(),
                           state.get_registered_output_keys(), remapping)
 
@@ -88,7 +66,7 @@ class StateView:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
         self.state = None  # what no state is: made for one visit
-        if _KEEPS_KEY_SETS and _has_plain_keys(state) and not constants_of(machine, label):
+        if _KEEPS_KEY_SETS and _has_plain_keys(state):
             self.state = state
             self.input_keys, self.output_keys = state._input_keys, state._output_keys
             self.remapper = smach.Remapper(machine.userdata, self.input_keys, self.output_keys,
@@ -110,13 +88,12 @@ def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tupl
 
     They are named as the state names them; `available` are keys of the container.
     """
-    present = set(available)
+    present = set(available).union(constants_of(machine, label))
     remapping = machine._remappings.get(label) or {}
-    constants = constants_of(machine, label)
     inputs = machine._states[label].get_registered_input_keys()
     return tuple(
         sorted(key for key in inputs
-               if key not in constants and remapping.get(key, key) not in present))
+               if remapping.get(key, key) not in present))
 
 
 def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:

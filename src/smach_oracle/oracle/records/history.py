@@ -17,19 +17,20 @@ from .visits import Visit, VisitResult
 class _Streak(NamedTuple):
     """The failures of one state, one after the other, without a success in between.
 
-    `anchor`: the state that a step back leads to while it keeps failing.
+    `anchor`: the state that a step back leads to while it keeps failing; None: the initial state.
     """
 
     state: Optional[str]
     successes: int  # of that state in all, when it failed
     anchor: Optional[str]
+    anchored: bool  # whether `anchor` was looked up in this execution's chain
 
 
-_NO_STREAK = _Streak(None, 0, None)
+_NO_STREAK = _Streak(None, 0, None, False)
 
 
 class History:
-    """Visits of one execution of a container, and the latest failure of the trial.
+    """Visits of one execution of a container, and its latest failure of the trial.
 
     `visits`: the latest `length` visits, oldest first. `unconditioned`: state of the latest visit
     that has no preconditions. `succeeded`, `succeeded_other`: the latest successful state, and the
@@ -52,11 +53,12 @@ class History:
     def begin_execution(self) -> None:
         """Forget the chain.
 
-        A container may run several times in a trial; its failures of the trial still count.
+        A container may run several times in a trial; its failures of the trial still count. A state
+        that goes on failing gets a new goal for its steps back, from the new chain.
         """
         self.visits.clear()
         self.unconditioned = self.succeeded = self.succeeded_other = None
-        self._streak = self._streak._replace(anchor=None)
+        self._streak = self._streak._replace(anchor=None, anchored=False)
 
     def resize(self, length: int) -> None:
         """Keep the latest `length` visits from now on."""
@@ -82,7 +84,7 @@ class History:
                               self.succeeded_before(state, successes))
 
     def failed_last(self, state: str) -> bool:
-        """Whether the most recent failure of this trial was of `state`."""
+        """Whether this container's most recent failure of the trial was of `state`."""
         return self._streak.state == state
 
     def failing_since(self, state: str, successes: int) -> bool:
@@ -95,12 +97,12 @@ class History:
     def succeeded_before(self, state: str, successes: int) -> Optional[str]:
         """Return the other state that succeeded last before `state` began to fail.
 
-        The answer stays the same while `state` keeps failing. It is None where there is no such
-        state.
+        The answer stays the same while `state` keeps failing, whatever has succeeded since. It is
+        None where nothing had succeeded before.
 
         :param successes: number of successes of `state` in all.
         """
-        if self.failing_since(state, successes) and self._streak.anchor is not None:
+        if self.failing_since(state, successes) and self._streak.anchored:
             return self._streak.anchor
         return self._latest_other(state)
 
@@ -111,7 +113,7 @@ class History:
         """
         anchor = self.succeeded_before(state, successes)
         self._before = self._streak
-        self._streak = _Streak(state, successes, anchor)
+        self._streak = _Streak(state, successes, anchor, True)
 
     def supersede(self, outcome: str) -> None:
         """Count the latest visit as neither success nor failure: an expert did its work."""

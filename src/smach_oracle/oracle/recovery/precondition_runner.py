@@ -9,7 +9,7 @@ import smach
 
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
-from ..machine.userdata_view import view_behind
+from ..machine.userdata_view import constants_of, view_behind, write_constants
 from ..machine.write_watch import WriteWatch
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
@@ -102,6 +102,8 @@ class PreconditionRunner:
                 raise NotMet('preempted')
             self._running = state
         try:
+            if label:
+                write_constants(behind(self._gate), constants_of(self._machine, label))
             return self._with_limit(state, label)
         except NotMet:
             raise

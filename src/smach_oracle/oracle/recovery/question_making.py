@@ -6,7 +6,7 @@ import smach
 from ..asking.question import OutcomeChoice, Question, StateChoice
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import constants_of, keys_after_jump, missing_keys
+from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.state_record import StateRecord
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
@@ -65,6 +65,5 @@ def _supersede_outcomes(machine: Machine, label: str,
 def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, Any]:
     data = dict(machine.userdata._data)
     remapping = machine._remappings.get(label) or {}
-    inputs = {key: data[remapping.get(key, key)] for key in state.get_registered_input_keys()
-              if remapping.get(key, key) in data}
-    return {**inputs, **constants_of(machine, label)}
+    return {key: data[remapping.get(key, key)] for key in state.get_registered_input_keys()
+            if remapping.get(key, key) in data}
