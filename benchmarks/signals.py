@@ -28,7 +28,8 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--signals', type=int, default=40,
                         help='to processes of each kind (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1, help='of the instants (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=1,
+                        help='of the instants (default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='fail where it is as told above')
     options = parser.parse_args()
     from signalled_programs import KINDS, signal_many

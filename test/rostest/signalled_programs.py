@@ -7,6 +7,7 @@ import json
 import os
 import random
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -86,7 +87,7 @@ def _signalled(kind: str, number: int, delay_s: float, node: str) -> Ending:
         try:
             if not program.says('READY', 60.0):
                 raise RuntimeError('it did not start: ' + program.output())
-            time.sleep(delay_s)  # the instant is the point
+            time.sleep(delay_s)  # the instant itself is what is tried
             begun_s = time.monotonic()
             program.signal(number)
             code = _code(program)
@@ -111,20 +112,17 @@ def _command(kind: str, folder: str, bags: str) -> List[str]:
 
 
 def _code(program: Process) -> Optional[int]:
-    deadline = time.monotonic() + HUNG_AFTER_S
-    while time.monotonic() < deadline:
-        code = program.process.poll()
-        if code is not None:
-            return code
-        time.sleep(0.02)
-    return None
+    try:
+        return program.wait(HUNG_AFTER_S)
+    except subprocess.TimeoutExpired:
+        return None
 
 
 def _say_where(program: Process) -> None:
     """Let a process that hangs print the stacks of its threads."""
     program.signal(signal.SIGUSR1)
     program.says('most recent call first', 5.0)
-    time.sleep(0.5)  # for the rest of them
+    time.sleep(0.5)  # the rest of them comes without an end to be known
 
 
 def _broken(folder: str) -> List[str]:
