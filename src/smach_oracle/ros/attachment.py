@@ -33,6 +33,7 @@ from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
 from .interfaces.starting import OUTPUT_TOPIC
 from .introspection.introspection_server import IntrospectionServer
+from .main_thread import keep_log_from_master
 from .master_watch import start_master_watch
 from .parameters import private_flag, private_names, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
@@ -127,6 +128,7 @@ class Attachments:
         if self._node_started:
             return
         self._node_started = True
+        keep_log_from_master()
         rospy.on_shutdown(self._on_shutdown)
         start_master_watch()
         self._events = EventPublisher()
