@@ -1,0 +1,61 @@
+"""A decision as a sentence for people: one for the log, the event, the terminal and the page. Pure.
+
+"PICK failed (1 of its last 10): trying it again."
+"""
+from typing import Any, Mapping, NamedTuple, Sequence
+
+from .policy import Action
+
+
+class DecisionFacts(NamedTuple):
+    """What led to a decision, and what it is."""
+
+    state: str  # the failed one
+    learned: Mapping[str, Any]  # its failure rate, as `FailureRate.snapshot` gives it
+    rate: float  # 0 to 1
+    continuous: bool
+    action: Action
+    target: str = ''  # of a revisit or a step back
+    met: Sequence[str] = ()  # preconditions that were made to hold
+    not_met: str = ''  # the one that could not
+    spent: int = -1  # recoveries of this trial, where they are all spent; else -1
+    blocked: str = ''  # why the policy's own choice is not possible
+    asked: str = ''  # who is asked, and how long: "an expert, 300 s"
+
+
+def decision_sentence(facts: DecisionFacts) -> str:
+    """Return the sentence, without a full stop."""
+    return '{}{}: {}'.format(_failed(facts), _helped(facts), _does(facts))
+
+
+def _failed(facts: DecisionFacts) -> str:
+    if facts.spent >= 0:
+        return '{} failed again after {} of this trial'.format(
+            facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent))
+    return '{} {} ({})'.format(facts.state, 'keeps failing' if facts.continuous else 'failed',
+                               _rate(facts))
+
+
+def _rate(facts: DecisionFacts) -> str:
+    window = facts.learned.get('window')
+    if not window:
+        return 'failure rate {:.0f}%'.format(100 * facts.rate)
+    if len(window) == 1:
+        return 'its first result'
+    return '{} of its last {}'.format(sum(window), len(window))
+
+
+def _helped(facts: DecisionFacts) -> str:
+    if facts.not_met:
+        return ', and {} did not help'.format(facts.not_met)
+    if facts.met:
+        return ', and {} {}'.format(' and '.join(facts.met),
+                                    'holds' if len(facts.met) == 1 else 'hold')
+    return ''
+
+
+def _does(facts: DecisionFacts) -> str:
+    if facts.action is Action.ASK:
+        why = facts.blocked + ', so ' if facts.blocked else ''
+        return '{}asking {}'.format(why, facts.asked or 'an expert')
+    return 'trying it again' if facts.target == facts.state else 'going back to ' + facts.target

@@ -1,0 +1,36 @@
+"""Every decision is one sentence that a person understands."""
+import pytest
+
+from smach_oracle.oracle.decision.policy import Action
+from smach_oracle.oracle.decision.sentence import DecisionFacts, decision_sentence
+
+TEN = {'window': [0] * 9 + [1]}
+
+
+def facts(action, **fields):
+    return DecisionFacts('PICK', fields.pop('learned', TEN), fields.pop('rate', 0.1),
+                         fields.pop('continuous', False), action, **fields)
+
+
+@pytest.mark.parametrize('given, sentence', [
+    (facts(Action.REVISIT, target='PICK'), 'PICK failed (1 of its last 10): trying it again'),
+    (facts(Action.REVISIT, target='PICK', met=['DETECT']),
+     'PICK failed (1 of its last 10), and DETECT holds: trying it again'),
+    (facts(Action.REVISIT, target='PICK', met=['DETECT', 'door open']),
+     'PICK failed (1 of its last 10), and DETECT and door open hold: trying it again'),
+    (facts(Action.STEP_BACK, target='DETECT', continuous=True),
+     'PICK keeps failing (1 of its last 10): going back to DETECT'),
+    (facts(Action.ASK, continuous=True, not_met='DETECT', asked='an expert, 300 s'),
+     'PICK keeps failing (1 of its last 10), and DETECT did not help: asking an expert, 300 s'),
+    (facts(Action.ASK, spent=5, asked='an expert, without end'),
+     'PICK failed again after 5 recoveries of this trial: asking an expert, without end'),
+    (facts(Action.ASK, spent=1), 'PICK failed again after 1 recovery of this trial: asking an expert'),
+    (facts(Action.ASK, blocked='MOVE cannot be entered, it still runs'),
+     'PICK failed (1 of its last 10): MOVE cannot be entered, it still runs, so asking an expert'),
+    (facts(Action.REVISIT, target='PICK', learned={'window': [1]}),
+     'PICK failed (its first result): trying it again'),
+    (facts(Action.REVISIT, target='PICK', learned={}, rate=0.255),
+     'PICK failed (failure rate 26%): trying it again'),
+])
+def test_a_decision_is_told_in_a_sentence(given, sentence):
+    assert decision_sentence(given) == sentence
