@@ -32,6 +32,11 @@ class WrappedMachine(Machine, Protocol):
         """Return the id of the trial about to begin."""
 
 
+def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
+    """Return the error for who sends a machine to its meta state."""
+    return smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -130,7 +135,7 @@ class TreeNode:
             if label not in self.machine._states:
                 raise smach.InvalidStateError('{!r} is no state of {}'.format(label, self.path))
             if self.is_oracle(label):
-                raise smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
+                raise entered_by_failures_alone(label)
             record = self.records.make(label, self.settings_of(label),
                                        bool(self.in_force.deep_copy_keys))
         return record
