@@ -39,7 +39,7 @@ class Recovery:
         self._cancelled = threading.Event()
         self._reason = ''
         self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
-        self._preconditions = PreconditionRunner(node, self._watch)
+        self._preconditions = PreconditionRunner(node, record.settings, self._watch)
         self.tried: List[str] = []
         self.question_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
 
