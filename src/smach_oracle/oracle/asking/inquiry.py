@@ -5,14 +5,17 @@ from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
 import smach
 
+from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
-from .answer_rules import check_answer, choices_of
-from .question import Answer, AnswerKind, Expert, Question
+from .answer_rules import check_answer, checked_type, choices_of
+from .question import Answer, AnswerKind, Expert, Progress, Question
 
 _WATCH_PERIOD_S = 0.05  # how soon a shutdown is noticed while a question is open
 # how long past the deadline an expert is waited for before its question is taken back
 _OVERTIME_S = 2.0
+# how long an expert's port is waited for once its question has been taken back
+_PATIENCE_S = 1.0
 _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
 
 
@@ -130,10 +133,11 @@ class Inquiry:
     def _answer_to(self, question: Question) -> Optional[Answer]:
         """Return the answer to one question, None where it did not fit."""
         try:
-            answer = self._guarded(
-                lambda: self._expert.ask(question, self._cancelled, self._progress))
-            if answer is None:
+            given = self._guarded(
+                lambda progress: self._expert.ask(question, self._cancelled, progress))
+            if given is None:
                 raise _NoAnswer('no answer by the deadline')
+            answer = checked_type(given)
             self._check(answer, question)
             self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(),
                        target=answer.named(), by=answer.by, text=answer.why)
@@ -147,15 +151,38 @@ class Inquiry:
     def _check(self, answer: Answer, question: Question) -> None:
         check_answer(answer, choices_of(question)._replace(states=self._asker.states_now()))
 
-    def _guarded(self, call: Callable[[], Optional[Answer]]) -> Optional[Answer]:
-        """Call the expert's port; what it raises beside AnswerError is its fault and no answer."""
+    def _guarded(self, call: Callable[[Progress], object]) -> Optional[object]:
+        """Call the expert's port in a thread that can be left behind.
+
+        What it raises beside AnswerError is its fault and no answer. What it tells or returns too
+        late is dropped.
+        """
+        def progress(what: str, by: str, text: str) -> None:
+            if not port.left:
+                self._progress(what, by, text)
+
+        port = BackgroundCall(lambda: call(progress), 'smach_oracle expert')
+        port.start()
         try:
-            return call()
-        except AnswerError:
+            self._wait_for(port)
+        except BaseException:  # Ctrl-C in the machine's thread
+            self._cancelled.set()
+            port.leave()
             raise
-        except Exception as err:
-            self._asker.warn('the expert\'s port failed: {!r}'.format(err))
-            raise _NoAnswer('the expert\'s port failed') from err
+        if not isinstance(port.error, Exception) or isinstance(port.error, AnswerError):
+            if port.error is not None:
+                raise port.error
+            return port.result
+        self._asker.warn('the expert\'s port failed: {!r}'.format(port.error))
+        raise _NoAnswer('the expert\'s port failed') from port.error
+
+    def _wait_for(self, port: BackgroundCall) -> None:
+        """Wait for the expert's port, and not long once its question has been taken back."""
+        while not port.done.wait(_WATCH_PERIOD_S):
+            if self._cancelled.is_set() and not port.done.wait(_PATIENCE_S) and port.leave():
+                self._asker.warn('the expert\'s port goes on although its question was taken back; '
+                                 'it is left behind')
+                raise _NoAnswer('no answer by the deadline')
 
     def _try_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         try:
@@ -168,11 +195,12 @@ class Inquiry:
     def _run_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         offer = next(offer for offer in question.interfaces if offer.name == answer.interface)
         self._emit(EventKind.INTERFACE_START, target=offer.name, by=answer.by)
-        outcome = ''
+        outcome, done = '', None
         try:
-            done = self._guarded(lambda: self._expert.run_interface(
-                offer, question, self._cancelled, self._progress))
-            if done is not None:
+            given = self._guarded(lambda progress: self._expert.run_interface(
+                offer, question, self._cancelled, progress))
+            if given is not None:
+                done = checked_type(given)
                 self._check_done(done, question)
                 outcome = done.outcome
         finally:
