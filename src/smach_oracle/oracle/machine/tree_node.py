@@ -1,6 +1,6 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 import copy
-from typing import Any, Dict, Iterator, Mapping, Optional, Protocol
+from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Tuple
 
 import smach
 
@@ -10,6 +10,7 @@ from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
+from .limited_run import LimitedRun, runs_of_thread
 from .protocols import Labels, Machine
 from .snapshots import take_snapshot
 from .tree import Tree
@@ -59,6 +60,7 @@ class TreeNode:
         self.engine = EngineProbe()
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
+        self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
         self.join(tree)
 
     def join(self, tree: Tree) -> None:
@@ -97,6 +99,22 @@ class TreeNode:
                 return True
             above = above.parent
         return False
+
+    def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
+        """Return the executions with a time limit inside which this container executes.
+
+        Those of its thread, and, as a Concurrence has threads of its own, those of the states
+        above it.
+        """
+        found = list(runs_of_thread())
+        under_way = self.tree.workers.under_way
+        node = self
+        while under_way and node.parent is not None:
+            run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
+            if run is not None and run not in found:
+                found.append(run)
+            node = node.parent
+        return tuple(found)
 
     # -- settings and states
 
@@ -167,6 +185,7 @@ class TreeNode:
         """Forget what belongs to one execution of the container."""
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
+        self.runs_around = self._find_runs_around()
         self.records.history.begin_execution()
         self.preempt_told = False
         self.engine.begin_execution()

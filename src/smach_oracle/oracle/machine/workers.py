@@ -13,6 +13,7 @@ from typing import Any, Callable, Dict, NamedTuple, Optional
 import smach
 
 from ..background import BackgroundCall
+from .limited_run import LimitedRun, enter
 from .userdata_gate import UserdataGate
 
 _STOP_PERIOD_S = 0.05  # how soon a function that runs is left behind at a preempt or a shutdown
@@ -38,11 +39,13 @@ class _Left(NamedTuple):
 
 
 class Workers:
-    """The abandoned threads of one tree of containers, by the state or function that they run."""
+    """Threads of one tree of containers, by the id of the state or function that they run."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.abandoned: Dict[int, _Left] = {}
+        # states with a time limit whose thread lives
+        self.under_way: Dict[int, LimitedRun] = {}
 
     def blocked(self, target: object) -> str:
         """Return why a state or a function cannot be entered now, '' where it can."""
@@ -59,16 +62,30 @@ class Workers:
             limit_s: float, grace_s: float) -> LimitedResult:
         """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
 
+        The limit stands still while a person is asked about something inside the state.
         `gate` is what `userdata` writes through. What the state raises is told in the result, not
         raised.
         """
-        call = BackgroundCall(functools.partial(state.execute, userdata),
+        run = LimitedRun()
+        call = BackgroundCall(functools.partial(_execute_inside, run, state, userdata),
                               'smach_oracle worker of {}'.format(label),
-                              functools.partial(recall_preempts, state))
-        call.start()
+                              functools.partial(self._ended_late, state))
+        self.under_way[id(state)] = run
         try:
-            if wait(call.done, limit_s):
-                return LimitedResult(call.result, call.error)
+            call.start()
+            return self._run_within(run, state, call, gate, limit_s, grace_s)
+        finally:
+            if not call.left:
+                self.under_way.pop(id(state), None)
+
+    def _run_within(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
+                    gate: UserdataGate, limit_s: float, grace_s: float) -> LimitedResult:
+        try:
+            left_s = limit_s
+            while left_s:
+                if wait(call.done, left_s):
+                    return LimitedResult(call.result, call.error)
+                left_s = run.take_stood_s()
         except BaseException:
             # Ctrl-C in the machine's thread: nothing the state does from now on counts
             self._leave_state(state, call, gate, 0.0)
@@ -79,6 +96,10 @@ class Workers:
             return LimitedResult(overrun=what + 'ended when it was preempted')
         return LimitedResult(overrun=what +
                              'was abandoned {:g} s after it was preempted'.format(grace_s))
+
+    def _ended_late(self, state: smach.State) -> None:
+        self.under_way.pop(id(state), None)
+        recall_preempts(state)
 
     def call(self, function: Callable[[smach.UserData], object], userdata: smach.UserData,
              gate: UserdataGate, limit_s: Optional[float],
@@ -135,6 +156,11 @@ class Workers:
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__init__()  # type: ignore[misc]
+
+
+def _execute_inside(run: LimitedRun, state: smach.State, userdata: smach.Remapper) -> object:
+    enter(run)
+    return state.execute(userdata)
 
 
 def wait(event: threading.Event, seconds: float) -> bool:

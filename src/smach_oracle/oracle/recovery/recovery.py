@@ -9,6 +9,7 @@ from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
 from ..machine.failure import ContainerEnding, Failure, natural_ending
+from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
@@ -137,7 +138,8 @@ class Recovery:
         return self._ask_expert(expert)
 
     def _ask_expert(self, expert: Expert) -> Verdict:
-        reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
+        with standing_still(self._node.runs_around):
+            reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
         if self.stopped():
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,

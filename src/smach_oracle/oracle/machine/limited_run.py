@@ -1,0 +1,79 @@
+"""Executions of states with a time limit, as the machines see them that run inside."""
+import contextlib
+import contextvars
+import threading
+from time import monotonic
+from typing import Any, Iterable, Iterator, Tuple
+
+# asked for again at once, where it cannot have been long
+_LEAST_S = 0.01
+
+
+class LimitedRun:
+    """One execution of a state with a time limit.
+
+    Its time stands still while a person is asked about something inside. Safe to use from several
+    threads.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._questions = 0  # open now
+        self._since_s = 0.0
+        self._stood_s = 0.0
+
+    @contextlib.contextmanager
+    def stands_still(self) -> Iterator[None]:
+        """Let its time stand still; several may do so at once."""
+        with self._lock:
+            self._note()
+            self._questions += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._note()
+                self._questions -= 1
+
+    def take_stood_s(self) -> float:
+        """Return for how many seconds its time has stood still since this was last asked.
+
+        It is 0.0 where it has not, and never while it stands.
+        """
+        with self._lock:
+            self._note()
+            stood_s, self._stood_s = self._stood_s, 0.0
+            return max(stood_s, _LEAST_S) if self._questions else stood_s
+
+    def _note(self) -> None:
+        now_s = monotonic()
+        if self._questions:
+            self._stood_s += now_s - self._since_s
+        self._since_s = now_s
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """An execution does not travel with a copied or pickled machine."""
+        return LimitedRun, ()
+
+
+_AROUND: 'contextvars.ContextVar[Tuple[LimitedRun, ...]]' = contextvars.ContextVar(
+    'smach_oracle_limited_runs', default=())
+
+
+def runs_of_thread() -> Tuple[LimitedRun, ...]:
+    """Return the executions inside which this thread runs, the innermost last."""
+    return _AROUND.get()
+
+
+def enter(run: LimitedRun) -> None:
+    """Be inside `run` from now on; to be called in a context of its own."""
+    _AROUND.set(_AROUND.get() + (run,))
+
+
+@contextlib.contextmanager
+def standing_still(runs: Iterable[LimitedRun]) -> Iterator[None]:
+    """Let the time of several executions stand still."""
+    with contextlib.ExitStack() as stack:
+        for run in runs:
+            stack.enter_context(run.stands_still())
+        yield
