@@ -274,8 +274,8 @@ class OracleContainer(smach.StateMachine):
         label: str = self._current_label  # type: ignore[assignment]
         record = node.records.by_label.get(label) or node.record(label)
         engine = node.engine
-        if self._preempt_requested or engine.attentive:
-            before_step(node)
+        if (self._preempt_requested or engine.attentive) and before_step(node):
+            return None
         state: smach.State = self._current_state  # type: ignore[assignment]
         userdata = self.userdata
         view = record.view

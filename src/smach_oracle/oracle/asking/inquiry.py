@@ -3,8 +3,6 @@ import threading
 import time
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
-import smach
-
 from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
@@ -26,7 +24,7 @@ class Asker(Protocol):
     question_cancelled: threading.Event  # the question is to be taken back
 
     def stopped(self) -> bool:
-        """Whether a preempt or a shutdown ends the recovery."""
+        """Whether something ends the recovery, such as a preempt or a shutdown."""
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
@@ -53,9 +51,10 @@ class Reply(NamedTuple):
 
 
 class _StopWatch:
-    """Sets `cancelled` at a shutdown, and when an expert is long overdue."""
+    """Sets `cancelled` when the asker stops, and when an expert is long overdue."""
 
-    def __init__(self, cancelled: threading.Event, end: Optional[float]) -> None:
+    def __init__(self, asker: Asker, cancelled: threading.Event, end: Optional[float]) -> None:
+        self._asker = asker
         self._cancelled = cancelled
         self._latest = None if end is None else end + _OVERTIME_S
         self._over = threading.Event()
@@ -72,7 +71,7 @@ class _StopWatch:
     def _watch(self) -> None:
         while not self._over.wait(_WATCH_PERIOD_S):
             late = self._latest is not None and time.monotonic() > self._latest
-            if smach.is_shutdown() or late:
+            if self._asker.stopped() or late:
                 self._cancelled.set()
                 return
 
@@ -96,7 +95,7 @@ class Inquiry:
     def run(self) -> Reply:
         """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
-            with _StopWatch(self._cancelled, self._end):
+            with _StopWatch(self._asker, self._cancelled, self._end):
                 return Reply(self._ask_until_it_fits(), self._question_id)
         except _NoAnswer as why:
             return Reply(None, self._question_id, str(why))

@@ -3,7 +3,9 @@ import contextlib
 import contextvars
 import threading
 from time import monotonic
-from typing import Any, Iterable, Iterator, Tuple
+from typing import Any, Iterable, Iterator, Set, Tuple
+
+from .engine_probe import EngineProbe
 
 # asked for again at once, where it cannot have been long
 _LEAST_S = 0.01
@@ -12,15 +14,30 @@ _LEAST_S = 0.01
 class LimitedRun:
     """One execution of a state with a time limit.
 
-    Its time stands still while a person is asked about something inside. Safe to use from several
-    threads.
+    Its time stands still while a person is asked about something inside. Once it is abandoned, the
+    machines inside stop at their next state boundary. Safe to use from several threads.
     """
 
     def __init__(self) -> None:
+        self.abandoned = False
+        self._inside: Set[EngineProbe] = set()
         self._lock = threading.Lock()
         self._questions = 0  # open now
         self._since_s = 0.0
         self._stood_s = 0.0
+
+    def hold(self, engine: EngineProbe) -> None:
+        """Be told of a machine that executes inside: it looks closely once this is abandoned."""
+        with self._lock:
+            self._inside.add(engine)
+            engine.attentive = engine.attentive or self.abandoned
+
+    def abandon(self) -> None:
+        """Let the machines inside look whether they are to stop."""
+        with self._lock:
+            self.abandoned = True
+            for engine in self._inside:
+                engine.attentive = True
 
     @contextlib.contextmanager
     def stands_still(self) -> Iterator[None]:

@@ -100,6 +100,17 @@ class TreeNode:
             above = above.parent
         return False
 
+    def is_left_behind(self) -> bool:
+        """Whether this container executes inside a state that was abandoned."""
+        return any(run.abandoned for run in self.runs_around)
+
+    def look_around(self) -> bool:
+        """Find out inside which executions this one is about to begin; whether it still may."""
+        self.runs_around = self._find_runs_around()
+        for run in self.runs_around:
+            run.hold(self.engine)
+        return not self.is_left_behind()
+
     def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
         """Return the executions with a time limit inside which this container executes.
 
@@ -162,8 +173,8 @@ class TreeNode:
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""
-        if self.events.observers and self.trial_id == self.tree.trial_id:
-            self.events.emit(kind, self.path, **fields)
+        if self.events.observers:
+            self.events.emit(kind, self.path, self.trial_id, **fields)
 
     def warn(self, text: str, label: str = '') -> None:
         """Log what the operator should know, and tell the observers."""
@@ -185,7 +196,6 @@ class TreeNode:
         """Forget what belongs to one execution of the container."""
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
-        self.runs_around = self._find_runs_around()
         self.records.history.begin_execution()
         self.preempt_told = False
         self.engine.begin_execution()

@@ -8,7 +8,7 @@ import functools
 import math
 import threading
 import time
-from typing import Any, Callable, Dict, NamedTuple, Optional
+from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
 import smach
 
@@ -88,9 +88,9 @@ class Workers:
                 left_s = run.take_stood_s()
         except BaseException:
             # Ctrl-C in the machine's thread: nothing the state does from now on counts
-            self._leave_state(state, call, gate, 0.0)
+            self._leave_state(run, state, call, gate, 0.0)
             raise
-        ended = self._leave_state(state, call, gate, grace_s)
+        ended = self._leave_state(run, state, call, gate, grace_s)
         what = 'overran its time limit of {:g} s and '.format(limit_s)
         if ended:
             return LimitedResult(overrun=what + 'ended when it was preempted')
@@ -125,8 +125,8 @@ class Workers:
             raise
         return LimitedResult(call.result, call.error)
 
-    def _leave_state(self, state: smach.State, call: BackgroundCall, gate: UserdataGate,
-                     grace_s: float) -> bool:
+    def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
+                     gate: UserdataGate, grace_s: float) -> bool:
         """Preempt a state and abandon it after its grace period; False where that was needed."""
         gate.shut()
         try:
@@ -137,7 +137,10 @@ class Workers:
             wait(call.done, grace_s)
         finally:
             abandoned = self._abandon(state, call, gate, _LATE)
-            if not abandoned:
+            if abandoned:
+                run.abandon()
+                _stop_bare_machines(state)
+            else:
                 recall_preempts(state)
         return not abandoned
 
@@ -172,12 +175,27 @@ def wait(event: threading.Event, seconds: float) -> bool:
     return True
 
 
+def _stop_bare_machines(state: smach.State) -> None:
+    """Let machines without an oracle end at their next state boundary, as both engines do then."""
+    try:
+        if isinstance(state, smach.StateMachine) and not hasattr(state, '_oracle'):
+            state._is_running = False
+        for child in _children(state):
+            _stop_bare_machines(child)
+    except Exception as err:  # a user's container may be of any make
+        smach.logwarn('Could not stop what is left of {!r}: {!r}'.format(state, err))
+
+
+def _children(state: smach.State) -> List[smach.State]:
+    get_children = getattr(state, 'get_children', None)
+    return list(get_children().values()) if callable(get_children) else []
+
+
 def recall_preempts(state: smach.State) -> None:
     """Take a preempt request back from a state that has ended, and from all that it contains."""
     try:
         state.recall_preempt()
-        get_children = getattr(state, 'get_children', None)
-        for child in (get_children() if callable(get_children) else {}).values():
+        for child in _children(state):
             recall_preempts(child)
     except Exception as err:  # a user's container may be of any make
         smach.logwarn('Could not take a preempt request back from {!r}: {!r}'.format(state, err))

@@ -96,7 +96,7 @@ class PreconditionRunner:
             raise NotMet('{} returned {!r}'.format(spec.name, result))
 
     def _stopped(self) -> bool:
-        return self._cancelled or smach.is_shutdown()
+        return self._cancelled or smach.is_shutdown() or self._node.is_left_behind()
 
     def _check_free(self, target: object) -> None:
         """Check that a state or a function may be entered now.

@@ -51,8 +51,8 @@ class Recovery:
         self._preconditions.cancel()
 
     def stopped(self) -> bool:
-        """Whether a preempt or a shutdown ends the recovery."""
-        return self._cancelled.is_set() or smach.is_shutdown()
+        """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
+        return self._cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
 
     def run(self) -> Verdict:
         """Decide, and ask where the policy says so."""
