@@ -2,7 +2,8 @@
 
 From the top down, each package above all that follow it: `container`, the public face; `execution`,
 `recovery`, `machine`, `asking`, `records`, `settings`, `decision`. Pure are `decision`, `settings`,
-all of `records` but the rates file, the question of `asking`, `errors` and `number_checks`.
+all of `records` but the rates file, the question of `asking`, `errors`, `background` and
+`number_checks`.
 `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
 """
 from typing import TYPE_CHECKING

@@ -17,7 +17,7 @@ from .machine.nesting import nodes_of
 from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
-from .machine.tree_node import TreeNode
+from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
@@ -185,6 +185,19 @@ class OracleContainer(smach.StateMachine):
             edges += [(EDGE_TO_ORACLE, label, meta) for label in self._oracle.labels()]
         return edges
 
+    def set_initial_state(self, initial_states: Sequence[str],
+                          userdata: Optional[smach.UserData] = None) -> None:
+        """Begin at this label (one, in a list) from now on, with these keys added to the userdata.
+
+        :raises InvalidStateError: for ORACLE, which failures alone enter; nothing is changed then.
+        """
+        labels = [initial_states] if isinstance(initial_states, str) else initial_states
+        for label in labels:
+            if self._oracle.is_oracle(label):
+                raise entered_by_failures_alone(label)
+        more = () if userdata is None else (userdata,)
+        super().set_initial_state(initial_states, *more)
+
     def check_consistency(self) -> None:
         """Raise what a StateMachine raises for an inconsistent machine.
 
@@ -258,8 +271,8 @@ class OracleContainer(smach.StateMachine):
         label: str = self._current_label  # type: ignore[assignment]
         record = node.records.by_label.get(label) or node.record(label)
         engine = node.engine
-        if self._preempt_requested or engine.attentive:
-            before_step(node)
+        if (self._preempt_requested or engine.attentive) and before_step(node):
+            return None
         state: smach.State = self._current_state  # type: ignore[assignment]
         userdata = self.userdata
         view = record.view

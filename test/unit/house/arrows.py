@@ -37,7 +37,7 @@ Layer = Union[str, Set[str]]
 LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
         'container', 'question', 'execution', 'recovery', 'machine', 'asking', 'records',
-        'settings', 'decision', 'number_checks', 'errors'
+        'settings', 'decision', 'number_checks', 'background', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers'},

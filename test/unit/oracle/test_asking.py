@@ -20,6 +20,7 @@ from machines import (
 )
 
 import smach
+import smach_oracle.oracle.asking.inquiry as inquiry
 from smach_oracle.oracle.errors import AnswerError, InterfaceError
 from smach_oracle.oracle.records.events import EventKind
 
@@ -188,8 +189,7 @@ def test_falling_back_to_a_state_has_an_end_when_nobody_ever_answers():
 
 
 def test_an_expert_who_sleeps_past_the_deadline_is_taken_the_question_from(monkeypatch):
-    import smach_oracle.oracle.asking.inquiry as asking_module
-    monkeypatch.setattr(asking_module, '_OVERTIME_S', 0.1)
+    monkeypatch.setattr(inquiry, '_OVERTIME_S', 0.1)
     machine, _ = asking(waits, deadline_s=0.1)
     begin = time.monotonic()
     assert machine.run() == 'aborted'

@@ -1,4 +1,7 @@
 """The four kinds of precondition, and that they run on failure alone."""
+import contextvars
+import threading
+
 import pytest
 from machines import Gate, Scripted, Watched, chain_of, in_thread
 
@@ -154,6 +157,128 @@ def test_a_labelled_state_keeps_its_time_limit():
     assert machine.run() == 'done'
     assert ends(machine) == [('CLEAR', 'not met')]
     assert 'time limit' in machine.of(EventKind.PRECONDITION_END)[0].text
+
+
+class Hanging:
+    """A function that does not come back until let go, and writes then."""
+
+    __name__ = 'hanging'
+
+    def __init__(self):
+        self.entered = threading.Event()
+        self.let_go = threading.Event()
+        self.left = threading.Event()
+        self.calls = 0
+
+    def __call__(self, ud):
+        self.calls += 1
+        self.entered.set()
+        assert self.let_go.wait(20)
+        ud.late = 'too late'
+        self.left.set()
+        return True
+
+    def leave(self):
+        """Let it end, and wait for it."""
+        self.let_go.set()
+        assert self.left.wait(20)
+
+
+BRIEF = {'states': {'B': {'time_limit_s': 0.1, 'grace_period_s': 0.1}}}
+
+
+def test_a_function_has_the_time_limit_of_the_state_whose_precondition_it_is():
+    hanging = Hanging()
+    machine = machine_with(hanging, **BRIEF)
+    assert in_thread(machine.run).result() == 'done'
+    assert ends(machine) == [('hanging', 'not met')]
+    assert 'overran its time limit of 0.1 s' in machine.of(EventKind.PRECONDITION_END)[0].text
+    hanging.leave()
+    assert 'late' not in machine.machine.userdata
+
+
+def test_a_function_that_still_runs_is_not_called_again():
+    hanging = Hanging()
+    machine = machine_with(hanging, b=Scripted('aborted', 'aborted'), **BRIEF)
+    assert in_thread(machine.run).result() == 'done'
+    assert hanging.calls == 1
+    assert 'still runs' in machine.of(EventKind.PRECONDITION_END)[1].text
+    hanging.leave()
+
+
+@pytest.mark.parametrize('settings', [{}, {'time_limit_s': 1000.0}])
+def test_a_function_that_does_not_come_back_does_not_outlast_a_preempt(settings):
+    hanging = Hanging()
+    machine = machine_with(hanging, **settings)
+    run = in_thread(machine.run)
+    assert hanging.entered.wait(10)
+    machine.machine.request_preempt()
+    assert run.result() == 'preempted'
+    assert not machine.of(EventKind.DECISION)
+    hanging.leave()
+    assert 'late' not in machine.machine.userdata
+
+
+def test_a_function_that_does_not_come_back_does_not_outlast_a_shutdown(monkeypatch):
+    hanging = Hanging()
+    machine = machine_with(hanging)
+    run = in_thread(machine.run)
+    assert hanging.entered.wait(10)
+    monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
+    assert run.result() == 'preempted'
+    hanging.leave()
+
+
+@pytest.mark.parametrize('stop', [KeyboardInterrupt, SystemExit])
+def test_what_ends_a_program_passes_through_a_function(stop):
+    def stops(ud):
+        raise stop()
+    machine = machine_with(stops)
+    with pytest.raises(stop):
+        machine.run()
+    assert machine.machine.is_running() is False
+
+
+def test_a_function_is_called_with_the_context_of_the_machine():
+    variable = contextvars.ContextVar('v', default='unset')
+    variable.set('set')
+    machine = machine_with(lambda ud: variable.get() == 'set')
+    machine.run()
+    assert ends(machine)[0][1] == 'met'
+
+
+def test_a_state_has_the_time_limit_of_the_state_whose_precondition_it_is():
+    gate = Gate()
+    machine = machine_with(Scripted(gate), **BRIEF)
+    assert in_thread(machine.run).result() == 'done'
+    assert ends(machine) == [('Scripted', 'not met')]
+    assert 'overran its time limit of 0.1 s' in machine.of(EventKind.PRECONDITION_END)[0].text
+
+
+def test_a_state_that_ignores_the_end_of_its_time_is_left_behind():
+    entered, let_go, left = threading.Event(), threading.Event(), threading.Event()
+
+    def stubborn(state, ud):
+        entered.set()
+        assert let_go.wait(20)
+        ud.late = 'too late'
+        left.set()
+        return 'ok'
+    machine = machine_with(Scripted(stubborn, output_keys=['late']), **BRIEF)
+    assert in_thread(machine.run).result() == 'done'
+    assert 'abandoned' in machine.of(EventKind.PRECONDITION_END)[0].text
+    let_go.set()
+    assert left.wait(20)
+    assert 'late' not in machine.machine.userdata
+
+
+def test_each_half_of_a_pair_has_the_limit():
+    hanging, gate = Hanging(), Gate()
+    machine = machine_with((hanging, Scripted(gate)), **BRIEF)
+    assert in_thread(machine.run).result() == 'done'
+    assert gate.entered.is_set(), 'a check that does not come back does not hold'
+    assert ends(machine) == [('hanging or Scripted', 'not met')]
+    hanging.leave()
 
 
 def test_a_state_added_with_preconditions_has_them():

@@ -40,6 +40,10 @@ class Clock:
         """Let the next so many waits (a limit, then a grace period) be over once `once` is set."""
         self._over += [once] * waits
 
+    def all_over(self):
+        """Whether every wait that was to end has ended."""
+        return not self._over
+
     def wait(self, event, seconds):
         """In place of `worker.wait`."""
         ended = wait_for(lambda: event.is_set() or self._over and self._over[0].is_set())

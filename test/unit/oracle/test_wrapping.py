@@ -175,12 +175,23 @@ def test_a_state_named_as_an_outcome_of_the_container_is_a_state():
     assert sorted(from_oracle) == ['A', 'aborted', 'done', 'preempted']
 
 
-def test_the_oracle_cannot_be_where_a_machine_begins():
-    machine = watched(Scripted()).machine
-    machine.set_initial_state(['ORACLE'])
+@pytest.mark.parametrize('initial', [['ORACLE'], 'ORACLE', ['B', 'ORACLE']])
+def test_the_oracle_is_refused_as_where_a_machine_begins(initial):
+    machine = watched(Scripted(), Scripted()).machine
+    given = smach.UserData()
+    given.x = 1
     with pytest.raises(smach.InvalidStateError, match='ORACLE'):
-        machine.execute()
-    assert machine.is_running() is False
+        machine.set_initial_state(initial, given)
+    assert machine.get_initial_states() == ['A']
+    assert 'x' not in machine.userdata
+    assert machine.execute() == 'done'
+
+
+def test_a_machine_may_begin_at_any_other_state():
+    machine = watched(Scripted(), Scripted())
+    machine.machine.set_initial_state(['B'])
+    assert machine.run() == 'done'
+    assert machine.visits() == ['B']
 
 
 def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state():

@@ -69,6 +69,38 @@ def choices_of(question: AskedQuestion) -> AnswerChoices:
                          question.output_keys)
 
 
+def checked_type(given: object) -> Answer:
+    """Return what an expert's port has given, where it is an answer and its fields can be read.
+
+    :raises AnswerError: where it is not; the text says which type is wrong.
+    """
+    if not isinstance(given, Answer):
+        raise AnswerError('it is {}, not an Answer'.format(_type_of(given)))
+    if not isinstance(given.kind, AnswerKind):
+        raise AnswerError('kind is {}, not an AnswerKind'.format(_type_of(given.kind)))
+    for name in ('state', 'outcome', 'interface'):
+        if not _is_hashable(getattr(given, name)):
+            raise AnswerError('{} is {}, not a name'.format(name, _type_of(getattr(given, name))))
+    for name in ('by', 'why'):
+        if not isinstance(getattr(given, name), str):
+            raise AnswerError('{} is {}, not text'.format(name, _type_of(getattr(given, name))))
+    if given.outputs is not None and not isinstance(given.outputs, Mapping):
+        raise AnswerError('outputs is {}, not a mapping'.format(_type_of(given.outputs)))
+    return given
+
+
+def _type_of(value: object) -> str:
+    return 'of type ' + type(value).__name__
+
+
+def _is_hashable(value: object) -> bool:
+    try:
+        hash(value)
+    except TypeError:
+        return False
+    return True
+
+
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
     """Check an answer and the keys of its outputs.
 

@@ -3,16 +3,17 @@ import threading
 import time
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
-import smach
-
+from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
-from .answer_rules import check_answer, choices_of
-from .question import Answer, AnswerKind, Expert, Question
+from .answer_rules import check_answer, checked_type, choices_of
+from .question import Answer, AnswerKind, Expert, Progress, Question
 
 _WATCH_PERIOD_S = 0.05  # how soon a shutdown is noticed while a question is open
 # how long past the deadline an expert is waited for before its question is taken back
 _OVERTIME_S = 2.0
+# how long an expert's port is waited for once its question has been taken back
+_PATIENCE_S = 1.0
 _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
 
 
@@ -23,7 +24,7 @@ class Asker(Protocol):
     question_cancelled: threading.Event  # the question is to be taken back
 
     def stopped(self) -> bool:
-        """Whether a preempt or a shutdown ends the recovery."""
+        """Whether something ends the recovery, such as a preempt or a shutdown."""
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
@@ -50,9 +51,10 @@ class Reply(NamedTuple):
 
 
 class _StopWatch:
-    """Sets `cancelled` at a shutdown, and when an expert is long overdue."""
+    """Sets `cancelled` when the asker stops, and when an expert is long overdue."""
 
-    def __init__(self, cancelled: threading.Event, end: Optional[float]) -> None:
+    def __init__(self, asker: Asker, cancelled: threading.Event, end: Optional[float]) -> None:
+        self._asker = asker
         self._cancelled = cancelled
         self._latest = None if end is None else end + _OVERTIME_S
         self._over = threading.Event()
@@ -69,7 +71,7 @@ class _StopWatch:
     def _watch(self) -> None:
         while not self._over.wait(_WATCH_PERIOD_S):
             late = self._latest is not None and time.monotonic() > self._latest
-            if smach.is_shutdown() or late:
+            if self._asker.stopped() or late:
                 self._cancelled.set()
                 return
 
@@ -93,7 +95,7 @@ class Inquiry:
     def run(self) -> Reply:
         """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
-            with _StopWatch(self._cancelled, self._end):
+            with _StopWatch(self._asker, self._cancelled, self._end):
                 return Reply(self._ask_until_it_fits(), self._question_id)
         except _NoAnswer as why:
             return Reply(None, self._question_id, str(why))
@@ -130,10 +132,11 @@ class Inquiry:
     def _answer_to(self, question: Question) -> Optional[Answer]:
         """Return the answer to one question, None where it did not fit."""
         try:
-            answer = self._guarded(
-                lambda: self._expert.ask(question, self._cancelled, self._progress))
-            if answer is None:
+            given = self._guarded(
+                lambda progress: self._expert.ask(question, self._cancelled, progress))
+            if given is None:
                 raise _NoAnswer('no answer by the deadline')
+            answer = checked_type(given)
             self._check(answer, question)
             self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(),
                        target=answer.named(), by=answer.by, text=answer.why)
@@ -147,15 +150,38 @@ class Inquiry:
     def _check(self, answer: Answer, question: Question) -> None:
         check_answer(answer, choices_of(question)._replace(states=self._asker.states_now()))
 
-    def _guarded(self, call: Callable[[], Optional[Answer]]) -> Optional[Answer]:
-        """Call the expert's port; what it raises beside AnswerError is its fault and no answer."""
+    def _guarded(self, call: Callable[[Progress], object]) -> Optional[object]:
+        """Call the expert's port in a thread that can be left behind.
+
+        What it raises beside AnswerError is its fault and no answer. What it tells or returns too
+        late is dropped.
+        """
+        def progress(what: str, by: str, text: str) -> None:
+            if not port.left:
+                self._progress(what, by, text)
+
+        port = BackgroundCall(lambda: call(progress), 'smach_oracle expert')
+        port.start()
         try:
-            return call()
-        except AnswerError:
+            self._wait_for(port)
+        except BaseException:  # Ctrl-C in the machine's thread
+            self._cancelled.set()
+            port.leave()
             raise
-        except Exception as err:
-            self._asker.warn('the expert\'s port failed: {!r}'.format(err))
-            raise _NoAnswer('the expert\'s port failed') from err
+        if not isinstance(port.error, Exception) or isinstance(port.error, AnswerError):
+            if port.error is not None:
+                raise port.error
+            return port.result
+        self._asker.warn('the expert\'s port failed: {!r}'.format(port.error))
+        raise _NoAnswer('the expert\'s port failed') from port.error
+
+    def _wait_for(self, port: BackgroundCall) -> None:
+        """Wait for the expert's port, and not long once its question has been taken back."""
+        while not port.done.wait(_WATCH_PERIOD_S):
+            if self._cancelled.is_set() and not port.done.wait(_PATIENCE_S) and port.leave():
+                self._asker.warn('the expert\'s port goes on although its question was taken back; '
+                                 'it is left behind')
+                raise _NoAnswer('no answer by the deadline')
 
     def _try_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         try:
@@ -168,11 +194,12 @@ class Inquiry:
     def _run_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         offer = next(offer for offer in question.interfaces if offer.name == answer.interface)
         self._emit(EventKind.INTERFACE_START, target=offer.name, by=answer.by)
-        outcome = ''
+        outcome, done = '', None
         try:
-            done = self._guarded(lambda: self._expert.run_interface(
-                offer, question, self._cancelled, self._progress))
-            if done is not None:
+            given = self._guarded(lambda progress: self._expert.run_interface(
+                offer, question, self._cancelled, progress))
+            if given is not None:
+                done = checked_type(given)
                 self._check_done(done, question)
                 outcome = done.outcome
         finally:

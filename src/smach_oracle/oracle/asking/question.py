@@ -130,9 +130,11 @@ class Expert:
             progress: Progress) -> Optional[Answer]:
         """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
 
-        Must return soon (tens of milliseconds) after `cancelled` is set. An INTERFACE answer is
-        handed back as it is; `run_interface` is then called. Deadlines are monotonic wall time. May
-        raise AnswerError for an answer that cannot be used; the question is then put again.
+        It is called in a thread of its own. Must return soon (tens of milliseconds) after
+        `cancelled` is set; a second after, it is left behind, and what it returns is dropped. An
+        INTERFACE answer is handed back as it is; `run_interface` is then called. Deadlines are
+        monotonic wall time. May raise AnswerError for an answer that cannot be used; the question
+        is then put again.
         """
         raise NotImplementedError
 
@@ -140,7 +142,8 @@ class Expert:
                       progress: Progress) -> Optional[Answer]:
         """Run a shared-autonomy interface.
 
-        It returns a SUPERSEDE answer, or None where the interface failed or was cancelled.
+        It is called, and left behind, as `ask` is. It returns a SUPERSEDE answer, or None where the
+        interface failed or was cancelled.
 
         May raise InterfaceError, which says to the expert why the interface cannot be used.
         """

@@ -23,15 +23,30 @@ from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 
 
-def before_step(node: TreeNode) -> None:
+def before_step(node: TreeNode) -> bool:
     """Before the first state of an execution, and before any state under a preempt request.
 
     Under a request the state is preempted too, unless the last one has serviced the request.
+
+    :returns: whether the machine has to stop here, since the state around it was abandoned.
     """
     if not node.engine.stepped:
         node.begin_stepping()
-    if not node.machine.preempt_requested():
-        return
+    if node.is_left_behind():
+        stop_left_behind(node)
+        return True
+    if node.machine.preempt_requested():
+        _heed_preempt(node)
+    return False
+
+
+def stop_left_behind(node: TreeNode) -> None:
+    """End the execution without an outcome; nobody waits for one."""
+    smach.logwarn('{}: stops, as the state around it was abandoned'.format(node.path))
+    node.machine._is_running = False
+
+
+def _heed_preempt(node: TreeNode) -> None:
     if node.engine.lock_is_held:
         _pass_preempt_on(node)
     else:
@@ -111,6 +126,9 @@ class Step:
         :raises InvalidTransitionError: likewise.
         """
         node, record = self._node, self._record
+        if node.is_left_behind():
+            stop_left_behind(node)
+            return None
         judged = judge(node, record, outcome, error)
         stopping = self._machine.preempt_requested() or smach.is_shutdown()
         if self._machine.preempt_requested():

@@ -4,6 +4,8 @@ Also what one execution of any container begins and ends.
 """
 from typing import Any, Callable, Dict, Optional
 
+import smach
+
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode, WrappedMachine
@@ -16,6 +18,9 @@ from .wrapping import adopt, bring_up_to_date
 def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
     """Execute a container; where no container above it runs, this is a trial."""
     node = machine._oracle
+    if not node.look_around():
+        smach.logwarn('{}: does not begin, as the state around it was abandoned'.format(node.path))
+        return None
     if node.has_running_ancestor():
         return _run(node, execute)
     adopt(machine)
@@ -90,6 +95,7 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
         raise
     finally:
         node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=_why(outcome, error))
+        node.runs_around = ()
         node.records.drop_snapshots()
 
 

@@ -1,6 +1,6 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 import copy
-from typing import Any, Dict, Iterator, Mapping, Optional, Protocol
+from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Tuple
 
 import smach
 
@@ -10,6 +10,7 @@ from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
+from .limited_run import LimitedRun, runs_of_thread
 from .protocols import Labels, Machine
 from .snapshots import take_snapshot
 from .tree import Tree
@@ -30,6 +31,11 @@ class WrappedMachine(Machine, Protocol):
 
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
+
+
+def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
+    """Return the error for who sends a machine to its meta state."""
+    return smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
 
 
 class TreeNode:
@@ -54,6 +60,7 @@ class TreeNode:
         self.engine = EngineProbe()
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
+        self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
         self.join(tree)
 
     def join(self, tree: Tree) -> None:
@@ -93,6 +100,33 @@ class TreeNode:
             above = above.parent
         return False
 
+    def is_left_behind(self) -> bool:
+        """Whether this container executes inside a state that was abandoned."""
+        return any(run.abandoned for run in self.runs_around)
+
+    def look_around(self) -> bool:
+        """Find out inside which executions this one is about to begin; whether it still may."""
+        self.runs_around = self._find_runs_around()
+        for run in self.runs_around:
+            run.hold(self.engine)
+        return not self.is_left_behind()
+
+    def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
+        """Return the executions with a time limit inside which this container executes.
+
+        Those of its thread, and, as a Concurrence has threads of its own, those of the states
+        above it.
+        """
+        found = list(runs_of_thread())
+        under_way = self.tree.workers.under_way
+        node = self
+        while under_way and node.parent is not None:
+            run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
+            if run is not None and run not in found:
+                found.append(run)
+            node = node.parent
+        return tuple(found)
+
     # -- settings and states
 
     @property
@@ -130,7 +164,7 @@ class TreeNode:
             if label not in self.machine._states:
                 raise smach.InvalidStateError('{!r} is no state of {}'.format(label, self.path))
             if self.is_oracle(label):
-                raise smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
+                raise entered_by_failures_alone(label)
             record = self.records.make(label, self.settings_of(label),
                                        bool(self.in_force.deep_copy_keys))
         return record
@@ -139,8 +173,8 @@ class TreeNode:
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""
-        if self.events.observers and self.trial_id == self.tree.trial_id:
-            self.events.emit(kind, self.path, **fields)
+        if self.events.observers:
+            self.events.emit(kind, self.path, self.trial_id, **fields)
 
     def warn(self, text: str, label: str = '') -> None:
         """Log what the operator should know, and tell the observers."""

@@ -1,116 +1,157 @@
-"""Runs a state that has a time limit in a thread of its own, so that it can be left behind.
+"""Runs what may have to be left behind in a thread of its own.
 
-On overrun the gate on its userdata is shut and the state is preempted; after a grace period it is
-abandoned. While an abandoned thread lives its state is blocked: nobody enters it again.
+A state with a time limit: on overrun the gate on its userdata is shut and the state is preempted;
+after a grace period it is abandoned. A function: it cannot be preempted, and is abandoned at once.
+While an abandoned thread lives, what it runs is blocked: nobody enters it again.
 """
-import contextvars
+import functools
+import math
 import threading
 import time
-from typing import Any, Dict, NamedTuple, Optional
+from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
 import smach
 
+from ..background import BackgroundCall
+from .limited_run import LimitedRun, enter
 from .userdata_gate import UserdataGate
+
+_STOP_PERIOD_S = 0.05  # how soon a function that runs is left behind at a preempt or a shutdown
+
+_LATE = 'still runs since it overran its time limit'
+_STOPPED = 'still runs since a preempt or a shutdown'
 
 
 class LimitedResult(NamedTuple):
-    """How an execution with a time limit went; exactly one of the three is told."""
+    """How a state or a function went in its thread; exactly one of the three is told."""
 
     outcome: object = None
     error: Optional[BaseException] = None
     overrun: str = ''  # what happened, in words
 
 
-class _Execution:
-    """One execution in a thread of its own."""
+class _Left(NamedTuple):
+    """What was left behind."""
 
-    def __init__(self, state: smach.State, userdata: smach.Remapper, name: str) -> None:
-        self.state = state
-        self.outcome: object = None
-        self.error: Optional[BaseException] = None
-        self.abandoned = False
-        self._lock = threading.Lock()
-        self._userdata = userdata
-        self.done = threading.Event()
-        context = contextvars.copy_context()
-        self.thread = threading.Thread(target=context.run, args=(self._work,), name=name,
-                                       daemon=True)
-
-    def _work(self) -> None:
-        try:
-            self.outcome = self.state.execute(self._userdata)
-        except BaseException as err:
-            # handed to the machine's thread, SystemExit and KeyboardInterrupt among them
-            self.error = err
-        with self._lock:
-            self.done.set()
-            late = self.abandoned
-        if late:
-            recall_preempts(self.state)
-
-    def abandon(self) -> bool:
-        """Leave the thread to itself; False where it has ended after all."""
-        with self._lock:
-            self.abandoned = not self.done.is_set()
-            return self.abandoned
+    target: object  # the state or the function, kept so that its id stays its own
+    call: BackgroundCall
+    why: str  # it is blocked
 
 
 class Workers:
-    """The abandoned threads of one tree of containers, by state."""
+    """Threads of one tree of containers, by the id of the state or function that they run."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self.abandoned: Dict[int, _Execution] = {}
+        self.abandoned: Dict[int, _Left] = {}
+        # states with a time limit whose thread lives
+        self.under_way: Dict[int, LimitedRun] = {}
 
-    def blocked(self, state: smach.State) -> str:
-        """Return why `state` cannot be entered now, '' where it can."""
+    def blocked(self, target: object) -> str:
+        """Return why a state or a function cannot be entered now, '' where it can."""
         with self._lock:
-            run = self.abandoned.get(id(state))
-            if run is None:
+            left = self.abandoned.get(id(target))
+            if left is None:
                 return ''
-            if run.thread.is_alive():
-                return 'still runs since it overran its time limit'
-            del self.abandoned[id(state)]
+            if left.call.is_alive():
+                return left.why
+            del self.abandoned[id(target)]
             return ''
 
     def run(self, state: smach.State, userdata: smach.Remapper, gate: UserdataGate, label: str,
             limit_s: float, grace_s: float) -> LimitedResult:
         """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
 
+        The limit stands still while a person is asked about something inside the state.
         `gate` is what `userdata` writes through. What the state raises is told in the result, not
         raised.
         """
-        run = _Execution(state, userdata, 'smach_oracle worker of {}'.format(label))
-        run.thread.start()
+        run = LimitedRun()
+        call = BackgroundCall(functools.partial(_execute_inside, run, state, userdata),
+                              'smach_oracle worker of {}'.format(label),
+                              functools.partial(self._ended_late, state))
+        self.under_way[id(state)] = run
         try:
-            if wait(run.done, limit_s):
-                return LimitedResult(run.outcome, run.error)
+            call.start()
+            return self._run_within(run, state, call, gate, limit_s, grace_s)
+        finally:
+            if not call.left:
+                self.under_way.pop(id(state), None)
+
+    def _run_within(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
+                    gate: UserdataGate, limit_s: float, grace_s: float) -> LimitedResult:
+        try:
+            left_s = limit_s
+            while left_s:
+                if wait(call.done, left_s):
+                    return LimitedResult(call.result, call.error)
+                left_s = run.take_stood_s()
         except BaseException:
             # Ctrl-C in the machine's thread: nothing the state does from now on counts
-            self._leave(run, gate, 0.0)
+            self._leave_state(run, state, call, gate, 0.0)
             raise
-        ended = self._leave(run, gate, grace_s)
+        ended = self._leave_state(run, state, call, gate, grace_s)
         what = 'overran its time limit of {:g} s and '.format(limit_s)
         if ended:
             return LimitedResult(overrun=what + 'ended when it was preempted')
         return LimitedResult(overrun=what +
                              'was abandoned {:g} s after it was preempted'.format(grace_s))
 
-    def _leave(self, run: _Execution, gate: UserdataGate, grace_s: float) -> bool:
+    def _ended_late(self, state: smach.State) -> None:
+        self.under_way.pop(id(state), None)
+        recall_preempts(state)
+
+    def call(self, function: Callable[[smach.UserData], object], userdata: smach.UserData,
+             gate: UserdataGate, limit_s: Optional[float],
+             stopped: Callable[[], bool]) -> LimitedResult:
+        """Call `function` until its time limit (s, monotonic; None: none) or until `stopped()`.
+
+        `gate` is what `userdata` writes through. What the function raises is told in the result,
+        not raised.
+        """
+        call = BackgroundCall(functools.partial(function, userdata), 'smach_oracle function')
+        call.start()
+        seconds = math.inf if limit_s is None else limit_s
+        end = time.monotonic() + seconds
+        try:
+            while not call.done.wait(min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))):
+                if time.monotonic() >= end and self._abandon(function, call, gate, _LATE):
+                    return LimitedResult(
+                        overrun='overran its time limit of {:g} s'.format(seconds))
+                if stopped() and self._abandon(function, call, gate, _STOPPED):
+                    return LimitedResult(overrun='was abandoned at a preempt or a shutdown')
+        except BaseException:
+            self._abandon(function, call, gate, _STOPPED)
+            raise
+        return LimitedResult(call.result, call.error)
+
+    def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
+                     gate: UserdataGate, grace_s: float) -> bool:
+        """Preempt a state and abandon it after its grace period; False where that was needed."""
         gate.shut()
         try:
-            run.state.request_preempt()
+            state.request_preempt()
         except Exception as err:  # a user's request_preempt must not keep the machine from going on
-            smach.logerr('request_preempt of {!r} failed: {!r}'.format(run.state, err))
+            smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
         try:
-            wait(run.done, grace_s)
+            wait(call.done, grace_s)
         finally:
-            if run.abandon():
-                with self._lock:
-                    self.abandoned[id(run.state)] = run
+            abandoned = self._abandon(state, call, gate, _LATE)
+            if abandoned:
+                run.abandon()
+                _stop_bare_machines(state)
             else:
-                recall_preempts(run.state)
-        return not run.abandoned
+                recall_preempts(state)
+        return not abandoned
+
+    def _abandon(self, target: object, call: BackgroundCall, gate: UserdataGate, why: str) -> bool:
+        """Leave a thread to itself; False where it has ended after all."""
+        if not call.leave():
+            return False
+        gate.shut()
+        with self._lock:
+            self.abandoned[id(target)] = _Left(target, call, why)
+        return True
 
     def __getstate__(self) -> Dict[str, Any]:
         """Threads do not travel with a pickled machine."""
@@ -118,6 +159,11 @@ class Workers:
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__init__()  # type: ignore[misc]
+
+
+def _execute_inside(run: LimitedRun, state: smach.State, userdata: smach.Remapper) -> object:
+    enter(run)
+    return state.execute(userdata)
 
 
 def wait(event: threading.Event, seconds: float) -> bool:
@@ -129,12 +175,27 @@ def wait(event: threading.Event, seconds: float) -> bool:
     return True
 
 
+def _stop_bare_machines(state: smach.State) -> None:
+    """Let machines without an oracle end at their next state boundary, as both engines do then."""
+    try:
+        if isinstance(state, smach.StateMachine) and not hasattr(state, '_oracle'):
+            state._is_running = False
+        for child in _children(state):
+            _stop_bare_machines(child)
+    except Exception as err:  # a user's container may be of any make
+        smach.logwarn('Could not stop what is left of {!r}: {!r}'.format(state, err))
+
+
+def _children(state: smach.State) -> List[smach.State]:
+    get_children = getattr(state, 'get_children', None)
+    return list(get_children().values()) if callable(get_children) else []
+
+
 def recall_preempts(state: smach.State) -> None:
     """Take a preempt request back from a state that has ended, and from all that it contains."""
     try:
         state.recall_preempt()
-        get_children = getattr(state, 'get_children', None)
-        for child in (get_children() if callable(get_children) else {}).values():
+        for child in _children(state):
             recall_preempts(child)
     except Exception as err:  # a user's container may be of any make
         smach.logwarn('Could not take a preempt request back from {!r}: {!r}'.format(state, err))

@@ -92,18 +92,27 @@ class EventSource:
         self._seq = 0
         self.observers: List[Observer] = []
         self.trial_id = ''
+        self._over = False  # the trial
 
     def begin_trial(self, trial_id: str) -> None:
         """Number from 0 again under a new trial id."""
         with self._lock:
             self.trial_id = trial_id
             self._seq = 0
+            self._over = False
 
-    def emit(self, kind: EventKind, path: str, **fields: Any) -> None:
-        """Tell every observer; costs nothing to speak of where there is none."""
+    def emit(self, kind: EventKind, path: str, of_trial: Optional[str] = None,
+             **fields: Any) -> None:
+        """Tell every observer; costs nothing to speak of where there is none.
+
+        What comes after the end of its trial (`of_trial`; None: the present one) is not told.
+        """
         if not self.observers:
             return
         with self._lock:
+            if self._over or of_trial not in (None, self.trial_id):
+                return
+            self._over = kind is EventKind.TRIAL_END
             event = Event(kind, self.trial_id, self._seq, time.time(), path, **fields)
             self._seq += 1
             for observer in tuple(self.observers):
@@ -122,5 +131,6 @@ class EventSource:
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self._over = False
         self._lock = threading.RLock()
         self.observers = []

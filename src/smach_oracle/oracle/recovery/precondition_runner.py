@@ -14,6 +14,7 @@ from ..machine.write_watch import WriteWatch
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
+from ..settings.settings import StateSettings
 from .failure import failure_kind, route_of
 
 
@@ -24,13 +25,16 @@ class NotMet(Exception):
 class PreconditionRunner:
     """Runs the preconditions of one failure, one after the other.
 
-    They read and write the container's userdata through a gate.
+    They read and write the container's userdata through a gate. A state of the container keeps its
+    own time limit; all else has that of the state whose preconditions they are.
 
-    `cancel` may be called from any thread, at any time: the state that runs is preempted, nothing
-    more begins.
+    `cancel` may be called from any thread, at any time: the state that runs is preempted, a
+    function that runs is left behind, nothing more begins.
     """
 
-    def __init__(self, node: TreeNode, watch: WriteWatch) -> None:
+    def __init__(self, node: TreeNode, settings: StateSettings, watch: WriteWatch) -> None:
+        """`settings`: of the state whose preconditions are to be run."""
+        self._settings = settings
         self._machine = node.machine
         self._node = node
         self._watch = watch
@@ -75,16 +79,35 @@ class PreconditionRunner:
             self._run_label(spec.target)
 
     def _call(self, spec: PreconditionSpec) -> None:
-        if self._cancelled:
-            raise NotMet('preempted')
-        try:
-            result = spec.target(behind(self._gate))
-        except Exception as err:
-            raise NotMet('{} raised {!r}'.format(spec.name, err)) from err
+        self._check_free(spec.target)
+        gate = self._gate.branch()
+        ended = self._node.tree.workers.call(spec.target, behind(gate), gate,
+                                             self._settings.time_limit_s, self._stopped)
+        if isinstance(ended.error, Exception):
+            raise NotMet('{} raised {!r}'.format(spec.name, ended.error)) from ended.error
+        if ended.error is not None:
+            raise ended.error
+        if ended.overrun:
+            raise NotMet('{} {}'.format(spec.name, ended.overrun))
+        result = ended.outcome
         if result is None:
             raise NotMet('{} returned None; True is met'.format(spec.name))
         if not result:
             raise NotMet('{} returned {!r}'.format(spec.name, result))
+
+    def _stopped(self) -> bool:
+        return self._cancelled or smach.is_shutdown() or self._node.is_left_behind()
+
+    def _check_free(self, target: object) -> None:
+        """Check that a state or a function may be entered now.
+
+        :raises NotMet: where it may not.
+        """
+        if self._cancelled:
+            raise NotMet('preempted')
+        blocked = self._node.tree.workers.blocked(target)
+        if blocked:
+            raise NotMet(blocked)
 
     def _run_label(self, label: str) -> None:
         state = self._machine._states.get(label)
@@ -93,10 +116,7 @@ class PreconditionRunner:
         self._judge(state, label, self._execute(state, label))
 
     def _execute(self, state: smach.State, label: str) -> object:
-        workers = self._node.tree.workers
-        blocked = workers.blocked(state)
-        if blocked:
-            raise NotMet(blocked)
+        self._check_free(state)
         with self._lock:
             if self._cancelled:
                 raise NotMet('preempted')
@@ -113,8 +133,8 @@ class PreconditionRunner:
             self._ended(state)
 
     def _with_limit(self, state: smach.State, label: str) -> object:
-        settings = self._node.settings_of(label) if label else None
-        if settings is None or settings.time_limit_s is None:
+        settings = self._node.settings_of(label) if label else self._settings
+        if settings.time_limit_s is None:
             return state.execute(view_behind(self._gate, self._machine, label, state))
         gate = self._gate.branch()
         result = self._node.tree.workers.run(

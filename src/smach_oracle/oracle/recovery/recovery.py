@@ -8,6 +8,7 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
@@ -39,7 +40,7 @@ class Recovery:
         self._cancelled = threading.Event()
         self._reason = ''
         self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
-        self._preconditions = PreconditionRunner(node, self._watch)
+        self._preconditions = PreconditionRunner(node, record.settings, self._watch)
         self.tried: List[str] = []
         self.question_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
 
@@ -50,8 +51,8 @@ class Recovery:
         self._preconditions.cancel()
 
     def stopped(self) -> bool:
-        """Whether a preempt or a shutdown ends the recovery."""
-        return self._cancelled.is_set() or smach.is_shutdown()
+        """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
+        return self._cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
 
     def run(self) -> Verdict:
         """Decide, and ask where the policy says so."""
@@ -137,7 +138,8 @@ class Recovery:
         return self._ask_expert(expert)
 
     def _ask_expert(self, expert: Expert) -> Verdict:
-        reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
+        with standing_still(self._node.runs_around):
+            reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
         if self.stopped():
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,

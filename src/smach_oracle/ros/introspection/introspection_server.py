@@ -261,8 +261,8 @@ def _waiting_bytes(topic: Optional[rospy.Publisher]) -> int:
 def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any]) -> bool:
     """Let the container start in ``labels`` with ``data`` from now on.
 
-    Returns False, and logs why, where it has no such states. A StateMachine that runs now goes
-    there at its next transition, as soon as its active state has ended.
+    Returns False, and logs why, where it has no such states or refuses them. A StateMachine that
+    runs now goes there at its next transition, as soon as its active state has ended.
     """
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]
@@ -273,7 +273,11 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
     userdata = smach.UserData()
     for key, value in data.items():
         userdata[key] = value
-    container.set_initial_state(labels, userdata)
+    try:
+        container.set_initial_state(labels, userdata)
+    except smach.InvalidStateError as err:
+        smach.logerr('Initial state %s not set: %s' % (labels, err))
+        return False
     if len(labels) == 1 and isinstance(container, smach.StateMachine) and container.is_running():
         container.userdata.update(userdata)
         watch.jump_to = labels[0]
