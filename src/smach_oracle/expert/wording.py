@@ -8,6 +8,7 @@ from typing import Union
 
 from smach_oracle.msg import ExpertQueryGoal, OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import DECIDED_BY
 
 
 def clean(text: str, lines: bool = False) -> str:
@@ -61,8 +62,7 @@ def event_words(event: Event) -> str:
             event.target, event.state),
         EventKind.PRECONDITION_END: lambda: 'Precondition {} of {}: {}.'.format(
             event.target, event.state, event.outcome),
-        EventKind.DECISION: lambda: 'The oracle decides: {}{}.'.format(
-            event.outcome.replace('_', ' '), ' to ' + event.target if event.target else ''),
+        EventKind.DECISION: lambda: _decision(event),
         EventKind.QUERY_OPENED: lambda: 'The expert is asked about {}.'.format(event.state),
         EventKind.QUERY_CLAIMED: lambda: 'The question was taken{}.'.format(by),
         EventKind.QUERY_RELEASED: lambda: 'The question was given back{}.'.format(by),
@@ -73,6 +73,14 @@ def event_words(event: Event) -> str:
         EventKind.PREEMPT: lambda: '{} was asked to stop.'.format(event.path),
     }.get(event.kind)
     return sentence() if sentence else next_step_words(event)
+
+
+def _decision(event: Event) -> str:
+    """The sentence that the oracle made; bags of 0.1 have none."""
+    if event.text and DECIDED_BY in (event.data or {}):
+        return clean(event.text) + '.'
+    return 'The oracle decides: {}{}.'.format(event.outcome.replace('_', ' '),
+                                              ' to ' + event.target if event.target else '')
 
 
 def _with(outcome: str) -> str:

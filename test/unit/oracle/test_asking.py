@@ -103,7 +103,7 @@ def test_the_question_tells_everything():
     assert question.userdata == {'k': 3} and question.input_userdata == {'k': 3}
     assert 59 < question.deadline_s <= 60
     assert question.fallback == 'stop with aborted'
-    assert question.reason == '1 recovery of this trial is spent on it'
+    assert question.reason == 'B failed again after 1 recovery of this trial'
 
 
 def test_preconditions_that_ran_before_are_told():

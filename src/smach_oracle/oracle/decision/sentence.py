@@ -25,7 +25,13 @@ class DecisionFacts(NamedTuple):
 
 def decision_sentence(facts: DecisionFacts) -> str:
     """Return the sentence, without a full stop."""
-    return '{}{}: {}'.format(_failed(facts), _helped(facts), _does(facts))
+    return '{}: {}'.format(cause_of(facts), _does(facts))
+
+
+def cause_of(facts: DecisionFacts) -> str:
+    """Return what led to the decision, as the sentence begins."""
+    blocked = '; ' + facts.blocked if facts.blocked else ''
+    return _failed(facts) + _helped(facts) + blocked
 
 
 def _failed(facts: DecisionFacts) -> str:
@@ -56,6 +62,5 @@ def _helped(facts: DecisionFacts) -> str:
 
 def _does(facts: DecisionFacts) -> str:
     if facts.action is Action.ASK:
-        why = facts.blocked + ', so ' if facts.blocked else ''
-        return '{}asking {}'.format(why, facts.asked or 'an expert')
+        return 'asking {}'.format(facts.asked or 'an expert')
     return 'trying it again' if facts.target == facts.state else 'going back to ' + facts.target

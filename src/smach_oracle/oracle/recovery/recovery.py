@@ -1,6 +1,6 @@
 """One failure, from the policy's question to the verdict (paper, Algorithm 1)."""
 import threading
-from typing import Any, List, Mapping, Tuple
+from typing import Any, List, Mapping
 
 import smach
 
@@ -8,6 +8,7 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
@@ -38,7 +39,9 @@ class Recovery:
         self._context = context
         self._continuous = continuous
         self._cancelled = threading.Event()
-        self._reason = ''
+        self._cause = ''  # of the decision
+        self._met: List[str] = []  # names of preconditions
+        self._not_met = ''
         self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, record.settings, self._watch)
         self.tried: List[str] = []
@@ -57,50 +60,54 @@ class Recovery:
     def run(self) -> Verdict:
         """Decide, and ask where the policy says so."""
         decider = Decider.MAX_RECOVERIES if self._limit_is_reached() else Decider.POLICY
-        action, target = self._decide(decider)
+        facts = self._decide(decider)
         if self.stopped():
             return self._preempted()
-        record = self._record
-        self.emit(EventKind.DECISION, outcome=action.value, target=target,
+        record, self._cause, sentence = self._record, cause_of(facts), decision_sentence(facts)
+        smach.loginfo('{}/{}'.format(self._node.path, sentence))
+        self.emit(EventKind.DECISION, outcome=facts.action.value, target=facts.target,
                   failure_class=int(record.failure_class), rate=record.rate,
-                  continuous=self._continuous, text=self._reason,
+                  continuous=self._continuous, text=sentence,
                   data={DECIDED_BY: decider.value})
-        if action is Action.ASK:
+        if facts.action is Action.ASK:
             return self._ask()
         record.recoveries += 1
-        return self._jump(target)
+        return self._jump(facts.target)
 
     # -- deciding
 
     def _limit_is_reached(self) -> bool:
         return self._record.recoveries >= self._record.settings.max_recoveries
 
-    def _decide(self, decider: Decider) -> Tuple[Action, str]:
+    def _decide(self, decider: Decider) -> DecisionFacts:
         record, policy = self._record, self._node.in_force.policy
         if decider is Decider.MAX_RECOVERIES:
-            count = record.recoveries
-            self._reason = '{} of this trial {} spent on it'.format(
-                '1 recovery' if count == 1 else '{} recoveries'.format(count),
-                'is' if count == 1 else 'are')
-            return Action.ASK, ''
-        failure_class = record.failure_class
-        preconditions = self._run_preconditions(failure_class)
-        action = policy.decide(Situation(failure_class, preconditions, self._continuous))
-        self._reason = '{}: {}, preconditions {}, {}continuous'.format(
-            policy.name, failure_class.name, preconditions.value,
-            '' if self._continuous else 'not ')
-        if action is Action.ASK:
-            return action, ''
-        revisits = action is Action.REVISIT
-        return self._checked(action,
-                             record.label if revisits else policy.step_back_target(self._context))
+            return self._facts_of(Action.ASK, spent=record.recoveries)
+        preconditions = self._run_preconditions(record.failure_class)
+        action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
+        target = ''
+        if action is not Action.ASK:
+            target = (record.label if action is Action.REVISIT
+                      else policy.step_back_target(self._context))
+        why_not = self._blocked(target) if target else ''
+        if why_not:
+            action, target, why_not = Action.ASK, '', '{} {}'.format(target, why_not)
+        return self._facts_of(action, target=target, blocked=why_not)
 
-    def _checked(self, action: Action, target: str) -> Tuple[Action, str]:
-        why = self._blocked(target)
-        if not why:
-            return action, target
-        self._reason += '; {} to {} is not possible: it {}'.format(action.value, target, why)
-        return Action.ASK, ''
+    def _facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
+        record = self._record
+        return DecisionFacts(record.label, record.learned(), record.rate, self._continuous, action,
+                             met=self._met, not_met=self._not_met,
+                             asked=self._asked_in_words() if action is Action.ASK else '', **fields)
+
+    def _asked_in_words(self) -> str:
+        node = self._node
+        if node.settings.escalate and node.has_running_ancestor():
+            return 'the oracle above'
+        if node.tree.expert is None:
+            return 'nobody, since there is no expert'
+        limit_s = node.settings.deadline_s
+        return 'an expert, {:g} s'.format(limit_s) if limit_s else 'an expert'
 
     def _blocked(self, label: str) -> str:
         """Return why a state cannot be entered now, '' where it can."""
@@ -122,6 +129,10 @@ class Recovery:
         why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
         self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
+        if why_not:
+            self._not_met = spec.name
+        else:
+            self._met.append(spec.name)
         self.tried.append('precondition {}: {}'.format(
             spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
         return not why_not
@@ -131,7 +142,7 @@ class Recovery:
     def _ask(self) -> Verdict:
         node = self._node
         if node.settings.escalate and node.has_running_ancestor():
-            return self._give_up('handed to the oracle above: ' + self._reason)
+            return self._give_up('handed to the oracle above: ' + self._cause)
         expert = node.tree.expert
         if expert is None:
             return self._fall_back('no expert is there to ask')
@@ -153,7 +164,7 @@ class Recovery:
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
-        account = Account(self._continuous, self._reason, tuple(self.tried), self._watch.written(),
+        account = Account(self._continuous, self._cause, tuple(self.tried), self._watch.written(),
                           self._fallback_in_words())
         return make_question(self._node, self._record, self._failure, account, deadline_s)
 
