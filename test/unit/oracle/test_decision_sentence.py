@@ -15,9 +15,10 @@ def facts(action, **fields):
 @pytest.mark.parametrize('given, sentence', [
     (facts(Action.REVISIT, target='PICK'), 'PICK failed (1 of its last 10): trying it again'),
     (facts(Action.REVISIT, target='PICK', met=['DETECT']),
-     'PICK failed (1 of its last 10), and DETECT holds: trying it again'),
+     'PICK failed (1 of its last 10), and its precondition DETECT holds: trying it again'),
     (facts(Action.REVISIT, target='PICK', met=['DETECT', 'door open']),
-     'PICK failed (1 of its last 10), and DETECT and door open hold: trying it again'),
+     'PICK failed (1 of its last 10), and its preconditions DETECT and door open hold: '
+     'trying it again'),
     (facts(Action.STEP_BACK, target='DETECT', continuous=True),
      'PICK keeps failing (1 of its last 10): going back to DETECT'),
     (facts(Action.ASK, continuous=True, not_met='DETECT', asked='an expert, 300 s'),

@@ -55,8 +55,10 @@ def _helped(facts: DecisionFacts) -> str:
     if facts.not_met:
         return ', and {} did not help'.format(facts.not_met)
     if facts.met:
-        return ', and {} {}'.format(' and '.join(facts.met),
-                                    'holds' if len(facts.met) == 1 else 'hold')
+        one = len(facts.met) == 1
+        return ', and its precondition{} {} hold{}'.format('' if one else 's',
+                                                           ' and '.join(facts.met),
+                                                           's' if one else '')
     return ''
 
 
