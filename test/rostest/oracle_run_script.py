@@ -165,7 +165,7 @@ class OracleRunTest(unittest.TestCase):
         rospy.set_param('/task/oracle', {'memory': 'large'})
         self.addCleanup(rospy.delete_param, '/task/oracle')
         task = self.run_task()
-        self.assertEqual(task.wait(), 1)
+        self.assertEqual(task.wait(), 2)
         for part in ('parameter /task/oracle', 'memory', "'large'", 'whole number'):
             self.assertIn(part, task.output())
 

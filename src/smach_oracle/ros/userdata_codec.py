@@ -4,6 +4,7 @@ Plain data becomes JSON; messages and lists of them become serialised ROS messag
 
     encode(key, value) -> UserdataItem     encode_all(mapping) -> [UserdataItem]
     decode(item) -> value                  decode_all(items) -> {key: value}
+    check(item)
 
 What fits neither encoding, or is larger than a limit, becomes an UNSENT item that names its Python
 type, so that a person at least sees that the key exists. Nothing is ever pickled. A tuple arrives
@@ -14,7 +15,7 @@ import json
 import math
 import re
 import struct
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, NoReturn, Optional, Sequence
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence
 
 import genpy
 import roslib.message
@@ -22,10 +23,13 @@ import roslib.message
 from smach_oracle.msg import UserdataItem
 from smach_oracle.oracle.errors import OracleError
 
+from .strict_json import load_json
+
 SUMMARY_BYTES = 4096  # a question is read by people: larger values only slow the list down
 TRANSFER_BYTES = 64 * 1024 * 1024  # between programs: a camera image passes, a runaway does not
 
 _LENGTH = struct.Struct('<I')
+_MD5SUM = re.compile(r'[0-9a-f]{32}\Z')
 _MESSAGE_TYPE = re.compile(r'[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z')
 
 
@@ -78,6 +82,25 @@ def decode(item: UserdataItem) -> Any:
     raise UserdataCodecError(
         'userdata {!r}: encoding {} is unknown; allowed: JSON (1), ROS_MESSAGE (2), UNSENT (3), '
         'ROS_MESSAGES (4)'.format(item.key, item.encoding))
+
+
+def check(item: UserdataItem) -> None:
+    """Check an item that goes on to another process, which may have types that are missing here.
+
+    :raises UserdataCodecError: where `decode` would raise there: what is wrong or missing.
+    """
+    if item.encoding not in (UserdataItem.ROS_MESSAGE, UserdataItem.ROS_MESSAGES):
+        decode(item)
+        return
+    _check_type_name(item)
+    if not _MD5SUM.match(item.md5sum):
+        raise UserdataCodecError(
+            'userdata {!r}: md5sum {!r} of {} is none; `rosmsg md5 {}` tells it'.format(
+                item.key, item.md5sum, item.type, item.type))
+    if getattr(roslib.message.get_message_class(item.type), '_md5sum', '') == item.md5sum:
+        decode(item)
+    elif item.encoding == UserdataItem.ROS_MESSAGES:
+        list(_parts(item))
 
 
 def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict[str, Any]:
@@ -137,19 +160,23 @@ def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
 
 def _decode_json(item: UserdataItem) -> object:
     try:
-        return json.loads(bytes(item.value).decode('utf-8'), parse_constant=_refuse_constant)
+        return load_json(bytes(item.value).decode('utf-8'))
     except (ValueError, RecursionError) as err:
         raise UserdataCodecError('userdata {!r} is not JSON: {}'.format(item.key, err)) from err
 
 
-def _refuse_constant(name: str) -> NoReturn:
-    raise ValueError('{} is not a JSON number'.format(name))
+def _check_type_name(item: UserdataItem) -> None:
+    """Check it, and so keep odd names away from the import that follows."""
+    if not item.type:
+        raise UserdataCodecError('userdata {!r}: the type of its ROS message is missing, such as '
+                                 'geometry_msgs/PoseStamped'.format(item.key))
+    if not _MESSAGE_TYPE.match(item.type):
+        raise UserdataCodecError('userdata {!r}: {!r} is not the name of a message type'.format(
+            item.key, item.type))
 
 
 def _message_class(item: UserdataItem) -> type:
-    if not _MESSAGE_TYPE.match(item.type):  # also keeps odd names away from the import that follows
-        raise UserdataCodecError('userdata {!r}: {!r} is not the name of a message type'.format(
-            item.key, item.type))
+    _check_type_name(item)
     message_class = roslib.message.get_message_class(item.type)
     if message_class is None:
         raise UserdataCodecError('userdata {!r}: message type {} is not installed here'.format(

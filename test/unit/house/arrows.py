@@ -44,7 +44,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread'},
-        'sendable_text'
+        {'sendable_text', 'strict_json'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',

@@ -125,7 +125,8 @@ def test_every_path_may_begin_with_the_home_folder(script, tmp_path, monkeypatch
     run = parse(['--config', '~/o.yaml', '--record', '~/bags', '~/task.py', '~/as it is'])
     assert (run.script, run.script_args) == (str(tmp_path / 'task.py'), ['~/as it is'])
     assert run.options.record == str(tmp_path / 'bags')
-    assert script_runner.read_settings(run).rates_file == str(tmp_path / 'rates.json')
+    settings = script_runner.read_settings(script_runner.load(run))
+    assert settings.rates_file == str(tmp_path / 'rates.json')
     assert parse(['--rates-file', '~/r.json',
                   script]).overrides['rates_file'] == str(tmp_path / 'r.json')
     script_runner.check(run)

@@ -3,7 +3,6 @@
 A prompt ends when the thing that it asks about is over.
 """
 import asyncio
-import json
 from typing import Callable, List, Optional, Sequence, Tuple
 
 from prompt_toolkit import PromptSession
@@ -13,6 +12,8 @@ from prompt_toolkit.input import Input
 from prompt_toolkit.output import Output
 from prompt_toolkit.styles import Style
 from prompt_toolkit.validation import ValidationError, Validator
+
+from smach_oracle.ros.strict_json import load_json
 
 from ..wording import clean
 
@@ -85,7 +86,7 @@ class JsonValidator(Validator):
         if not text:
             return
         try:
-            json.loads(text, parse_constant=_refuse)
+            load_json(text)
         except ValueError as err:
             position = getattr(err, 'pos', len(text))
             raise ValidationError(position,
@@ -113,7 +114,3 @@ def _fits(typed: str, key: str, meaning: str) -> bool:
     words = meaning.lower().split()
     return key.lower().startswith(typed) or any(' '.join(words[start:]).startswith(typed)
                                                 for start in range(len(words)))
-
-
-def _refuse(name: str) -> float:
-    raise ValueError('{} is not a JSON number'.format(name))

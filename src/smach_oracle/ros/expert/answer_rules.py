@@ -1,7 +1,7 @@
 """Does an expert's decision fit the question? Pure: works on the fields of the messages alone."""
-from typing import Dict, Iterable
+from typing import Dict
 
-from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, UserdataItem
+from smach_oracle.msg import ExpertDecision, ExpertQueryGoal
 from smach_oracle.oracle.asking.answer_rules import (
     AnswerChoices,
     check_answer,
@@ -11,7 +11,7 @@ from smach_oracle.oracle.asking.answer_rules import (
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.errors import AnswerError
 
-from ..userdata_codec import UserdataCodecError, decode
+from ..userdata_codec import UserdataCodecError, check
 
 _KINDS = [int(kind) for kind in AnswerKind]
 
@@ -55,17 +55,11 @@ def describe_decision(decision: ExpertDecision) -> str:
 def _check_outputs(choices: AnswerChoices, decision: ExpertDecision) -> None:
     check_output_keys(choices.failed_state, [item.key for item in decision.outputs],
                       choices.output_keys)
-    _check_values(decision.outputs)
-
-
-def _check_values(items: Iterable[UserdataItem]) -> None:
-    """Messages are left to the robot: a shared server need not have every robot's types."""
-    for item in items:
-        if item.encoding not in (UserdataItem.ROS_MESSAGE, UserdataItem.ROS_MESSAGES):
-            try:
-                decode(item)
-            except UserdataCodecError as err:
-                raise AnswerError('output {}'.format(err)) from err
+    for item in decision.outputs:
+        try:
+            check(item)
+        except UserdataCodecError as err:
+            raise AnswerError('output {}'.format(err)) from err
 
 
 def _items(decision: ExpertDecision) -> Dict[str, object]:

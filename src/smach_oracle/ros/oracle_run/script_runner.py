@@ -9,6 +9,7 @@ import os
 import sys
 import types
 from contextlib import contextmanager
+from functools import partial
 from importlib.machinery import SourceFileLoader
 from typing import (
     Any,
@@ -30,11 +31,13 @@ from smach_oracle.oracle.settings.paths import check_writable, path_of
 from smach_oracle.oracle.settings.settings import Settings
 
 from .. import attachment
-from ..loaded_settings import LoadedSettings, load_settings, resolve_python, split_python_name
+from ..loaded_settings import LoadedSettings, load_settings, resolve_python
 from ..shutdown import ShutdownGuard
+from .precondition_labels import check_precondition_labels
+from .python_names import check_python_name
+from .refusal import USAGE_ERROR, Refusal
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
-USAGE_ERROR = 2  # exit code
 NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = ('--config', '--record', '--record-topic', '--policy', '--rates-file')
 
@@ -146,7 +149,7 @@ def check(invocation: Invocation) -> None:
     """
     loaded = load_settings(invocation.config, None, invocation.overrides)
     with _located(loaded):
-        settings = Settings.from_dict(loaded, _check_python_name)
+        settings = Settings.from_dict(loaded, partial(_check_name, invocation.script))
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
     if invocation.options.record:
@@ -154,8 +157,8 @@ def check(invocation: Invocation) -> None:
         prepare_folder(invocation.options.record)
 
 
-def _check_python_name(name: str) -> Callable[[smach.UserData], bool]:
-    split_python_name(name)
+def _check_name(script: str, name: str) -> Callable[[smach.UserData], bool]:
+    check_python_name(script, name)
     return _never_called
 
 
@@ -164,14 +167,20 @@ def _never_called(userdata: smach.UserData) -> bool:
     raise NotImplementedError
 
 
-def read_settings(invocation: Invocation) -> Settings:
-    """The settings for the machines of this invocation.
+def load(invocation: Invocation) -> LoadedSettings:
+    """What is set for the machines of this invocation, not checked yet.
 
-    :raises SettingsError: naming where the mistake is.
+    :raises SettingsError: where the file cannot be read.
     """
-    loaded = load_settings(invocation.config, overrides=invocation.overrides)
-    with _located(loaded):
-        return Settings.from_dict(loaded, resolve_python)
+    return load_settings(invocation.config, overrides=invocation.overrides)
+
+
+def read_settings(loaded: LoadedSettings) -> Settings:
+    """Settings with all names of Python objects resolved.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    return Settings.from_dict(loaded, resolve_python)
 
 
 @contextmanager
@@ -190,8 +199,9 @@ class MachineWrapper:
     script that builds a new one for each trial goes on learning where it was.
     """
 
-    def __init__(self, invocation: Invocation) -> None:
+    def __init__(self, invocation: Invocation, refusal: Refusal) -> None:
         self._invocation = invocation
+        self._refusal = refusal
         self._names: Dict[Tuple[Any, ...], str] = {}
         file_name = os.path.basename(invocation.script)
         self._stem = os.path.splitext(file_name)[0].upper().replace(' ', '_')
@@ -199,13 +209,21 @@ class MachineWrapper:
     def __call__(self, machine: smach.StateMachine) -> None:
         """Swap the machine's class.
 
-        :raises SettingsError: where the settings do not fit the machine.
+        :raises SystemExit: where the settings do not fit the machine, which is told.
         """
+        with self._refusal.of_errors():
+            self._wrap(machine)
+
+    def _wrap(self, machine: smach.StateMachine) -> None:
         from ..container import OracleContainer
-        settings = read_settings(self._invocation)
-        OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
-                             name=self.name(machine), strict=False,
-                             recover=self._invocation.recover)
+        loaded = load(self._invocation)
+        with _located(loaded):
+            settings = read_settings(loaded)
+            if self._invocation.recover:
+                check_precondition_labels(machine, settings)
+            OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
+                                 name=self.name(machine), strict=False,
+                                 recover=self._invocation.recover)
 
     def name(self, machine: smach.StateMachine) -> str:
         """A name for the machine, such as "PICK_AND_PLACE".
@@ -255,18 +273,25 @@ def _show_only_frames_of(file_name: str) -> None:
     sys.excepthook = excepthook
 
 
+def tell(err: Exception) -> None:
+    """Say what is wrong, in one line."""
+    print('oracle_run: {}'.format(err), file=sys.stderr, flush=True)
+
+
 def main(args: Optional[Sequence[str]] = None) -> None:
     """Entry point."""
     invocation = parse(sys.argv[1:] if args is None else args)
     try:
         check(invocation)
     except (SettingsError, OSError) as err:
-        print('oracle_run: {}'.format(err), file=sys.stderr)
+        tell(err)
         sys.exit(USAGE_ERROR)
     from .interception import Interception
     attachment.configure(invocation.options)
     guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)
-    Interception(MachineWrapper(invocation)).install()
-    run_script(invocation.script, invocation.script_args)
+    refusal = Refusal(guard, tell)
+    Interception(MachineWrapper(invocation, refusal)).install()
+    with refusal.decides_exit_code():
+        run_script(invocation.script, invocation.script_args)

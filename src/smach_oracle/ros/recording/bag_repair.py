@@ -1,55 +1,64 @@
-"""Gives the bags of recorders that died an index, so that they can be read.
+"""Mends the bags of recorders that died, so that they can be read.
 
-Only files that this package's recorder made (they say so in their header) and that no living
-process holds (their writer's lock is gone) are touched: `rosbag record` names its files alike.
+Only files that this package's recorder made (they say so in their header, or in their name where
+that is damaged) and that no living process holds (their writer's lock is gone) are touched: `rosbag
+record` names its files alike.
+
+`NAME.bag.active` is copied, as far as it can be read, to `NAME.bag.mending`. Then it is renamed to
+`NAME.bag.damaged` and the copy to `NAME.bag`. When that has been read back, the damaged one goes.
+Whatever moment the process dies at, the next start goes on from there.
 """
 import fcntl
 import os
 import re
 import time
-from typing import BinaryIO, Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import BinaryIO, Callable, List, NamedTuple, Optional
 
 from . import bag_format
-from .bag_format import BagFormatError, ChunkInfo, Fields, Stamp
-from .bag_writer import write_bag_index
+from .bag_format import BagFormatError
+from .bag_mending import Progress, Saved, contents, mend, read_back
 
-ACTIVE_SUFFIX = '.bag.active'
-OUR_NAME = re.compile(r'(^|/)\d{8}T\d{6}\.\d{3}Z_[^/]*\.bag\.active$')
+ACTIVE_SUFFIX, DAMAGED_SUFFIX = '.bag.active', '.bag.damaged'
+OUR_NAME = re.compile(r'(^|/)\d{8}T\d{6}\.\d{3}Z_[^/]*\.bag\.(active|damaged)$')
 JUST_MADE_S = 10.0
+_FIELDS_OF_OTHERS = {'op', 'index_pos', 'conn_count', 'chunk_count'}  # what rosbag itself writes
+
+Log = Callable[[str], None]
 
 
-class _Scan(NamedTuple):
-    end: int  # of the last complete chunk and its index
-    connections: List[bytes]  # records
-    chunks: List[ChunkInfo]
+class _Tools(NamedTuple):
+    info: Log
+    warn: Log
+    progress: Progress
 
 
-def recover_folder(folder: str, info: Callable[[str], None], warn: Callable[[str],
-                                                                           None]) -> List[str]:
+def recover_folder(folder: str, info: Log, warn: Log,
+                   progress: Progress = lambda: None) -> List[str]:
     """Turn the orphaned `.bag.active` files of a folder into `.bag` files.
 
-    A file that cannot be mended is left as it is and named in a warning.
+    A file that cannot be mended is left as it is and named in a warning; so is what was lost.
 
+    :param progress: called again and again while the disk answers.
     :returns: the paths of the mended bags.
     :raises OSError: where the folder cannot be listed.
     """
     recovered = []
+    tools = _Tools(info, warn, progress)
     for name in sorted(os.listdir(folder)):
         path = os.path.join(folder, name)
-        if not name.endswith(ACTIVE_SUFFIX):
+        if not name.endswith((ACTIVE_SUFFIX, DAMAGED_SUFFIX)):
             continue
         try:
-            target = _recover(path)
-        except (OSError, BagFormatError) as err:
+            target = _recover(path, tools)
+        except OSError as err:
             warn('The bag {} of a recorder that died cannot be mended: {}'.format(path, err))
             continue
         if target is not None:
-            info('Mended the bag of a recorder that died: {}'.format(target))
             recovered.append(target)
     return recovered
 
 
-def _recover(path: str) -> Optional[str]:
+def _recover(path: str, tools: _Tools) -> Optional[str]:
     try:
         bag = open(path, 'r+b')
     except FileNotFoundError:
@@ -61,14 +70,90 @@ def _recover(path: str) -> Optional[str]:
             return None  # it is being written
         if not _is_still_at(bag, path) or not _is_ours(bag):
             return None
-        if not repair(bag):
-            os.unlink(path)  # killed before its first message
-            return None
-        target = path[:-len('.active')]
-        if os.path.exists(target):
-            target = free_name(target)
-        os.rename(path, target)
+        if not path.endswith(DAMAGED_SUFFIX):
+            return _mend(bag, path, tools)
+        return _go_on(bag, path, tools)
+
+
+def _mend(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
+    target = path[:-len('.active')]
+    if os.path.exists(target) or os.path.exists(target + '.damaged'):
+        target = free_name(target)
+    saved = mend(bag, target + '.mending', tools.progress)
+    if not saved.messages:
+        os.unlink(target + '.mending')
+        _leave_empty(bag, path, saved, tools.warn)
+        return None
+    os.rename(path, target + '.damaged')
+    try:
+        os.rename(target + '.mending', target)
+    except OSError:
+        os.rename(target + '.damaged', path)
+        raise
+    _drop_damaged(target, saved, tools)
     return target
+
+
+def _leave_empty(bag: BinaryIO, path: str, saved: Saved, warn: Log) -> None:
+    """Remove a file whose writer was killed before its first message; any other one stays."""
+    size = os.fstat(bag.fileno()).st_size
+    if size <= bag_format.BAG_HEADER_END or _begins_with_a_torn_chunk(bag, saved):
+        os.unlink(path)
+    else:
+        warn('Nothing can be read in the bag {} of a recorder that died; it is left as it is'
+             .format(path))
+
+
+def _begins_with_a_torn_chunk(bag: BinaryIO, saved: Saved) -> bool:
+    """Whether the file ends inside its first chunk, and nothing else is wrong with it."""
+    if saved.bytes_lost:
+        return False
+    size = os.fstat(bag.fileno()).st_size
+    bag.seek(bag_format.BAG_HEADER_END)
+    try:
+        is_chunk = bag_format.op_of(bag_format.read_header(bag, size)) == bag_format.OP_CHUNK
+        claimed = bag_format.UINT32.unpack(bag_format.read_exactly(bag, 4))[0]
+    except BagFormatError:
+        return size < bag_format.BAG_HEADER_END + len(bag_format.pack_chunk_header(0))
+    return is_chunk and bag.tell() + claimed > size
+
+
+def _go_on(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
+    """Finish what another recorder began before it died."""
+    target = path[:-len('.damaged')]
+    if os.path.exists(target):
+        _drop_damaged(target, contents(bag, tools.progress), tools)
+        return target
+    active = target + '.active'
+    if os.path.exists(active):
+        return None
+    os.rename(path, active)
+    return _mend(bag, active, tools)
+
+
+def _drop_damaged(target: str, saved: Saved, tools: _Tools) -> None:
+    """Remove the damaged bag, once the mended one has been read back."""
+    try:
+        read_back(target, saved, tools.progress)
+        _sync_folder(os.path.dirname(target))
+    except OSError as err:
+        tools.warn('The mended bag {} cannot be read back, its original stays as {}.damaged: '
+                   '{}'.format(target, target, err))
+        return
+    os.unlink(target + '.damaged')
+    losses = saved.losses()
+    (tools.warn if saved.bytes_lost else tools.info)(
+        'Mended the bag of a recorder that died: {}, {} messages{}'.format(
+            target, saved.messages, losses and '; lost: ' + losses))
+
+
+def _sync_folder(folder: str) -> None:
+    """Make the disk hold the names of the files, before one of them is removed."""
+    handle = os.open(folder or '.', os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _is_still_at(bag: BinaryIO, path: str) -> bool:
@@ -81,139 +166,26 @@ def _is_still_at(bag: BinaryIO, path: str) -> bool:
 
 def _is_ours(bag: BinaryIO) -> bool:
     status = os.fstat(bag.fileno())
+    has_our_name = bool(OUR_NAME.search(bag.name))
     if status.st_size == 0:  # killed between making it and its header, unless it was made just now
-        return bool(OUR_NAME.search(bag.name)) and time.time() - status.st_mtime > JUST_MADE_S
+        return has_our_name and time.time() - status.st_mtime > JUST_MADE_S
+    bag.seek(len(bag_format.MAGIC))
     try:
-        return _read_bag_header(bag).get(bag_format.WRITER_FIELD) == bag_format.WRITER_NAME
+        fields = bag_format.read_header(bag, bag_format.HEADER_RECORD_SIZE)
     except BagFormatError:
-        return False
-
-
-def _read_bag_header(bag: BinaryIO) -> Fields:
-    bag.seek(0)
-    if bag.read(len(bag_format.MAGIC)) != bag_format.MAGIC:
-        raise BagFormatError('it is no bag of version 2.0')
-    fields = bag_format.read_header(bag, bag_format.HEADER_RECORD_SIZE)
-    if bag_format.op_of(fields) != bag_format.OP_BAG_HEADER:
-        raise BagFormatError('it has no bag header')
-    return fields
-
-
-def repair(bag: BinaryIO) -> bool:
-    """Cut a bag (open 'r+b', uncompressed) off after its last whole chunk and index it anew.
-
-    :returns: whether there is a message in it.
-    :raises BagFormatError: where it is not a bag.
-    :raises OSError: where the disk does not take it.
-    """
-    size = os.fstat(bag.fileno()).st_size
-    if size:
-        _read_bag_header(bag)
-    if size < bag_format.BAG_HEADER_END:
-        return False
-    scan = _scan(bag)
-    bag.truncate(scan.end)
-    write_bag_index(bag.fileno(), scan.end, scan.connections, scan.chunks)
-    os.fsync(bag.fileno())
-    return bool(scan.chunks)
-
-
-def _scan(bag: BinaryIO) -> _Scan:
-    size = os.fstat(bag.fileno()).st_size
-    connections: Dict[int, bytes] = {}
-    chunks: List[ChunkInfo] = []
-    end = bag_format.BAG_HEADER_END
-    while end < size:
-        bag.seek(end)
-        try:
-            chunk, end = _read_chunk(bag, size, connections)
-        except BagFormatError:
-            break  # torn by the crash
-        chunks.append(chunk)
-    return _Scan(end, [connections[number] for number in sorted(connections)], chunks)
-
-
-def _read_chunk(bag: BinaryIO, size: int, connections: Dict[int, bytes]) -> Tuple[ChunkInfo, int]:
-    """Read the chunk at the file's position.
-
-    :returns: the chunk, and where its last index record ends.
-    """
-    position = bag.tell()
-    if bag_format.op_of(bag_format.read_header(bag, size)) != bag_format.OP_CHUNK:
-        raise BagFormatError('no chunk at {}'.format(position))
-    data_size = bag_format.UINT32.unpack(bag_format.read_exactly(bag, 4))[0]
-    data_position = bag.tell()
-    bag.seek(data_size, os.SEEK_CUR)
-    info, end, is_last = _read_indexes(bag, position, size)
-    if is_last or set(info.counts) - set(connections):  # else the messages need not be read
-        bag.seek(data_position)
-        found, messages = _look_into(bag_format.read_exactly(bag, data_size))
-        if messages != sum(info.counts.values()):
-            raise BagFormatError('the index of the chunk at {} is torn'.format(position))
-        connections.update(found)
-    if set(info.counts) - set(connections):
-        raise BagFormatError('messages without a connection at {}'.format(position))
-    return info, end
-
-
-def _read_indexes(bag: BinaryIO, chunk_position: int, size: int) -> Tuple[ChunkInfo, int, bool]:
-    """Read the index records at the file's position.
-
-    :returns: their contents, where they end, and whether nothing sound follows.
-    """
-    counts: Dict[int, int] = {}
-    stamps: List[Stamp] = []
-    end = bag.tell()
-    while True:
-        try:
-            fields = bag_format.read_header(bag, size)
-            if bag_format.op_of(fields) != bag_format.OP_INDEX:
-                is_last = False
-                break
-            entries = bag_format.read_exactly(
-                bag,
-                bag_format.UINT32.unpack(bag_format.read_exactly(bag, 4))[0])
-            if len(entries) < bag_format.INDEX_ENTRY.size:
-                raise BagFormatError('an index without entries')
-        except BagFormatError:
-            is_last = True
-            break
-        stamps += [
-            bag_format.stamp_at(entries, 0),
-            bag_format.stamp_at(entries, len(entries) - bag_format.INDEX_ENTRY.size)
-        ]
-        counts[bag_format.uint32_field(fields, 'conn')] = bag_format.uint32_field(fields, 'count')
-        end = bag.tell()
-    if not counts:
-        raise BagFormatError('the chunk at {} has no index'.format(chunk_position))
-    return ChunkInfo(chunk_position, min(stamps), max(stamps), counts), end, is_last
-
-
-def _look_into(chunk: bytes) -> Tuple[Dict[int, bytes], int]:
-    """The connection records of a chunk, and how many messages it holds."""
-    connections: Dict[int, bytes] = {}
-    messages = position = 0
-    while position + 4 <= len(chunk):
-        header_end = position + 4 + bag_format.UINT32.unpack_from(chunk, position)[0]
-        if header_end + 4 > len(chunk):
-            raise BagFormatError('a chunk ends inside a record')
-        fields = bag_format.parse_fields(chunk[position + 4:header_end])
-        end = header_end + 4 + bag_format.UINT32.unpack_from(chunk, header_end)[0]
-        if bag_format.op_of(fields) == bag_format.OP_CONNECTION:
-            connections[bag_format.uint32_field(fields, 'conn')] = chunk[position:end]
-        else:
-            messages += 1
-        position = end
-    return connections, messages
+        return has_our_name  # the header is torn or damaged
+    if fields.get(bag_format.WRITER_FIELD) == bag_format.WRITER_NAME:
+        return True
+    return has_our_name and set(fields) != _FIELDS_OF_OTHERS
 
 
 def free_name(path: str) -> str:
     """`path`, or `..._2.bag`, `..._3.bag` and so on.
 
-    A name is taken where a bag of that name is there or being written.
+    A name is taken where a bag of that name is there, being written or being mended.
     """
     stem, number = path[:-len('.bag')], 1
-    while os.path.exists(path) or os.path.exists(path + '.active'):
+    while any(os.path.exists(path + suffix) for suffix in ('', '.active', '.damaged')):
         number += 1
         path = '{}_{}.bag'.format(stem, number)
     return path

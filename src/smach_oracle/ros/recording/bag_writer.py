@@ -4,7 +4,8 @@ rosbag.Bag opens a chunk on disk and patches its length in afterwards, keeps an 
 message in memory until it is closed, and is left undefined by a failing write. A recorder beside a
 robot wants the opposite: here a chunk is put together in memory and appended whole, with its index,
 at a known end; a failing write is cut off again, so that what was written stays a valid bag; memory
-holds one chunk, and some ten bytes for each chunk before it.
+holds one chunk, and some ten bytes for each chunk before it. Chunks 1, 2, 4, 8 and so on repeat all
+connections: where the first chunk is damaged, the messages of later ones still have a type.
 """
 import errno
 import fcntl
@@ -123,6 +124,8 @@ class BagWriter:
         self._append(bag_format.pack_chunk_header(len(chunk)) + chunk + indexes)
         self._chunks.append(info)
         self._reset_chunk()
+        if _is_power_of_two(len(self._chunks)):
+            self._buffer += b''.join(item.record for item in self._connections.values())
 
     def sync(self) -> None:
         """Make the disk hold what was flushed.
@@ -203,6 +206,10 @@ def _message_header(connection: int) -> bytes:
     return whole[:-8]
 
 
+def _is_power_of_two(number: int) -> bool:
+    return number & (number - 1) == 0
+
+
 def _stamp_of(entry: Tuple[int, int, int]) -> Stamp:
     return entry[:2]
 
@@ -219,4 +226,4 @@ def _cut_off(fd: int, end: int) -> None:
     try:
         os.ftruncate(fd, end)
     except OSError:
-        pass  # a torn tail costs nothing: `rosbag reindex` and bag_repair cut it off
+        pass  # a torn tail costs nothing: `rosbag reindex` and bag_repair leave it out

@@ -1,11 +1,11 @@
-"""Serialises OracleEvents fast.
+"""Serialises OracleEvents fast, and tells serialised ones from damaged ones.
 
 Through a message object an event costs five times as much, and the machine waits.
 """
 import io
 import json
 import struct
-from typing import Callable
+from typing import Callable, Optional
 
 import genpy
 
@@ -63,6 +63,33 @@ def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
     The stamp is ROS time, or (0, 0).
     """
     return _pack_directly if md5sum == PACKED_MD5 else _pack_through_message
+
+
+def event_number(data: bytes) -> Optional[int]:
+    """The sequence number of a serialised OracleEvent; None where the bytes are none."""
+    try:
+        position = _after_strings(data, _HEAD.size - _LENGTH.size, 1)
+        position = _after_strings(data, position + _WALL_TIME.size, 1)
+        number: int = _UINT64.unpack_from(data, position)[0]
+        position = _after_strings(data, position + _UINT64.size, 4)
+        position = _after_strings(data, position + _FAILURE.size, 4)
+    except (struct.error, UnicodeDecodeError):
+        return None
+    return number if position == len(data) else None
+
+
+def _after_strings(data: bytes, position: int, count: int) -> int:
+    """Where `count` strings end that begin at a position.
+
+    :raises struct.error: where the data end before.
+    :raises UnicodeDecodeError: where one is no text.
+    """
+    for _ in range(count):
+        start = position + 4
+        position = start + _LENGTH.unpack_from(data, position)[0]
+        if position > start:
+            data[start:position].decode('utf-8')
+    return position
 
 
 pack_event = choose_packing(EVENT_TYPE.md5sum)

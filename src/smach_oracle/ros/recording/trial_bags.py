@@ -169,7 +169,8 @@ class TrialBags:
         """Mend the bags of recorders that died in this folder, and our own that met an error."""
         try:
             with self._watch:
-                return recover_folder(self._folder, self._reporter.info, self._reporter.warn)
+                return recover_folder(self._folder, self._reporter.info, self._reporter.warn,
+                                      self._watch.answered)
         except OSError as err:
             self._reporter.warn('{} cannot be searched for bags to mend: {}'.format(
                 self._folder, err))

@@ -23,6 +23,6 @@ def test_json_and_nothing_are_taken(text):
     assert complaint(text) == ''
 
 
-@pytest.mark.parametrize('text', ['mug', '{', 'NaN', "{'a': 1}"])
+@pytest.mark.parametrize('text', ['mug', '{', 'NaN', '1e999', "{'a': 1}"])
 def test_what_is_not_json_is_told_while_typing(text):
     assert 'not JSON' in complaint(text)

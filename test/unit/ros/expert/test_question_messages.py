@@ -4,12 +4,14 @@ holds.
 import io
 
 import genpy
+import pytest
 from expert_fixtures import make_question
 
-from smach_oracle.msg import ExpertQueryGoal, SharedAutonomyGoal, UserdataItem
+from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, SharedAutonomyGoal, UserdataItem
+from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
-from smach_oracle.ros.expert.question_messages import to_goal, to_interface_goal
+from smach_oracle.ros.expert.question_messages import to_answer, to_goal, to_interface_goal
 
 HALF = 'no file caf\udce9.png'  # as Python names a file whose name is no UTF-8
 NOW = genpy.Time(1)
@@ -46,3 +48,15 @@ def test_a_userdata_key_that_is_no_string_is_named_and_keeps_nothing_else_back()
     assert items == {'5': UserdataItem.UNSENT, 'a': UserdataItem.JSON}
     goal = over_the_wire(to_interface_goal(InterfaceOffer('assist', '/assist'), question))
     assert isinstance(goal, SharedAutonomyGoal) and len(goal.userdata) == 2
+
+
+@pytest.mark.parametrize('item, missing', [
+    (UserdataItem('object', UserdataItem.ROS_MESSAGE, '', '', b''), 'type of its ROS message'),
+    (UserdataItem('object', UserdataItem.ROS_MESSAGE, 'std_msgs/Empty', '', b''), 'md5'),
+    (UserdataItem('object', UserdataItem.JSON, '', '', b'1e999'), '1e999'),
+])
+def test_the_robot_refuses_outputs_that_it_cannot_read_and_says_what_is_missing(item, missing):
+    decision = ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='done', outputs=[item],
+                              by='ann')
+    with pytest.raises(AnswerError, match='answer of ann cannot be used.*object.*' + missing):
+        to_answer(decision)

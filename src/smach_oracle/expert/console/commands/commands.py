@@ -3,10 +3,10 @@
 A command is a JSON object {"id": number, "do": name, ...arguments}. No argument is ever the name of
 a topic, a service or a type to call: questions are named by their keys, and must be open ones.
 """
-import json
 from typing import Any, Dict, Mapping, NamedTuple, Optional
 
 from smach_oracle.oracle.errors import OracleError
+from smach_oracle.ros.strict_json import load_json
 
 from .checks import QUESTION, CommandSpec, one_of, outputs, shown, text, whole
 from .driving import DRIVING_COMMANDS
@@ -82,16 +82,12 @@ def _decode(text: object) -> Dict[str, Any]:
     if len(text) > MOST_BYTES:
         raise CommandError('a command has at most {} bytes'.format(MOST_BYTES))
     try:
-        data = json.loads(text, parse_constant=_refuse)
+        data = load_json(text)
     except (ValueError, RecursionError) as err:
         raise CommandError('not JSON: {}'.format(err)) from err
     if not isinstance(data, dict):
         raise CommandError('a command is a JSON object')
     return data
-
-
-def _refuse(name: str) -> float:
-    raise ValueError('{} is not a JSON number'.format(name))
 
 
 def _person(value: object) -> str:

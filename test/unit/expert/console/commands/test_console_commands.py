@@ -48,6 +48,7 @@ def test_what_is_left_out_is_empty():
 
 @pytest.mark.parametrize('message', [
     '', 'null', '[]', '{', '1', '"x"', b'{"id": 1}', '{"id": 1, "do": "claim", "question": NaN}',
+    '{"id": 1, "do": "answer", "outputs": [1e999]}',
     '[' * 60000, 'x' * (MOST_BYTES + 1),
     text(),
     text(do=None),

@@ -1,0 +1,56 @@
+"""Whether the preconditions in the settings name states of a script's machine."""
+from typing import Dict, Iterator, NamedTuple, Tuple
+
+import smach
+from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.settings import Settings
+
+
+class _Use(NamedTuple):
+    """A precondition that names a state, where it is used."""
+
+    key: str
+    named: str
+    others: Tuple[str, ...]  # the labels that it may name there
+
+
+def check_precondition_labels(machine: smach.StateMachine, settings: Settings) -> None:
+    """Check that preconditions name other states beside the state that they are for.
+
+    A label may occur in several nested machines: it is enough that the precondition fits one.
+
+    :raises SettingsError: where one fits nowhere.
+    """
+    wrong: Dict[Tuple[str, str], _Use] = {}
+    right = set()
+    for use in _uses(machine, settings, ''):
+        if use.named in use.others:
+            right.add(use[:2])
+        else:
+            wrong.setdefault(use[:2], use)
+    for place, use in wrong.items():
+        if place not in right:
+            raise SettingsError(use.key, use.named, 'the labels of the other states there: '
+                                + ', '.join(use.others))
+
+
+def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator[_Use]:
+    children = _children(container)
+    for label, state in children.items():
+        below = '{}/{}'.format(path, label) if path else label
+        if isinstance(container, smach.StateMachine):
+            others = tuple(sorted(other for other in children if other != label))
+            for spec in settings.for_state(path, label).preconditions:
+                key = below if 'preconditions' in settings.states.get(below, ()) else label
+                for named in spec.labels():
+                    yield _Use('states.{}.preconditions'.format(key), named, others)
+        if settings.nested and isinstance(state, smach.Container):
+            yield from _uses(state, settings, below)
+
+
+def _children(container: smach.Container) -> Dict[str, smach.State]:
+    """The states by label; none where an Iterator has no contained state yet."""
+    try:
+        return dict(container.get_children())
+    except (AttributeError, TypeError):
+        return {}

@@ -1,0 +1,159 @@
+"""A mistake in the settings ends oracle_run with exit code 2 before any state runs."""
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
+PRELUDE = '''
+print('SCRIPT RUNS', flush=True)
+import smach
+class Runs(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
+    def execute(self, userdata):
+        print('STATE RUNS', flush=True)
+        return 'succeeded'
+def machine(*labels):
+    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    with sm:
+        for label, after in zip(labels, labels[1:] + ('succeeded',)):
+            smach.StateMachine.add(label, Runs(), {'succeeded': after})
+    return sm
+def ready(userdata):
+    return True
+'''
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run a script under oracle_run with settings; returns exit code, output and errors."""
+    def run_script(settings, text='machine("HOME", "PICK").execute()'):
+        (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent(text))
+        (tmp_path / 'oracle.yaml').write_text(settings)
+        (tmp_path / 'checks.py').write_text('def clear(userdata):\n    return True\n')
+        environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
+        done = subprocess.run(
+            [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', 'task.py'],
+            cwd=str(tmp_path), env=environment, timeout=60, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, universal_newlines=True)
+        return done.returncode, done.stdout, done.stderr
+    return run_script
+
+
+def precondition(given, state='PICK'):
+    return 'states:\n  {}:\n    preconditions: [{}]\n'.format(state, given)
+
+
+@pytest.mark.parametrize('name, why', [
+    ('python:no_such_module:clear', "No module named 'no_such_module'"),
+    ('python:checks:claer', "checks has no 'claer'"),
+    ('python:__main__:raedy', "__main__ has no 'raedy'"),
+    ('python:smach_oracle.no_such_module:x', "No module named 'smach_oracle.no_such_module'"),
+    ('python:checks', 'the form is python:module:attribute'),
+])
+def test_a_wrong_python_name_is_told_before_the_script_runs(run, name, why):
+    code, out, errors = run(precondition('"{}"'.format(name)))
+    assert (code, out) == (2, '')
+    assert errors.startswith('oracle_run: oracle.yaml line 3: states.PICK.preconditions')
+    assert name in errors and why in errors and 'Traceback' not in errors
+
+
+@pytest.mark.parametrize('name', ['python:checks:clear', 'python:__main__:ready',
+                                  'python:os.path:exists', 'python:math:isnan'])
+def test_a_right_python_name_is_taken(run, name):
+    code, out, errors = run(precondition('"{}"'.format(name)))
+    assert (code, out.count('STATE RUNS')) == (0, 2), errors
+
+
+@pytest.mark.parametrize('text', [
+    'import sys, os\nos.mkdir("more")\nopen("more/late.py", "w").write("def ok(u): return True")\n'
+    'sys.path.append("more")\nmachine("HOME", "PICK").execute()',
+])
+def test_a_module_that_the_script_alone_makes_known_is_believed(run, text):
+    code, out, errors = run(precondition('"python:late:ok"'), text)
+    assert (code, out.count('STATE RUNS')) == (0, 2), errors
+
+
+MISTAKES = [
+    (precondition('HOEM'), "line 3: states.PICK.preconditions: 'HOEM' is not allowed; allowed: "
+     'the labels of the other states there: HOME'),
+    (precondition('PICK'), "'PICK' is not allowed"),
+    (precondition('{check: "python:checks:clear", achieve: HOEM}'), "'HOEM' is not allowed"),
+    ('oracle_label: PICK\n', "line 1: oracle_label: 'PICK' is not allowed; allowed: a name that is "
+     'no state or outcome of TASK'),
+    ('oracle_label: succeeded\n', "oracle_label: 'succeeded' is not allowed"),
+]
+
+
+@pytest.mark.parametrize('settings, text', MISTAKES)
+def test_what_the_machine_alone_can_tell_is_told_before_its_first_state(run, settings, text):
+    code, out, errors = run(settings)
+    assert code == 2 and 'SCRIPT RUNS' in out and 'STATE RUNS' not in out
+    assert errors.splitlines()[-1].startswith('oracle_run: oracle.yaml ') and text in errors
+    assert 'Traceback' not in errors
+
+
+@pytest.mark.parametrize('text', [
+    """
+    try:
+        machine('HOME', 'PICK').execute()
+    except:
+        pass
+    machine('OTHER').execute()
+    """,
+    """
+    import sys
+    try:
+        machine('HOME', 'PICK').execute()
+    finally:
+        sys.exit(0)
+    """,
+    """
+    import threading
+    threading.Thread(target=machine('HOME', 'PICK').execute).start()
+    threading.Event().wait(50)
+    """,
+    """
+    import threading
+    thread = threading.Thread(target=machine('HOME', 'PICK').execute)
+    thread.start()
+    thread.join()
+    """,
+    """
+    outer = smach.Concurrence(outcomes=['succeeded', 'aborted'], default_outcome='aborted',
+                              outcome_map={})
+    with outer:
+        smach.Concurrence.add('INNER', machine('HOME', 'PICK'))
+    outer.execute()
+    """,
+])
+def test_the_exit_code_is_2_whatever_the_script_makes_of_it(run, text):
+    code, out, errors = run(precondition('HOEM'), text)
+    assert code == 2 and 'SCRIPT RUNS' in out and 'STATE RUNS' not in out, errors
+    assert errors.count('oracle_run: oracle.yaml line 3') == 1
+
+
+def test_a_precondition_that_fits_one_of_several_nested_machines_is_taken(run):
+    code, out, errors = run(precondition('HOME'), """
+        outer = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+        with outer:
+            smach.StateMachine.add('ONE', machine('PICK', 'AWAY'), {'succeeded': 'TWO'})
+            smach.StateMachine.add('TWO', machine('PICK', 'HOME'))
+        print(outer.execute())
+    """)
+    assert (code, out.count('STATE RUNS')) == (0, 4), errors
+
+
+def test_a_precondition_of_a_nested_state_is_looked_up_beside_it(run):
+    code, out, errors = run(precondition('TWO', state='ONE/PICK'), """
+        outer = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+        with outer:
+            smach.StateMachine.add('ONE', machine('PICK', 'AWAY'), {'succeeded': 'TWO'})
+            smach.StateMachine.add('TWO', Runs())
+        outer.execute()
+    """)
+    assert code == 2 and 'SCRIPT RUNS' in out and 'STATE RUNS' not in out
+    assert 'states.ONE/PICK.preconditions' in errors and 'other states there: AWAY' in errors
