@@ -5,10 +5,12 @@ signal takes it: a signal that meets the main thread within a call to the master
 for good. In another thread the call ends while the handler waits for the lock.
 """
 import threading
-from typing import Callable, Generic, List, TypeVar
+from typing import Callable, List, TypeVar
 
 import rospy
 from rospy.impl.paramserver import get_param_server_cache
+
+from smach_oracle.oracle.background import BackgroundCall
 
 # rospy asks for it at each line of the log
 _ROSOUT_PARAM = '/rosout_disable_topics_generation'
@@ -28,15 +30,17 @@ def outside_main_thread(function: Callable[[], Result]) -> Result:
     """
     if threading.current_thread() is not threading.main_thread():
         return function()
-    call = _Call(function)
-    thread = threading.Thread(target=call.run, name='calls the master', daemon=True)
-    thread.start()
+    results: List[Result] = []
+    call = BackgroundCall(lambda: results.append(function()), 'calls the master')
+    call.start()
     looks_left = SHUTDOWN_WAIT_S / _LOOK_S
     while not call.done.wait(_LOOK_S):
         looks_left -= rospy.core.is_shutdown_requested()
         if looks_left <= 0:
             raise rospy.ROSInterruptException('the node shuts down; the master has not answered')
-    return call.result()
+    if call.error is not None:
+        raise call.error
+    return results[0]
 
 
 def keep_log_from_master() -> None:
@@ -47,26 +51,3 @@ def keep_log_from_master() -> None:
     """
     if rospy.get_param_cached(_ROSOUT_PARAM, None) is None:
         get_param_server_cache().set(_ROSOUT_PARAM, False)
-
-
-class _Call(Generic[Result]):
-    """One call: what it returned, or raised."""
-
-    def __init__(self, function: Callable[[], Result]) -> None:
-        self.done = threading.Event()
-        self._function = function
-        self._returned: List[Result] = []
-        self._raised: List[BaseException] = []
-
-    def run(self) -> None:
-        try:
-            self._returned.append(self._function())
-        except BaseException as err:  # it belongs to the caller
-            self._raised.append(err)
-        finally:
-            self.done.set()
-
-    def result(self) -> Result:
-        if self._raised:
-            raise self._raised[0]
-        return self._returned[0]

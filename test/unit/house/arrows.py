@@ -9,8 +9,9 @@ MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
-    'ros': {'oracle.asking', 'oracle.container', 'oracle.decision', 'oracle.errors',
-            'oracle.records', 'oracle.settings', 'oracle.OracleContainer', 'oracle.oracle_of'},
+    'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
+            'oracle.errors', 'oracle.records', 'oracle.settings', 'oracle.OracleContainer',
+            'oracle.oracle_of'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
