@@ -154,6 +154,8 @@ class LibraryTest(unittest.TestCase):
         self.assertAlmostEqual(question.query.deadline, 30.0, delta=5.0)  # as in the code
         self.answer(expert, question)
         self.finish(program)
+        self.assertEqual(program.output().count(
+            'ROBOT: the parameter /task/oracle overrides max_recoveries: 3, now 0'), 1)
 
     def test_a_settings_object_is_taken_as_it_is(self) -> None:
         self.set_param('oracle', {'max_recoveries': 0})

@@ -8,7 +8,7 @@ recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves 
 """
 import functools
 import weakref
-from typing import Any, List, Mapping, MutableMapping, NamedTuple, Optional, Sequence
+from typing import Any, List, Mapping, MutableMapping, NamedTuple, Optional, Sequence, Set
 
 import rospy
 
@@ -36,6 +36,7 @@ class _GivenSettings(NamedTuple):
     nested: Optional[bool]
 
 
+_told: Set[str] = set()  # a script may build a machine for each trial
 _given: MutableMapping[BareContainer, _GivenSettings] = weakref.WeakKeyDictionary()
 
 
@@ -137,9 +138,19 @@ def _take_parameters(machine: BareContainer) -> None:
     parameters = read_param(DEFAULT_PARAM)
     if parameters:
         settings = LoadedSettings(given.settings)
-        settings.put(parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM))
+        name = rospy.resolve_name(DEFAULT_PARAM)
+        for change in settings.overridden_by(parameters):
+            _tell_once('{}: the parameter {} overrides {}'.format(
+                oracle_of(machine).path, name, change))
+        settings.put(parameters, 'parameter ' + name)
         # Not strict: one parameter serves every machine of the node, and not each of them has every
         # state.
         BareContainer.wrap(machine, settings=checked(settings, given.preconditions),
                            nested=given.nested, strict=False, recover=oracle_of(machine).recovers)
     del _given[machine]  # only now: a program that tries again after an error gets it again
+
+
+def _tell_once(text: str) -> None:
+    if text not in _told:
+        _told.add(text)
+        rospy.loginfo(text)

@@ -41,6 +41,12 @@ class LoadedSettings(Dict[str, Any]):
             line = (lines or {}).get(key)
             self._origins[key] = '{} line {}'.format(origin, line) if line else origin
 
+    def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
+        """What `put` would replace by something else, as "max_recoveries: 5, now 0"."""
+        mine, theirs = dict(_leaves(self)), dict(_leaves(values))
+        return ['{}: {!r}, now {!r}'.format(key, mine[key], value)
+                for key, value in theirs.items() if key in mine and mine[key] != value]
+
     def origin(self, key: str) -> str:
         """Where a dotted key, or else the mapping it should be in, was set; '' where nowhere."""
         while key:
@@ -170,6 +176,14 @@ def _dotted_keys(values: Mapping[str, Any], prefix: str = '') -> Iterator[str]:
         yield dotted
         if isinstance(value, Mapping):
             yield from _dotted_keys(value, dotted + '.')
+
+
+def _leaves(values: Mapping[str, Any], prefix: str = '') -> Iterator[Tuple[str, Any]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, '{}{}.'.format(prefix, key))
+        else:
+            yield '{}{}'.format(prefix, key), value
 
 
 def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tuple[str, Any]]:

@@ -223,3 +223,11 @@ def test_the_key_is_named_where_a_precondition_cannot_be_imported(write, checks_
         Settings.from_dict(settings, resolve_python)
     text = str(settings.located(caught.value))
     assert 'line 3' in text and 'states.PICK.preconditions' in text and "has no 'blind'" in text
+
+
+def test_what_a_parameter_overrides_is_named():
+    settings = LoadedSettings({'max_recoveries': 5, 'memory': 10,
+                               'states': {'PICK': {'prior': 0.2}}})
+    assert settings.overridden_by({'max_recoveries': 0, 'memory': 10, 'deadline_s': 3.0,
+                                   'states': {'PICK': {'prior': 0.3}}}) == [
+        'max_recoveries: 5, now 0', 'states.PICK.prior: 0.2, now 0.3']
