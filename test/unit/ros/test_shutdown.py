@@ -16,7 +16,8 @@ PRELUDE = '''
 import ctypes, signal, sys, time
 from smach_oracle.ros.shutdown import ShutdownGuard
 def say(text):
-    print(text, flush=True)
+    sys.stdout.write(text + '\\n')  # at once: several threads say something
+    sys.stdout.flush()
 guard = ShutdownGuard(lambda: say('preempt'), lambda limit_s: say('close'))
 guard.install()
 '''
