@@ -89,9 +89,17 @@ class OracleContainer(BareContainer):
             return super().execute(*args, **kwargs)
         oracle.describe_failure = describe_failure
         if not attachments().has(self):
-            outside_main_thread(functools.partial(_attach, self))
+            self._attach()
         with attachments().trial(self):
             return super().execute(*args, **kwargs)
+
+    def _attach(self) -> None:
+        try:
+            _take_parameters(self)
+            outside_main_thread(functools.partial(attachments().attach, self))
+        except rospy.ROSInterruptException as err:
+            # as a bare machine, it runs and finds the shutdown itself
+            rospy.logwarn('%s is not attached to its node: %s', oracle_of(self).path, err)
 
 
 def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> Settings:
@@ -122,11 +130,6 @@ def _remember(machine: BareContainer, settings: SettingsLike, preconditions: Pre
         _given[machine] = _GivenSettings(settings, preconditions, nested)
 
 
-def _attach(machine: OracleContainer) -> None:
-    _take_parameters(machine)
-    attachments().attach(machine)
-
-
 def _take_parameters(machine: BareContainer) -> None:
     """Merge the parameter `~oracle` over what the machine was given in code.
 
@@ -135,7 +138,8 @@ def _take_parameters(machine: BareContainer) -> None:
     if machine not in _given or not rospy.core.is_initialized():
         return
     given = _given[machine]
-    parameters = read_param(DEFAULT_PARAM)
+    # Python objects that they name are looked up in this thread: a module may be imported for it
+    parameters = outside_main_thread(functools.partial(read_param, DEFAULT_PARAM))
     if parameters:
         settings = LoadedSettings(given.settings)
         name = rospy.resolve_name(DEFAULT_PARAM)

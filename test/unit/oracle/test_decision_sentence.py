@@ -25,6 +25,8 @@ def facts(action, **fields):
      'PICK keeps failing (1 of its last 10), and DETECT did not help: asking an expert, 300 s'),
     (facts(Action.ASK, spent=5, asked='an expert, without end'),
      'PICK failed again after 5 recoveries of this trial: asking an expert, without end'),
+    (facts(Action.ASK, spent=0),
+     'PICK failed (1 of its last 10), and no recovery of it is allowed: asking an expert'),
     (facts(Action.ASK, spent=1),
      'PICK failed again after 1 recovery of this trial: asking an expert'),
     (facts(Action.ASK, blocked='MOVE still runs'),

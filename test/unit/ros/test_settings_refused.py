@@ -51,7 +51,7 @@ def precondition(given, state='PICK'):
     ('python:no_such_module:clear', "No module named 'no_such_module'"),
     ('python:checks:claer', "checks has no 'claer'"),
     ('python:__main__:raedy', "__main__ has no 'raedy'"),
-    ('python:smach_oracle.no_such_module:x', "No module named 'smach_oracle.no_such_module'"),
+    ('python:json.no_such_module:x', "No module named 'json.no_such_module'"),
     ('python:checks', 'the form is python:module:attribute'),
 ])
 def test_a_wrong_python_name_is_told_before_the_script_runs(run, name, why):
@@ -75,6 +75,32 @@ def test_a_right_python_name_is_taken(run, name):
 def test_a_module_that_the_script_alone_makes_known_is_believed(run, text):
     code, out, errors = run(precondition('"python:late:ok"'), text)
     assert (code, out.count('STATE RUNS')) == (0, 2), errors
+
+
+def test_a_package_that_looks_for_its_modules_elsewhere_is_believed(run):
+    text = """
+        import os
+        os.mkdir('elsewhere')
+        open('elsewhere/ready.py', 'w').write('def ok(userdata): return True')
+        os.mkdir('split')
+        open('split/__init__.py', 'w').write('__path__.append("elsewhere")')
+        machine('HOME', 'PICK').execute()
+        """
+    assert run('{}', text)[0] == 0  # the package is there at the next start
+    code, out, errors = run(precondition('"python:split.ready:ok"'))
+    assert (code, out.count('STATE RUNS')) == (0, 2), errors
+
+
+def test_one_file_serves_several_machines_of_a_script(run):
+    text = """
+        first, second = machine('DETECT', 'GRASP'), machine('GRASP', 'PLACE')
+        first.execute()
+        second.execute()
+        """
+    code, out, errors = run(precondition('DETECT', 'GRASP'), text)
+    assert (code, out.count('STATE RUNS')) == (0, 4), errors
+    code, out, errors = run(precondition('PLACE', 'GRASP'), text)
+    assert (code, out.count('STATE RUNS')) == (0, 4), errors
 
 
 MISTAKES = [

@@ -35,7 +35,9 @@ def cause_of(facts: DecisionFacts) -> str:
 
 
 def _failed(facts: DecisionFacts) -> str:
-    if facts.spent >= 0:
+    if facts.spent == 0:
+        return '{} failed ({}), and no recovery of it is allowed'.format(facts.state, _rate(facts))
+    if facts.spent > 0:
         return '{} failed again after {} of this trial'.format(
             facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent))
     return '{} {} ({})'.format(facts.state, 'keeps failing' if facts.continuous else 'failed',

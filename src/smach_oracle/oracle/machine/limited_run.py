@@ -8,7 +8,7 @@ from typing import Any, Iterable, Iterator, Set, Tuple
 from .engine_probe import EngineProbe
 
 # asked for again at once, where it cannot have been long
-_LEAST_S = 0.01
+_LEAST_S = 0.05
 
 
 class LimitedRun:

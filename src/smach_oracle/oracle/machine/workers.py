@@ -23,11 +23,12 @@ _STOPPED = 'still runs since a preempt or a shutdown'
 
 
 class LimitedResult(NamedTuple):
-    """How a state or a function went in its thread; exactly one of the three is told."""
+    """How a state or a function went in its thread; one of the first three is told."""
 
     outcome: object = None
     error: Optional[BaseException] = None
     overrun: str = ''  # what happened, in words
+    late: bool = False  # it still runs
 
 
 class _Left(NamedTuple):
@@ -102,28 +103,34 @@ class Workers:
         recall_preempts(state)
 
     def call(self, function: Callable[[smach.UserData], object], userdata: smach.UserData,
-             gate: UserdataGate, limit_s: Optional[float],
+             gate: UserdataGate, limit_s: Optional[float], grace_s: float,
              stopped: Callable[[], bool]) -> LimitedResult:
         """Call `function` until its time limit (s, monotonic; None: none) or until `stopped()`.
 
-        `gate` is what `userdata` writes through. What the function raises is told in the result,
-        not raised.
+        It has `grace_s` more to end by itself, in which it writes nothing any more, and is left
+        behind then. `gate` is what `userdata` writes through. What the function raises is told in
+        the result, not raised.
         """
         call = BackgroundCall(functools.partial(function, userdata), 'smach_oracle function')
         call.start()
-        seconds = math.inf if limit_s is None else limit_s
-        end = time.monotonic() + seconds
+        end = time.monotonic() + (math.inf if limit_s is None else limit_s)
+        why = ''
         try:
-            while not call.done.wait(min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))):
-                if time.monotonic() >= end and self._abandon(function, call, gate, _LATE):
-                    return LimitedResult(
-                        overrun='overran its time limit of {:g} s'.format(seconds))
-                if stopped() and self._abandon(function, call, gate, _STOPPED):
-                    return LimitedResult(overrun='was abandoned at a preempt or a shutdown')
+            while not why and not call.done.wait(
+                    min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))):
+                if time.monotonic() >= end:
+                    why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
+                elif stopped():
+                    why = 'was stopped by a preempt or a shutdown'
+            if not why:
+                return LimitedResult(call.result, call.error)
+            gate.shut()
+            wait(call.done, grace_s)
         except BaseException:
             self._abandon(function, call, gate, _STOPPED)
             raise
-        return LimitedResult(call.result, call.error)
+        late = self._abandon(function, call, gate, _STOPPED if stopped() else _LATE)
+        return LimitedResult(overrun=why + (' and was left behind' if late else ''), late=late)
 
     def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
                      gate: UserdataGate, grace_s: float) -> bool:

@@ -89,10 +89,15 @@ class Recovery:
         if action is not Action.ASK:
             target = (record.label if action is Action.REVISIT
                       else policy.step_back_target(self._context))
-        why_not = self._blocked(target) if target else ''
+        why_not = self._why_not(target) if target else ''
         if why_not:
-            action, target, why_not = Action.ASK, '', '{} {}'.format(target, why_not)
+            action, target = Action.ASK, ''
         return self._facts_of(action, target=target, blocked=why_not)
+
+    def _why_not(self, target: str) -> str:
+        """Return why the machine cannot go on to a state by itself now, '' where it can."""
+        blocked = self._blocked(target)
+        return '{} {}'.format(target, blocked) if blocked else self._preconditions.left_behind
 
     def _facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         record = self._record
@@ -154,13 +159,18 @@ class Recovery:
         if self.stopped():
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
-                          text='preempted' if self._cancelled.is_set() else 'shutdown')
+                          text=self._why_stopped())
             return self._preempted()
         if reply.answer is not None:
             return self._obey(reply.answer)
         self.emit(EventKind.QUERY_EXPIRED, query_id=reply.question_id,
                   text='{}; fallback: {}'.format(reply.why_none, self._fallback_in_words()))
         return self._fall_back(reply.why_none)
+
+    def _why_stopped(self) -> str:
+        if self._cancelled.is_set():
+            return 'preempted'
+        return 'left behind' if self._node.is_left_behind() else 'shutdown'
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""

@@ -1,5 +1,6 @@
 """Whether the preconditions in the settings name states of a script's machine."""
-from typing import Dict, Iterator, NamedTuple, Tuple
+import gc
+from typing import Dict, Iterator, List, NamedTuple, Tuple
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
@@ -14,12 +15,11 @@ class _Use(NamedTuple):
     others: Tuple[str, ...]  # the labels that it may name there
 
 
-def check_precondition_labels(machine: smach.StateMachine, settings: Settings) -> None:
-    """Check that preconditions name other states beside the state that they are for.
+def misplaced_preconditions(machine: smach.StateMachine,
+                            settings: Settings) -> List[SettingsError]:
+    """Return the preconditions that name no other state beside the state that they are for.
 
     A label may occur in several nested machines: it is enough that the precondition fits one.
-
-    :raises SettingsError: where one fits nowhere.
     """
     wrong: Dict[Tuple[str, str], _Use] = {}
     right = set()
@@ -28,10 +28,23 @@ def check_precondition_labels(machine: smach.StateMachine, settings: Settings) -
             right.add(use[:2])
         else:
             wrong.setdefault(use[:2], use)
-    for place, use in wrong.items():
-        if place not in right:
-            raise SettingsError(use.key, use.named, 'the labels of the other states there: '
-                                + ', '.join(use.others))
+    return [SettingsError(use.key, use.named, 'the labels of the other states there: '
+                          + ', '.join(use.others))
+            for place, use in wrong.items() if place not in right]
+
+
+def is_label_elsewhere(name: str, machine: smach.StateMachine) -> bool:
+    """Whether a container of this process that is not in the machine has a state of this name."""
+    own = {id(each) for each in _containers(machine)}
+    return any(id(each) not in own and name in _children(each) for each in gc.get_objects()
+               if isinstance(each, smach.Container))
+
+
+def _containers(container: smach.Container) -> Iterator[smach.Container]:
+    yield container
+    for state in _children(container).values():
+        if isinstance(state, smach.Container):
+            yield from _containers(state)
 
 
 def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator[_Use]:

@@ -12,6 +12,7 @@ from typing import Iterator, List, Optional, Sequence, Set
 from ..loaded_settings import split_python_name
 
 _CHANGES_PATH = ('sys.path', 'load_manifest', 'addsitedir', 'import_module', 'exec')
+_EXTENDS_PATH = ('__path__', 'extend_path', 'declare_namespace', 'exec')
 _MAKES_NAMES = ('exec', 'globals', 'setattr', 'vars', 'locals', '__getattr__', '__dict__')
 
 
@@ -43,9 +44,9 @@ def _source_of(script: str, module: str, attribute: str) -> Optional[str]:
     found: Optional[ModuleSpec] = None
     parts = module.split('.')
     for number in range(len(parts)):
-        found = _find('.'.join(parts[:number + 1]), path)
+        parent, found = found, _find('.'.join(parts[:number + 1]), path)
         if found is None:
-            if _changes_path(script):
+            if _changes_path(script) or parent is not None and _extends_path(parent):
                 return None
             raise ImportError('No module named {!r}'.format('.'.join(parts[:number + 1])))
         path = found.submodule_search_locations
@@ -55,7 +56,28 @@ def _source_of(script: str, module: str, attribute: str) -> Optional[str]:
 
 
 def _find(module: str, path: Optional[Sequence[str]]) -> Optional[ModuleSpec]:
-    return None if path is None else PathFinder.find_spec(module, list(path))
+    if path is None:
+        return None
+    found = PathFinder.find_spec(module, list(path))
+    if found is None and '.' not in module:
+        found = _found_otherwise(module)
+    return found
+
+
+def _found_otherwise(module: str) -> Optional[ModuleSpec]:
+    """By the finders of packages that are installed for development, among others."""
+    for finder in sys.meta_path:
+        if finder is not PathFinder and hasattr(finder, 'find_spec'):
+            found = finder.find_spec(module, None)
+            if found is not None:
+                return found
+    return None
+
+
+def _extends_path(package: ModuleSpec) -> bool:
+    """Whether a package may look for its modules elsewhere, as those of a catkin devel space do."""
+    names = _names_in(package.origin or '')
+    return names is None or bool(names.intersection(_EXTENDS_PATH))
 
 
 def _changes_path(script: str) -> bool:

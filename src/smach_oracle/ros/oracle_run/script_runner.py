@@ -33,7 +33,7 @@ from smach_oracle.oracle.settings.settings import Settings
 from .. import attachment
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python
 from ..shutdown import ShutdownGuard
-from .precondition_labels import check_precondition_labels
+from .precondition_labels import is_label_elsewhere, misplaced_preconditions
 from .python_names import check_python_name
 from .refusal import USAGE_ERROR, Refusal
 
@@ -220,10 +220,20 @@ class MachineWrapper:
         with _located(loaded):
             settings = read_settings(loaded)
             if self._invocation.recover:
-                check_precondition_labels(machine, settings)
+                self._check_preconditions(machine, settings)
             OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
                                  name=self.name(machine), strict=False,
                                  recover=self._invocation.recover)
+
+    def _check_preconditions(self, machine: smach.StateMachine, settings: Settings) -> None:
+        """Refuse what is nowhere, before anything has moved; warn of it at a later machine.
+
+        One file serves all machines of a script, and not each of them has every state.
+        """
+        for problem in misplaced_preconditions(machine, settings):
+            if not self._names and not is_label_elsewhere(str(problem.value), machine):
+                raise problem
+            smach.logwarn('{}: {}'.format(self.name(machine), problem))
 
     def name(self, machine: smach.StateMachine) -> str:
         """A name for the machine, such as "PICK_AND_PLACE".
