@@ -4,11 +4,9 @@ import pytest
 from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.decision.sentence import DecisionFacts, decision_sentence
 
-TEN = {'window': [0] * 9 + [1]}
-
 
 def facts(action, **fields):
-    return DecisionFacts('PICK', fields.pop('learned', TEN), fields.pop('rate', 0.1),
+    return DecisionFacts('PICK', fields.pop('recent', (1, 10)), fields.pop('rate', 0.1),
                          fields.pop('continuous', False), action, **fields)
 
 
@@ -31,9 +29,9 @@ def facts(action, **fields):
      'PICK failed again after 1 recovery of this trial: asking an expert'),
     (facts(Action.ASK, blocked='MOVE still runs'),
      'PICK failed (1 of its last 10); MOVE still runs: asking an expert'),
-    (facts(Action.REVISIT, target='PICK', learned={'window': [1]}),
+    (facts(Action.REVISIT, target='PICK', recent=(1, 1)),
      'PICK failed (its first result): trying it again'),
-    (facts(Action.REVISIT, target='PICK', learned={}, rate=0.255),
+    (facts(Action.REVISIT, target='PICK', recent=(0, 0), rate=0.255),
      'PICK failed (failure rate 26%): trying it again'),
 ])
 def test_a_decision_is_told_in_a_sentence(given, sentence):

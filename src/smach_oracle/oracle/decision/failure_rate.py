@@ -97,11 +97,16 @@ class FailureRate:
     @property
     def rate(self) -> float:
         """Failure rate, 0 to 1."""
+        failures, results = self.recent
+        return (failures + self.prior * (self.memory - results)) / self.memory
+
+    @property
+    def recent(self) -> Tuple[int, int]:
+        """How many failures there are among how many latest results; O(1)."""
         failures = len(self._failed)
         if failures and self._failed[0] < self._results - self.memory:
             failures -= 1
-        missing = max(0, self.memory - self._results)
-        return (failures + self.prior * missing) / self.memory
+        return failures, min(self.memory, self._results)
 
     def snapshot(self) -> Dict[str, Any]:
         """Return what was learned as plain data, for `restore` and the rates file.
@@ -180,6 +185,11 @@ class ExponentialFailureRate:
     def rate(self) -> float:
         """Failure rate, 0 to 1."""
         return self._rate
+
+    @property
+    def recent(self) -> Tuple[int, int]:
+        """Nothing: it does not know single results."""
+        return 0, 0
 
     def snapshot(self) -> Dict[str, Any]:
         """Return what was learned as plain data, for `restore` and the rates file."""

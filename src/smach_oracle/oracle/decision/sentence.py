@@ -2,7 +2,7 @@
 
 "PICK failed (1 of its last 10): trying it again."
 """
-from typing import Any, Mapping, NamedTuple, Sequence
+from typing import NamedTuple, Sequence, Tuple
 
 from .policy import Action
 
@@ -11,7 +11,7 @@ class DecisionFacts(NamedTuple):
     """What led to a decision, and what it is."""
 
     state: str  # the failed one
-    learned: Mapping[str, Any]  # its failure rate, as `FailureRate.snapshot` gives it
+    recent: Tuple[int, int]  # failures among its latest results, and their number; 0, 0: not known
     rate: float  # 0 to 1
     continuous: bool
     action: Action
@@ -45,12 +45,12 @@ def _failed(facts: DecisionFacts) -> str:
 
 
 def _rate(facts: DecisionFacts) -> str:
-    window = facts.learned.get('window')
-    if not window:
+    failures, results = facts.recent
+    if not results:
         return 'failure rate {:.0f}%'.format(100 * facts.rate)
-    if len(window) == 1:
+    if results == 1:
         return 'its first result'
-    return '{} of its last {}'.format(sum(window), len(window))
+    return '{} of its last {}'.format(failures, results)
 
 
 def _helped(facts: DecisionFacts) -> str:

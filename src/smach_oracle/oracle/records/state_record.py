@@ -121,6 +121,12 @@ class StateRecord:
             return self._up_to_date().rate
 
     @property
+    def recent(self) -> Tuple[int, int]:
+        """Failures among the latest results, and their number; 0, 0 where that is not known."""
+        with self._lock:
+            return self._up_to_date().recent
+
+    @property
     def failure_class(self) -> FailureClass:
         """Class by the learned rate."""
         return classify(self.rate, self.settings.moderate_from, self.settings.high_from)

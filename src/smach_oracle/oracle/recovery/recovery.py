@@ -101,7 +101,7 @@ class Recovery:
 
     def _facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         record = self._record
-        return DecisionFacts(record.label, record.learned(), record.rate, self._continuous, action,
+        return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
                              met=self._met, not_met=self._not_met,
                              asked=self._asked_in_words() if action is Action.ASK else '', **fields)
 

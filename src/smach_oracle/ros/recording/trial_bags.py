@@ -2,8 +2,9 @@
 
 A bag is given up where the disk does not take it.
 """
+import threading
 import time
-from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Dict, NamedTuple, Optional, Tuple, Union
 
 from smach_oracle.msg import RecorderStatus
 from smach_oracle.oracle.records.events import Event, EventKind
@@ -14,6 +15,7 @@ from .recorder_status import DiskWatch, LossCounter, RecorderState, RecordingSta
 from .trial_bag import SyncBudget, TrialBag
 
 FIRST_RETRY_S, LONGEST_RETRY_S = 0.5, 5.0
+MEND_WAIT_S = 2.0  # for bags to be mended, before the robot goes on beside it
 KeptKey = Tuple[Union[str, bytes], ...]
 KEPT_FOR_NEXT_BAG = 500  # latched messages and structures with which every bag begins
 
@@ -58,6 +60,7 @@ class TrialBags:
         self._error = ''
         self._retry_at = 0.0
         self._retry_s = FIRST_RETRY_S
+        self._mending: Optional[threading.Thread] = None
 
     def write(self, item: QueueItem) -> None:
         """Write an item of the recorder's queue into the bag or the bags that it belongs to."""
@@ -165,16 +168,23 @@ class TrialBags:
         if key is not None and (key in self._kept or len(self._kept) < KEPT_FOR_NEXT_BAG):
             self._kept[key] = item
 
-    def recover(self) -> List[str]:
-        """Mend the bags of recorders that died in this folder, and our own that met an error."""
+    def recover(self) -> None:
+        """Mend the bags of recorders that died in this folder, and our own that met an error.
+
+        That is done soon for most. A large one is mended in the background: the robot need not wait
+        for it.
+        """
+        if self._mending is None or not self._mending.is_alive():
+            self._mending = threading.Thread(target=self._mend_all, name='bag mending', daemon=True)
+            self._mending.start()
+        self._mending.join(MEND_WAIT_S)
+
+    def _mend_all(self) -> None:
         try:
-            with self._watch:
-                return recover_folder(self._folder, self._reporter.info, self._reporter.warn,
-                                      self._watch.answered)
+            recover_folder(self._folder, self._reporter.info, self._reporter.warn)
         except OSError as err:
             self._reporter.warn('{} cannot be searched for bags to mend: {}'.format(
                 self._folder, err))
-            return []
 
     def wait_s(self) -> Optional[float]:
         """How long the writer thread may sleep; None: until something comes."""

@@ -2,6 +2,7 @@
 import os
 import random
 import shutil
+import threading
 
 import pytest
 import rosbag
@@ -9,8 +10,15 @@ from recorded import STRING, messages, quiet, string_data, texts_in, write
 from rosbags.rosbag1 import Reader
 
 from smach_oracle.analysis.bag_events import MessageStores
-from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.ros.recording import bag_format, bag_mending, bag_repair, bag_writer
+from smach_oracle.oracle.records.events import Event, EventKind, EventSource
+from smach_oracle.ros.recorder import TrialRecorder
+from smach_oracle.ros.recording import (
+    bag_format,
+    bag_mending,
+    bag_repair,
+    bag_writer,
+    trial_bags,
+)
 from smach_oracle.ros.recording.bag_format import BAG_HEADER_END
 from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.ros.recording.bag_writer import BagWriter
@@ -355,3 +363,22 @@ def test_a_mender_that_dies_at_any_step_is_gone_on_from(tmp_path, monkeypatch, d
     recover_folder(str(tmp_path), quiet, pytest.fail)
     assert os.listdir(str(tmp_path)) == [NAME]
     assert len(messages(str(tmp_path / NAME))) == 252
+
+
+def test_the_recorder_does_not_wait_for_a_large_bag_to_be_mended(tmp_path, monkeypatch):
+    let_go, mended = threading.Event(), threading.Event()
+
+    def takes_long(*_):
+        assert let_go.wait(20)
+        mended.set()
+    monkeypatch.setattr(trial_bags, 'recover_folder', takes_long)
+    monkeypatch.setattr(trial_bags, 'MEND_WAIT_S', 0.05)
+    recorder = TrialRecorder(str(tmp_path))
+    source = EventSource(print)
+    recorder.attach(source)
+    source.begin_trial('t')
+    source.emit(EventKind.TRIAL_START, 'TOP')
+    source.emit(EventKind.TRIAL_END, 'TOP')
+    assert recorder.close(20.0) and list(tmp_path.glob('*.bag'))
+    let_go.set()
+    assert mended.wait(20)
