@@ -2,13 +2,12 @@
 """How often a program hangs that meets a signal around its first execute: bare, wrapped as a
 library, and under oracle_run, in one run.
 
-    benchmarks/signals.py [--signals N] [--seed S] [--check]
+    benchmarks/signals.py [--signals N] [--seed S]
 
 Each process gets one SIGINT or SIGTERM, at an instant drawn from the seed within a second of its
 first execute, on a master of its own. A process that has not ended 20 s later counts as hung. A bag
-counts as whole where rosbag reads it to its end. --check fails where a bag is not whole, where
-oracle_run hangs, or where the library hangs more often than the bare script: rospy's own clean-up
-can hang a node.
+counts as whole where rosbag reads it to its end. The exit status is 1 where a bag is not whole, or
+oracle_run hangs. The bare script may hang as well: in rospy's own clean-up.
 """
 import argparse
 import collections
@@ -30,7 +29,6 @@ def main():
                         help='to processes of each kind (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1,
                         help='of the instants (default: %(default)s)')
-    parser.add_argument('--check', action='store_true', help='fail where it is as told above')
     options = parser.parse_args()
     from signalled_programs import KINDS, signal_many
 
@@ -52,8 +50,7 @@ def main():
     print('bags that are not whole: {}'.format(len(broken)))
     for text in broken:
         print('  ' + text)
-    good = not broken and not hung['oracle_run'] and hung['library'] <= hung['bare']
-    return int(options.check and not good)
+    return int(bool(broken or hung['oracle_run']))
 
 
 def wait_for_master(uri):
