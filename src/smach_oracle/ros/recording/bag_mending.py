@@ -14,9 +14,6 @@ from .bag_writer import MAX_CHUNK_BYTES, BagWriter
 from .event_packing import event_number
 
 _NANOSECONDS = 10 ** 9
-_STEPS_OF = 1000  # messages, after which the caller learns that the disk answers
-
-Progress = Callable[[], None]
 
 
 class MendError(OSError):
@@ -45,25 +42,24 @@ class Saved(NamedTuple):
         return ' and '.join(parts)
 
 
-def mend(source: BinaryIO, target: str, progress: Progress) -> Saved:
+def mend(source: BinaryIO, target: str) -> Saved:
     """Write what can be read of a bag into a new file.
 
     :param source: the damaged bag; it is only read.
     :param target: path of the new bag; a file that is there is replaced.
-    :param progress: called again and again meanwhile.
     :raises OSError: where the disk cannot be read or takes no more; there is no new file then.
     """
-    return _in_two_passes(source, progress, lambda reading: reading.write(target))
+    return _in_two_passes(source, lambda reading: reading.write(target))
 
 
-def read_back(path: str, saved: Saved, progress: Progress) -> None:
+def read_back(path: str, saved: Saved) -> None:
     """Check that a mended bag is sound and holds what was saved.
 
     :raises MendError: where it does not.
     :raises OSError: where the disk cannot be read.
     """
     with open(path, 'rb') as bag:
-        found = contents(bag, progress)
+        found = contents(bag)
         if found.losses() or found[:2] != saved[:2]:
             raise MendError('{} does not hold what was written: {} messages of {}{}'.format(
                 path, found.messages, saved.messages, found.losses() and ', lost: '
@@ -74,34 +70,31 @@ def read_back(path: str, saved: Saved, progress: Progress) -> None:
             raise MendError('the index of {} is wrong: {}'.format(path, err)) from err
 
 
-def contents(bag: BinaryIO, progress: Progress) -> Saved:
+def contents(bag: BinaryIO) -> Saved:
     """What `mend` would save of a bag.
 
     :raises OSError: where the disk cannot be read.
     """
-    return _in_two_passes(bag, progress, lambda reading: reading.read())
+    return _in_two_passes(bag, lambda reading: reading.read())
 
 
-def _in_two_passes(source: BinaryIO, progress: Progress,
-                   work: Callable[['_Pass'], Saved]) -> Saved:
+def _in_two_passes(source: BinaryIO, work: Callable[['_Pass'], Saved]) -> Saved:
     """Do it again where the end of the file has told more of the connections than its beginning."""
-    first = _Pass(source, {}, progress)
+    first = _Pass(source, {})
     saved = work(first)
     known = first.connections.all()
     if all(known.get(number) == used for number, used in first.used.items()):
         return saved
-    return work(_Pass(source, known, progress))
+    return work(_Pass(source, known))
 
 
 class _Pass:
     """One reading of a damaged bag from its beginning to its end."""
 
-    def __init__(self, source: BinaryIO, known: Dict[int, BagConnection],
-                 progress: Progress) -> None:
+    def __init__(self, source: BinaryIO, known: Dict[int, BagConnection]) -> None:
         self.connections = Connections()
         self.used: Dict[int, Optional[BagConnection]] = {}  # None: some messages had none
         self._known = known
-        self._progress = progress
         self._salvage = Salvage(source)
         self._messages = self._checksum = self._events_lost = 0
         self._next_event = 0
@@ -123,9 +116,7 @@ class _Pass:
 
     def read(self, writer: Optional[BagWriter] = None) -> Saved:
         """Count the messages, and hand them to a writer."""
-        for number, found in enumerate(self._salvage.read()):
-            if number % _STEPS_OF == 0:
-                self._progress()
+        for found in self._salvage.read():
             if found.record.op == bag_format.OP_CONNECTION:
                 if not self.connections.learn(found.record.fields, found.data):
                     self._salvage.lose(found.record.end - found.record.position)
@@ -165,7 +156,6 @@ class _Pass:
             writer.add(connection.topic, connection.kind, stamp, data, dict(connection.details))
             if writer.buffered_bytes >= MAX_CHUNK_BYTES:
                 writer.flush()
-                self._progress()
 
     def _count_lost_events(self, number: int) -> None:
         """Count the numbers left out behind the event before, where anything was lost there."""

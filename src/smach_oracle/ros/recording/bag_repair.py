@@ -16,7 +16,7 @@ from typing import BinaryIO, Callable, List, NamedTuple, Optional
 
 from . import bag_format
 from .bag_format import BagFormatError
-from .bag_mending import Progress, Saved, contents, mend, read_back
+from .bag_mending import Saved, contents, mend, read_back
 
 ACTIVE_SUFFIX, DAMAGED_SUFFIX = '.bag.active', '.bag.damaged'
 OUR_NAME = re.compile(r'(^|/)\d{8}T\d{6}\.\d{3}Z_[^/]*\.bag\.(active|damaged)$')
@@ -29,21 +29,18 @@ Log = Callable[[str], None]
 class _Tools(NamedTuple):
     info: Log
     warn: Log
-    progress: Progress
 
 
-def recover_folder(folder: str, info: Log, warn: Log,
-                   progress: Progress = lambda: None) -> List[str]:
+def recover_folder(folder: str, info: Log, warn: Log) -> List[str]:
     """Turn the orphaned `.bag.active` files of a folder into `.bag` files.
 
     A file that cannot be mended is left as it is and named in a warning; so is what was lost.
 
-    :param progress: called again and again while the disk answers.
     :returns: the paths of the mended bags.
     :raises OSError: where the folder cannot be listed.
     """
     recovered = []
-    tools = _Tools(info, warn, progress)
+    tools = _Tools(info, warn)
     for name in sorted(os.listdir(folder)):
         path = os.path.join(folder, name)
         if not name.endswith((ACTIVE_SUFFIX, DAMAGED_SUFFIX)):
@@ -79,7 +76,7 @@ def _mend(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
     target = path[:-len('.active')]
     if os.path.exists(target) or os.path.exists(target + '.damaged'):
         target = free_name(target)
-    saved = mend(bag, target + '.mending', tools.progress)
+    saved = mend(bag, target + '.mending')
     if not saved.messages:
         os.unlink(target + '.mending')
         _leave_empty(bag, path, saved, tools.warn)
@@ -122,7 +119,7 @@ def _go_on(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
     """Finish what another recorder began before it died."""
     target = path[:-len('.damaged')]
     if os.path.exists(target):
-        _drop_damaged(target, contents(bag, tools.progress), tools)
+        _drop_damaged(target, contents(bag), tools)
         return target
     active = target + '.active'
     if os.path.exists(active):
@@ -134,7 +131,7 @@ def _go_on(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
 def _drop_damaged(target: str, saved: Saved, tools: _Tools) -> None:
     """Remove the damaged bag, once the mended one has been read back."""
     try:
-        read_back(target, saved, tools.progress)
+        read_back(target, saved)
         _sync_folder(os.path.dirname(target))
     except OSError as err:
         tools.warn('The mended bag {} cannot be read back, its original stays as {}.damaged: '

@@ -77,10 +77,6 @@ class DiskWatch:
     def __exit__(self, *_: object) -> None:
         self._since = None
 
-    def answered(self) -> None:
-        """Note that the disk has answered, within a call that takes several steps."""
-        self._since = time.monotonic()
-
     def hangs(self) -> bool:
         """Whether the present call has taken too long."""
         since = self._since

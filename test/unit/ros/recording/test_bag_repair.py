@@ -32,8 +32,8 @@ def mend(path):
     """Mend a bag beside the damaged one; returns the path of the new one and what was saved."""
     target = str(path) + '.mended'
     with open(str(path), 'rb') as bag:
-        saved = bag_mending.mend(bag, target, lambda: None)
-    bag_mending.read_back(target, saved, lambda: None)
+        saved = bag_mending.mend(bag, target)
+    bag_mending.read_back(target, saved)
     return target, saved
 
 
@@ -321,8 +321,8 @@ def test_the_original_stays_until_the_mended_bag_has_been_read_back(tmp_path, mo
     before = path.read_bytes()
     real = bag_mending.mend
 
-    def badly(bag, target, progress):
-        saved = real(bag, target, progress)
+    def badly(bag, target):
+        saved = real(bag, target)
         overwrite(target, BAG_HEADER_END + 30, b'\0' * 9)
         return saved
 
