@@ -55,7 +55,23 @@ def record_and_kill(folder, after_s, events_per_trial, pause_s):
 
 
 def mend_by_next_start(folder):
+    """Start a recorder, and wait for what it mends in the background where the disk is slow."""
     assert TrialRecorder(str(folder), warn=pytest.fail).close(20.0)
+    assert wait_for(lambda: active(folder) == just_made(folder))
+
+
+def just_made(folder):
+    """Files without a header, which a recorder leaves: another one may be just making them."""
+    with os.scandir(str(folder)) as entries:
+        return sorted(entry.path for entry in entries
+                      if entry.name.endswith('.active') and is_empty(entry))
+
+
+def is_empty(entry):
+    try:
+        return entry.stat().st_size == 0
+    except FileNotFoundError:
+        return False  # it was renamed meanwhile
 
 
 def mend_by_rosbag_reindex(folder):
@@ -97,5 +113,5 @@ def test_at_most_the_last_second_is_missing(tmp_path, mend, events_per_trial, pa
         print('killed {:.6f} s after the first event'.format(after_s))
         killed = record_and_kill(folder, after_s, events_per_trial, pause_s)
         mend(folder)
-        assert active(folder) == []
+        assert active(folder) == just_made(folder)
         check(folder, *killed)
