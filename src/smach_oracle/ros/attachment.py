@@ -97,7 +97,7 @@ class Attachments:
 
         :raises OSError: where the folder for the bags cannot be made or written.
         """
-        if machine in self._on_ros:
+        if self.has(machine):
             return
         with self._lock:
             self._machines.add(machine)

@@ -23,12 +23,14 @@ Result = TypeVar('Result')
 def outside_main_thread(function: Callable[[], Result]) -> Result:
     """Return what a function returns, or raise what it raises; wait for it.
 
-    It runs in a thread of its own where the caller is the main thread, and else in the caller's.
+    It runs in a thread of its own where the caller is the main thread of a node, and else in the
+    caller's: without a node rospy handles no signals.
 
     :raises rospy.ROSInterruptException: where the node shuts down, and the function has not
         returned 2 s later.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if (threading.current_thread() is not threading.main_thread()
+            or not rospy.core.is_initialized()):
         return function()
     results: List[Result] = []
     call = BackgroundCall(lambda: results.append(function()), 'calls the master')
