@@ -18,12 +18,14 @@ import subprocess
 import sys
 import threading
 import time
-import xmlrpc.client
 
 LIMIT = 4.0  # empty calls
 SHARED = '/shared/expert_query'
 OWN = '/latency_robot/expert_query'
 EMPTY = '/latency_robot/empty'
+
+sys.path.insert(
+    0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest'))
 
 
 def main():
@@ -79,29 +81,23 @@ class Processes:
         """Start a master on a free port, for us and for all that is started after it; wait until it
         answers.
         """
+        from own_master import wait_for_master
+
         from smach_oracle.experiment.launching import free_port
         port = free_port()
         uri = 'http://localhost:{}'.format(port)
         os.environ['ROS_MASTER_URI'] = uri
         self.start(['roscore', '-p', str(port)])
-        for _ in range(300):
-            try:
-                xmlrpc.client.ServerProxy(uri).getPid('/latency')
-                return
-            except OSError:
-                time.sleep(0.1)
-        raise RuntimeError('no master came up at {}'.format(uri))
+        wait_for_master(uri)
 
 
 def measure(server, questions):
     """Latencies of answers, and of empty calls right before them, in seconds."""
     import rospy
+    from expert_fixtures import make_question
     from std_srvs.srv import Empty, EmptyResponse
 
     from smach_oracle.ros.expert.client import ExpertQueryClient
-    sys.path.insert(
-        0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest'))
-    from expert_fixtures import make_question
     rospy.init_node('latency_robot', disable_signals=True, log_level=rospy.WARN)
     rospy.Service(EMPTY, Empty, lambda _: EmptyResponse())
     client = ExpertQueryClient(server)

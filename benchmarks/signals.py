@@ -15,8 +15,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-import xmlrpc.client
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'rostest'))
@@ -30,6 +28,7 @@ def main():
     parser.add_argument('--seed', type=int, default=1,
                         help='of the instants (default: %(default)s)')
     options = parser.parse_args()
+    from own_master import wait_for_master
     from signalled_programs import KINDS, signal_many
 
     from smach_oracle.experiment.launching import free_port
@@ -51,16 +50,6 @@ def main():
     for text in broken:
         print('  ' + text)
     return int(bool(broken or hung['oracle_run']))
-
-
-def wait_for_master(uri):
-    for _ in range(300):
-        try:
-            xmlrpc.client.ServerProxy(uri).getPid('/signals')
-            return
-        except OSError:
-            time.sleep(0.1)
-    raise RuntimeError('no master came up at ' + uri)
 
 
 if __name__ == '__main__':

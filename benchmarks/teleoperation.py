@@ -12,7 +12,6 @@ time, or where the median stop takes more than 100 ms.
 import argparse
 import os
 import signal
-import socket
 import statistics
 import subprocess
 import sys
@@ -23,6 +22,8 @@ LONGEST_STOP_S = 0.1
 STANDS = 2e-4  # rad between two joint states, 1/60 s apart
 FIXTURES = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest')
 
+sys.path.insert(0, FIXTURES)
+
 
 class Measured:
     """A person who drives, and what the robot tells meanwhile."""
@@ -30,9 +31,8 @@ class Measured:
     def __init__(self):
         import rospy
         from sensor_msgs.msg import JointState
-        from trajectory_msgs.msg import JointTrajectory
-        sys.path.insert(0, FIXTURES)
         from teleoperation_fixtures import Person
+        from trajectory_msgs.msg import JointTrajectory
         self._now = lambda: rospy.Time.now().to_sec()
         self.person = Person('manipulation_interface')
         self.joints, self.targets = [], []
@@ -101,6 +101,8 @@ def main():
     parser.add_argument('--stops', type=int, default=7, help='of each kind (default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='fail outside of the limits')
     options = parser.parse_args()
+    from own_master import wait_for_master
+
     from smach_oracle.experiment.launching import free_port
     port = free_port()
     os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
@@ -109,23 +111,12 @@ def main():
          str(port), os.path.join(FIXTURES, 'console_drive_pr2.test')], stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL)
     try:
-        wait_for_master(port)
+        wait_for_master(os.environ['ROS_MASTER_URI'])
         good = measure(options)
     finally:
         robot.send_signal(signal.SIGINT)
         robot.wait(30)
     return 1 if options.check and not good else 0
-
-
-def wait_for_master(port):
-    """Until it listens."""
-    until_s = time.monotonic() + 60.0
-    while time.monotonic() < until_s:
-        with socket.socket() as probe:
-            if probe.connect_ex(('localhost', port)) == 0:
-                return
-        time.sleep(0.1)
-    raise RuntimeError('no master came up')
 
 
 if __name__ == '__main__':

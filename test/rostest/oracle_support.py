@@ -13,6 +13,7 @@ from typing import Any, Dict, List, Optional
 
 import rosbag
 import rospy
+from own_master import master_answers
 from waiting import wait_for
 
 from smach_oracle.experiment.launching import free_port
@@ -94,7 +95,7 @@ class OwnMaster:
     def start(self) -> None:
         """Start it and wait until it answers."""
         self._process = Process(['rosmaster', '--core', '-p', str(self._port)], self.env)
-        if not wait_for(self._answers):
+        if not wait_for(lambda: master_answers(self.uri)):
             raise RuntimeError('no master at ' + self.uri)
 
     def kill(self) -> None:
@@ -113,13 +114,6 @@ class OwnMaster:
             state = master.getSystemState('/test')[2]
         return {kind: [name for name, _ in entries]
                 for kind, entries in zip(('publishers', 'subscribers', 'services'), state)}
-
-    def _answers(self) -> bool:
-        try:
-            with xmlrpc.client.ServerProxy(self.uri) as master:
-                return bool(master.getPid('/test')[0] == 1)
-        except OSError:
-            return False
 
 
 def recorded_events(folder: str, node: str = 'task') -> List[List[OracleEvent]]:
