@@ -28,7 +28,6 @@ class LimitedResult(NamedTuple):
     outcome: object = None
     error: Optional[BaseException] = None
     overrun: str = ''  # what happened, in words
-    late: bool = False  # it still runs
 
 
 class _Left(NamedTuple):
@@ -130,7 +129,7 @@ class Workers:
             self._abandon(function, call, gate, _STOPPED)
             raise
         late = self._abandon(function, call, gate, _STOPPED if stopped() else _LATE)
-        return LimitedResult(overrun=why + (' and was left behind' if late else ''), late=late)
+        return LimitedResult(overrun=why + (' and was left behind' if late else ''))
 
     def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
                      gate: UserdataGate, grace_s: float) -> bool:

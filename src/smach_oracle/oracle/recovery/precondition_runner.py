@@ -42,7 +42,6 @@ class PreconditionRunner:
         self._lock = threading.Lock()
         self._running: Optional[Any] = None
         self._cancelled = False
-        self.left_behind = ''  # which function still runs, in words
 
     def cancel(self) -> None:
         """Preempt what runs, and let nothing more begin."""
@@ -80,16 +79,11 @@ class PreconditionRunner:
             self._run_label(spec.target)
 
     def _call(self, spec: PreconditionSpec) -> None:
-        blocked = self._node.tree.workers.blocked(spec.target)
-        if blocked:
-            self.left_behind = '{} {}'.format(spec.name, blocked)
         self._check_free(spec.target)
         gate = self._gate.branch()
         ended = self._node.tree.workers.call(spec.target, behind(gate), gate,
                                              self._settings.time_limit_s,
                                              self._settings.grace_period_s, self._stopped)
-        if ended.late:
-            self.left_behind = '{} still runs'.format(spec.name)
         if isinstance(ended.error, Exception):
             raise NotMet('{} raised {!r}'.format(spec.name, ended.error)) from ended.error
         if ended.error is not None:

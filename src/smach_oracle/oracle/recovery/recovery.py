@@ -97,7 +97,16 @@ class Recovery:
     def _why_not(self, target: str) -> str:
         """Return why the machine cannot go on to a state by itself now, '' where it can."""
         blocked = self._blocked(target)
-        return '{} {}'.format(target, blocked) if blocked else self._preconditions.left_behind
+        return '{} {}'.format(target, blocked) if blocked else self._function_that_runs()
+
+    def _function_that_runs(self) -> str:
+        """Return which function among the preconditions was left behind and runs, '' for none."""
+        for spec in self._record.settings.preconditions:
+            for name, function in spec.functions():
+                blocked = self._node.tree.workers.blocked(function)
+                if blocked:
+                    return '{} {}'.format(name, blocked)
+        return ''
 
     def _facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         record = self._record

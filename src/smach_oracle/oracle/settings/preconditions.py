@@ -38,6 +38,14 @@ class PreconditionSpec(NamedTuple):
             return tuple(label for half in self.target for label in half.labels())
         return ()
 
+    def functions(self) -> Tuple[Tuple[str, Callable[..., Any]], ...]:
+        """Return the names of the functions that it calls, each with the function."""
+        if self.kind is PreconditionKind.CALLABLE:
+            return ((self.name, self.target),)
+        if self.kind is PreconditionKind.PAIR:
+            return tuple(found for half in self.target for found in half.functions())
+        return ()
+
 
 _ALLOWED = (
     'the label of a state, a smach.State, a callable f(userdata) -> bool, a pair (check, achieve) '
