@@ -6,7 +6,8 @@ states.
 
 The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced,
 nobody observes. The rounds alternate and the best of each counts, so that neighbours on the machine
-do not. With --check the exit status is 1 where a wrapped transition costs more than 20 bare steps.
+do not. Nested: the same two states three machines deep. The aim is 12 bare steps; with --check the
+exit status is 1 above 15, which leaves room for a busy machine.
 """
 import argparse
 import itertools
@@ -17,7 +18,8 @@ from typing import Dict
 import smach
 from smach_oracle.oracle import OracleContainer
 
-LIMIT = 20.0
+AIM, LIMIT = 12.0, 15.0
+DEPTH = 3
 
 
 class Fixed(smach.State):
@@ -41,6 +43,16 @@ def two_state_loop() -> smach.StateMachine:
     return machine
 
 
+def nested_loop() -> smach.StateMachine:
+    """The same loop inside of machines."""
+    machine = two_state_loop()
+    for _ in range(DEPTH - 1):
+        inner, machine = machine, smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+        with machine:
+            smach.StateMachine.add('INNER', inner)
+    return machine
+
+
 def bare_step_s(count: int) -> float:
     """Seconds that one step of the bare loop takes."""
     states: Dict[str, Fixed] = {'A': Fixed('x'), 'B': Fixed('y')}
@@ -58,7 +70,10 @@ def machine_step_s(machine: smach.StateMachine, count: int) -> float:
     smach.set_shutdown_check(
         itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
     begin = time.perf_counter()
-    machine.execute()
+    try:
+        machine.execute()
+    except (smach.InvalidTransitionError, smach.InvalidUserCodeError):
+        pass  # SMACH says so of a nested machine that ends without outcome, as at a shutdown
     elapsed_s = time.perf_counter() - begin
     smach.set_shutdown_check(lambda: False)
     return elapsed_s / count
@@ -80,17 +95,18 @@ def main() -> int:
     silence()
     observed = OracleContainer.wrap(two_state_loop())
     observed.events.observers.append(lambda event: None)
-    machines = (two_state_loop(), OracleContainer.wrap(two_state_loop()), observed)
+    machines = (two_state_loop(), OracleContainer.wrap(two_state_loop()),
+                OracleContainer.wrap(nested_loop()), observed)
     rounds = [(bare_step_s(args.transitions * 2),) +
               tuple(machine_step_s(machine, args.transitions) for machine in machines)
               for _ in range(args.rounds)]
-    bare, engine, wrapped, watched = (min(column) for column in zip(*rounds))
+    bare, *costs = (min(column) for column in zip(*rounds))
+    engine, wrapped, nested, watched = (cost / bare for cost in costs)
     print('engine: {}'.format(smach.__file__))
-    print(
-        'bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f} (limit {:g}), observed '
-        'too {:.1f}'
-        .format(bare * 1e9, engine / bare, wrapped / bare, LIMIT, watched / bare))
-    return 1 if args.check and wrapped / bare > LIMIT else 0
+    print('bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f}, nested {:.1f}, '
+          'observed too {:.1f} (wrapped and nested: aim {:g}, limit {:g})'.format(
+              bare * 1e9, engine, wrapped, nested, watched, AIM, LIMIT))
+    return 1 if args.check and max(wrapped, nested) > LIMIT else 0
 
 
 if __name__ == '__main__':

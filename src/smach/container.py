@@ -32,12 +32,13 @@ class Container(State):
     _construction_lock = threading.RLock()
 
     _context_kwargs: Sequence[Any] = ()
-    _pause_requested = False
+    _pause_requested = False  # of containers that do not call __init__
 
     def __init__(self, outcomes: Sequence[str] = (), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = ()) -> None:
         State.__init__(self, outcomes, input_keys, output_keys)
         self.userdata = smach.UserData()
+        self._pause_requested = False
         self._start_cbs: List[Callback] = []
         self._transition_cbs: List[Callback] = []
         self._termination_cbs: List[Callback] = []

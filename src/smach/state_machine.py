@@ -5,6 +5,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import smach
 from smach.container import Container, Edge
+from smach.hooks import is_hooked
 from smach.state import State
 from smach.transitions import end_of, inconsistencies, search_target
 from smach.visit import StateVisit
@@ -24,7 +25,7 @@ class StateMachine(Container):
 
     _is_preempt_passed_on = False  # whether a state was asked since the latest request
 
-    # until execute() has looked: whether a method of _HOOKS was overridden or patched
+    # until execute() has looked: whether a method of smach.hooks was overridden or patched
     _is_hooked = True
 
     def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
@@ -92,7 +93,8 @@ class StateMachine(Container):
         self._states[label] = state
         self._transitions[label] = transitions
         self._remappings[label] = {} if remapping is None else remapping
-        self._constants[label] = {} if constants is None else constants
+        if constants is not None:
+            self._constants[label] = constants
         if self._connector_outcomes and self._last_added_label is not None:
             for outcome in self._connector_outcomes:
                 self._transitions[self._last_added_label][outcome] = label
@@ -150,18 +152,21 @@ class StateMachine(Container):
             or that leads nowhere.
         """
         self._is_running = True
-        self._is_hooked = any(getattr(getattr(self, name), '__func__', None) is not method
-                              for name, method in _HOOKS.items())
+        self._is_hooked = is_hooked(self)
         try:
             if not self._is_consistent():
                 return None
             with self._state_transitioning_lock:
                 self._start(parent_ud)
                 outcome = None
-                while outcome is None and self._is_running and not smach.is_shutdown():
+                while True:  # CPython 3.11 makes no other kind of long loop faster as it runs
+                    if not self._is_running or smach.is_shutdown():
+                        break
                     if self._pause_requested:
                         self._wait_while_paused()
                     outcome = self._update_once()
+                    if outcome is not None:
+                        break
             self._copy_output_keys(self.userdata, parent_ud)
             return outcome
         finally:
@@ -390,10 +395,6 @@ class StateMachine(Container):
         for name, value in state.items():
             setattr(self, name, value)
 
-
-# The public methods that are called at every step only if somebody put another in their place.
-_HOOKS = {'preempt_requested': State.preempt_requested,
-          'call_transition_cbs': Container.call_transition_cbs}
 
 # Stands for a target that has to be looked for, where None means one that falls through.
 _SEARCH: Any = object()

@@ -18,7 +18,7 @@ from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone
-from .machine.userdata_view import StateView, write_constants
+from .machine.userdata_view import StateView, constants_of, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
@@ -45,6 +45,7 @@ class OracleContainer(smach.StateMachine):
     """
 
     _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none; never written
+    _pause_requested = False  # of engines that do not pause
 
     def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
@@ -258,78 +259,84 @@ class OracleContainer(smach.StateMachine):
         super().call_start_cbs()
 
     def _update_once(self) -> Optional[str]:
-        """Execute the current state and make the transition.
+        """Execute the current state and make the transition, and go on with the next state.
 
-        It returns None to go on, else the container's outcome.
+        It goes on while each is a plain success, and nothing makes the engine's loop stop or pause.
+        It returns None to let the engine go on, else the container's outcome.
 
         Every transition takes this way, so it is kept flat: a plain success costs what is on this
         page.
         """
         node = self._oracle
         lock = self._state_transitioning_lock
-        # a machine that runs has a current state, with its label and its transitions
-        label: str = self._current_label  # type: ignore[assignment]
-        record = node.records.by_label.get(label) or node.record(label)
         engine = node.engine
-        if (self._preempt_requested or engine.attentive) and before_step(node):
-            return None
-        state: smach.State = self._current_state  # type: ignore[assignment]
-        userdata = self.userdata
-        view = record.view
-        if (view is None or view.state is not state or view.userdata is not userdata
-                or view.remapping is not self._remappings[label]
-                or view.input_keys is not state._input_keys
-                or view.output_keys is not state._output_keys):
-            view = record.view = StateView(self, label, state)
-        record.snapshot = userdata._data.copy()
-        observed = node.events.observers
-        transitions: Transitions = self._current_transitions  # type: ignore[assignment]
-        outcome: Any  # a user's state may return anything
-        error = None
-        if engine.lock_is_held:
-            lock.release()
-        try:
+        records = node.records
+        while True:
+            # a machine that runs has a current state, with its label and its transitions
+            label: str = self._current_label  # type: ignore[assignment]
             try:
-                constants = self._constants.get(label)
-                if constants:
-                    write_constants(userdata, constants)
-                if observed or record.special or node.abandoned:
-                    outcome = Step(node, record).execute(state, view.remapper)
-                else:
-                    outcome = state.execute(view.remapper)
-            except Exception as err:
-                outcome, error = None, err
-            finally:
-                lock.acquire()
-            try:
-                edge = record.fast[outcome]
-                target = edge.target
-                plain = transitions[outcome] is target and not self._preempt_requested
-            except (KeyError, TypeError):
-                # seen for the first time, no plain success, or no outcome at all
-                plain = False
-            if not plain:
-                return Step(node, record).ended(outcome, error)
-            edge.count += 1
-            history = node.records.history
-            history.visits.append(edge.visit)
-            if not record.has_preconditions:
-                history.unconditioned = label
-            if history.succeeded != label:
-                history.succeeded_other = history.succeeded
-                history.succeeded = label
-            if observed:
-                node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=target)
-            self._current_label = target
-            self._current_state = self._states[target]
-            self._current_transitions = self._transitions[target]
-            smach.loginfo(edge.message)
-            if self._transition_cbs or engine.tells_transitions:
-                self.call_transition_cbs()
-            return None
-        finally:
-            if not engine.lock_is_held:
+                record = records.by_label[label]
+            except KeyError:
+                record = node.record(label)
+            if (self._preempt_requested or engine.attentive) and before_step(node):
+                return None
+            state: smach.State = self._current_state  # type: ignore[assignment]
+            userdata = self.userdata
+            view = record.view
+            if (view.state is not state or view.userdata is not userdata
+                    or view.remapping is not self._remappings[label]
+                    or view.input_keys is not state._input_keys
+                    or view.output_keys is not state._output_keys):
+                view = record.view = StateView(self, label, state)
+            record.snapshot = view.data.copy()
+            observed = node.events.observers
+            transitions: Transitions = self._current_transitions  # type: ignore[assignment]
+            outcome: Any  # a user's state may return anything
+            error = None
+            if engine.lock_is_held:
                 lock.release()
+            try:
+                try:
+                    if self._constants:
+                        write_constants(userdata, constants_of(self, label))
+                    if observed or record.special or node.abandoned:
+                        outcome = Step(node, record).execute(state, view.remapper)
+                    else:
+                        outcome = state.execute(view.remapper)
+                except Exception as err:
+                    outcome, error = None, err
+                finally:
+                    lock.acquire()
+                try:
+                    edge = record.fast[outcome]
+                    target = edge.target
+                    plain = transitions[outcome] is target and not self._preempt_requested
+                except (KeyError, TypeError):
+                    # seen for the first time, no plain success, or no outcome at all
+                    plain = False
+                if not plain:
+                    return Step(node, record).ended(outcome, error)
+                edge.count += 1
+                history = records.history
+                history.visits.append(edge.visit)
+                if not record.has_preconditions:
+                    history.unconditioned = label
+                if history.succeeded != label:
+                    history.succeeded_other = history.succeeded
+                    history.succeeded = label
+                if observed:
+                    node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=target)
+                self._current_label = target
+                self._current_state = self._states[target]
+                self._current_transitions = self._transitions[target]
+                smach.loginfo(edge.message)
+                if self._transition_cbs or engine.tells_transitions:
+                    self.call_transition_cbs()
+                if not self._is_running or smach.is_shutdown() or self._pause_requested:
+                    return None
+            finally:
+                if not engine.lock_is_held:
+                    lock.release()
 
     # -- pickling and copying
 

@@ -7,6 +7,7 @@ from smach_states import Fixed, Scripted, UntilPreempted, concurrence, machine, 
 from waiting import Once, stays, wait_for
 
 import smach
+from smach_oracle.oracle import OracleContainer
 
 
 def preempt(sm_holder, serviced):
@@ -191,22 +192,23 @@ def test_one_request_to_a_machine_that_rushes_stops_one_state_not_two():
 
 
 @pytest.mark.improvement
-def test_a_paused_machine_enters_no_state_until_resumed():
+@pytest.mark.parametrize('wrap', [lambda sm: sm, OracleContainer.wrap])
+def test_a_paused_machine_enters_no_state_until_resumed(wrap):
     entered = []
 
     def enter(state, ud):
         entered.append(1)
-        if len(entered) == 1:
+        if len(entered) == 3:
             sm.request_pause()
-        return 'done' if len(entered) == 2 else 'failed'
-    sm = machine(('A', Scripted(enter), {'failed': 'A'}))
+        return 'done' if len(entered) == 4 else 'again'
+    sm = wrap(machine(('A', Scripted(enter, ['done', 'again']), {'again': 'A'})))
     thread = threading.Thread(target=sm.execute, daemon=True)
     thread.start()
     assert wait_for(lambda: entered and sm.pause_requested())
-    assert stays(lambda: entered == [1] and sm.is_running() and sm.pause_requested(), 0.15)
+    assert stays(lambda: len(entered) == 3 and sm.is_running() and sm.pause_requested(), 0.15)
     sm.request_resume()
     thread.join(30.0)
-    assert entered == [1, 1] and not sm.is_running()
+    assert len(entered) == 4 and not sm.is_running()
 
 
 @pytest.mark.improvement

@@ -26,6 +26,7 @@ class KeptView(Protocol):
     """
 
     remapper: Any  # a smach.Remapper, which this module does not know
+    data: Dict[str, Any]  # what the container's userdata holds
 
     @property
     def state(self) -> object:
@@ -48,6 +49,16 @@ class KeptView(Protocol):
         """The state's set of output keys."""
 
 
+class _NoView:
+    """Before the first visit: a view of no state."""
+
+    state = userdata = remapping = input_keys = output_keys = remapper = None
+    data: Dict[str, Any] = {}
+
+
+_NO_VIEW = _NoView()
+
+
 class StateRecord:
     """Learned rate, counts and latest snapshot of one state.
 
@@ -64,7 +75,7 @@ class StateRecord:
         self.label = label
         self.fast: Dict[Any, FastEdge] = {}
         self.snapshot: Optional[Dict[str, Any]] = None
-        self.view: Optional[KeptView] = None  # from its last visit
+        self.view: KeptView = _NO_VIEW  # from its last visit
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
         self.fallbacks = 0
@@ -177,7 +188,7 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=None)
+        state.update(snapshot=None, view=_NO_VIEW)
         del state['_lock']
         return state
 
