@@ -159,6 +159,15 @@ def test_the_rules_of_answers_name_the_reason():
         check_answer(goto('POUR'), choices_of(expert.questions[0]))
 
 
+def test_a_question_says_what_would_come_again_behind_each_choice():
+    states = chain(DETECT=Scripted(), POUR=Scripted(), LIFT=Scripted(), PLACE=Scripted('aborted'),
+                   LATER=Scripted())
+    machine, expert = guarded(states, give_up(), max_recoveries=0)
+    machine.run()
+    assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
+        'DETECT': ('POUR',), 'POUR': ('POUR',), 'LIFT': (), 'PLACE': (), 'LATER': ('POUR',)}
+
+
 def test_a_state_that_was_not_done_is_no_repeat():
     states = chain(DETECT=Scripted('aborted'), POUR=Scripted(), PLACE=Scripted())
     machine, _ = guarded(states, goto('POUR'), on_retry='never', max_recoveries=0)
