@@ -216,6 +216,14 @@ def test_preconditions_that_outlast_the_minutes_are_followed_by_no_recovery(cloc
     assert slow.runs == 1 and not machine.decisions()
 
 
+def test_a_deadline_at_the_very_end_is_not_without_end(clock):
+    budget = trial_budget.TrialBudget()
+    budget.begin(Budget(minutes=1))
+    clock[0] += 60
+    deadline_s, is_cut = budget.within(0)
+    assert 0 < deadline_s < 0.1 and is_cut
+
+
 @pytest.mark.parametrize('deadline_s', [300.0, 0])
 def test_a_question_is_open_no_longer_than_the_trial(clock, deadline_s):
     def too_late(question, cancelled, progress):

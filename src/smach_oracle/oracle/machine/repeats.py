@@ -104,7 +104,7 @@ def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:
     since = node.records.marks.of(target).reached
     for each in nodes_of(node.machine):
         for done in _done_in(node, each):
-            if done.mark.reached >= since or (each is node and done.name == target):
+            if done.mark.reached >= since:
                 yield done
 
 
