@@ -17,7 +17,7 @@ from waiting import stays, wait_for  # noqa: E402
 from smach_oracle.expert import followed_server  # noqa: E402
 from smach_oracle.expert.front_end import FrontEnd, ServerGoneError, wait_for_question  # noqa: E402
 from smach_oracle.msg import ExpertDecision, OpenQuery  # noqa: E402
-from smach_oracle.oracle.asking.question import AnswerKind  # noqa: E402
+from smach_oracle.oracle.asking.question import AnswerKind, StateChoice  # noqa: E402
 from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
 
 SHARED = '/shared/expert_query'
@@ -26,6 +26,7 @@ RULES = """
 PICK:
   - {kind: goto, state: DETECT, delay_s: 0.4, why: look again}
   - {kind: supersede, outcome: succeeded, outputs: {grasped: [mug, 1]}}
+POUR: {kind: goto, state: POUR}
 default: {kind: ignore}
 """
 
@@ -202,6 +203,11 @@ class TestExpertFaults(unittest.TestCase):
         ignored = Asked(client, make_question('third', failed_state='PLACE', deadline_s=1.0))
         self.assertTrue(ignored.wait())
         self.assertIsNone(ignored.answer)
+        poured = StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR',))
+        unconfirmed = Asked(client, make_question('fourth', failed_state='POUR', deadline_s=1.0,
+                                                  choices=(poured,)))
+        self.assertTrue(unconfirmed.wait())
+        self.assertIsNone(unconfirmed.answer, 'the rule does not confirm that it is repeated')
         self.assertLess(expert.interrupt(), EXIT_S)
 
 

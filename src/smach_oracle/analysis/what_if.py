@@ -42,6 +42,7 @@ SAME, NOT_KNOWN = 'same', 'not known'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
 NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 _ROUNDING = 1e-9
+_OUTSIDE_POLICIES = (Decider.MAX_RECOVERIES, Decider.BUDGET, Decider.ON_RETRY)
 
 Key = Tuple[str, str]  # path and state
 
@@ -62,6 +63,7 @@ class _LearnedState:
         self.estimator = make_estimator(settings['estimator'], settings['memory'],
                                         settings['prior'])
         self.context: Optional[FailureContext] = None
+        self.held_back = False  # the present question is about no failure
         # whether each was met, of those run for the present failure
         self.preconditions: List[bool] = []
 
@@ -91,10 +93,10 @@ class Replay:
         elif event.kind == EventKind.PRECONDITION_END:
             self._state(event).preconditions.append(event.outcome == 'met')
         elif event.kind == EventKind.SUPERSEDE:
-            self._state(event).estimator.take_back_failure()
-            self._history(event.path).supersede(event.outcome)
+            self._superseded(event)
         elif event.kind == EventKind.DECISION:
-            return self._decide(event)
+            self._state(event).held_back = decided_by(event) is Decider.HELD_BACK
+            return None if self._state(event).held_back else self._decide(event)
         return None
 
     def rate(self, event: Event) -> float:
@@ -119,9 +121,17 @@ class Replay:
         state.estimator.add(True)
         self._visited(event, VisitResult.FAILURE)
 
+    def _superseded(self, event: Event) -> None:
+        if self._state(event).held_back:
+            self._visited(event, VisitResult.SUPERSEDED)
+            return
+        self._state(event).estimator.take_back_failure()
+        self._history(event.path).supersede(event.outcome)
+
     def _left(self, event: Event) -> None:
         state = self._state(event)
-        if state.context is not None:  # the end of the visit whose failure is known
+        # the end of the visit whose failure is known, or of none: the state was held back
+        if state.context is not None or not event.outcome:
             return
         if not is_preempted(event.outcome):
             state.estimator.add(False)
@@ -137,7 +147,7 @@ class Replay:
 
     def _decide(self, event: Event) -> str:
         state = self._state(event)
-        if decided_by(event) is Decider.MAX_RECOVERIES:
+        if decided_by(event) in _OUTSIDE_POLICIES:
             return Action.ASK.value
         failure_class = classify(state.estimator.rate, self._settings['moderate_from'],
                                  self._settings['high_from'])

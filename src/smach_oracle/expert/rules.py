@@ -15,7 +15,7 @@ answers.
 """
 import math
 import threading
-from typing import Any, Dict, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Protocol, Sequence, Tuple
 
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
 from smach_oracle.oracle.errors import SettingsError
@@ -26,7 +26,17 @@ DEFAULT = 'default'
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
 KINDS = {kind.name.lower(): kind for kind in AnswerKind}
 _NAMED_BY = {'goto': 'state', 'supersede': 'outcome', 'interface': 'interface'}
-_FIELDS = ('kind', 'state', 'outcome', 'interface', 'outputs', 'why', 'delay_s')
+_FIELDS = ('kind', 'state', 'outcome', 'interface', 'outputs', 'why', 'delay_s', 'confirm')
+
+
+class _Choice(Protocol):
+    """A state to go to, of a question or of the goal that carries it."""
+
+    @property
+    def state(self) -> str: ...
+
+    @property
+    def repeats(self) -> Sequence[str]: ...
 
 
 class Rule(NamedTuple):
@@ -39,6 +49,16 @@ class Rule(NamedTuple):
     outputs: Optional[Mapping[str, Any]] = None
     why: str = ''
     delay_s: float = 0.0
+    confirm: bool = False  # whether it may have a state repeated that is not repeated by itself
+
+    def why_not(self, choices: Iterable[_Choice]) -> str:
+        """Why it must not answer a question with these choices, '' where it may."""
+        repeats = self.kind == 'goto' and any(
+            choice.state == self.state and self.state in choice.repeats for choice in choices)
+        if not repeats or self.confirm:
+            return ''
+        return ('{} was done in this trial, and only a rule with confirm: true has it '
+                'repeated'.format(self.state))
 
     def answer(self, by: str) -> Answer:
         """The answer; a rule that ignores has none.
@@ -95,11 +115,12 @@ class RuleExpert(Expert):
             progress: Progress) -> Optional[Answer]:
         """The rule's answer after its delay.
 
-        None by the deadline where the rule ignores or comes too late.
+        None by the deadline where the rule ignores or comes too late, or would have a state
+        repeated that it does not confirm.
         """
         rule = self._rules.next('', question.trial_id, question.container_path,
                                 question.failed_state)
-        ignores = rule.kind == IGNORE
+        ignores = rule.kind == IGNORE or bool(rule.why_not(question.choices))
         limit_s = question.deadline_s or math.inf
         wait_s = min(math.inf if ignores else rule.delay_s, limit_s)
         if cancelled.wait(None if wait_s ==
@@ -145,7 +166,7 @@ def _parse_rule(key: str, value: object) -> Rule:
                           'a name; {} needs one'.format(kind))
     return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'),
                 _text(key, value, 'interface'), _outputs(key, value), _text(key, value, 'why'),
-                _delay_s(key, value))
+                _delay_s(key, value), checks.flag(key + '.confirm', value.get('confirm', False)))
 
 
 def _text(key: str, value: Mapping[str, Any], field: str) -> str:

@@ -80,9 +80,13 @@ class ScriptedExpert:
     def _begin(self, key: str, listed: ListedQuestion) -> None:
         goal = listed.goal
         rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path, goal.failed_state)
-        due_s = float('inf') if rule.kind == IGNORE else time.monotonic() + rule.delay_s
+        why_not = rule.why_not(goal.choices)
+        if why_not:
+            rospy.logwarn('The rule for %s does not answer: %s', goal.failed_state, why_not)
+        ignores = rule.kind == IGNORE or bool(why_not)
+        due_s = float('inf') if ignores else time.monotonic() + rule.delay_s
         self._planned[key] = _PlannedAnswer(listed, rule, due_s)
-        if rule.delay_s > 0 and rule.kind != IGNORE:
+        if rule.delay_s > 0 and not ignores:
             try:
                 self._front_end.claim(listed)
             except ServerGoneError as err:

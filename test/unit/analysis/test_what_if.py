@@ -27,18 +27,21 @@ class Chance(smach.State):
 
 
 class Hand(Expert):
-    """Does the failed state's work, and now and then sends the machine back to it."""
+    """Does the failed state's work, and now and then sends the machine back to it, or farther."""
 
-    def __init__(self, generator):
+    def __init__(self, generator, back_to=''):
         self._generator = generator
+        self._back_to = back_to
 
     def ask(self, question, cancelled, progress):
         if self._generator.random() < 0.3:
-            return Answer(AnswerKind.GOTO, state=question.failed_state, by='hand')
+            states = [choice.state for choice in question.choices]
+            state = self._back_to if self._back_to in states else question.failed_state
+            return Answer(AnswerKind.GOTO, state=state, by='hand')
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='hand')
 
 
-def run(count, seed=1, states=None, **settings):
+def run(count, seed=1, states=None, back_to='', **settings):
     """The events of some trials of one learning machine, by trial."""
     generator = random.Random(seed)
     inner = smach.StateMachine(outcomes=['succeeded', 'aborted'])
@@ -50,7 +53,7 @@ def run(count, seed=1, states=None, **settings):
         smach.StateMachine.add('PICK', Chance(generator, 0.5), {'succeeded': 'INNER'})
         smach.StateMachine.add('INNER', inner, {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Chance(generator, 0.3))
-    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator),
+    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator, back_to),
                          preconditions={'PICK': ['LOOK']},
                          settings=dict(KEPT, states=states or {}, **settings))
     events = []
@@ -70,6 +73,19 @@ def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
     assert tried.counts[
         'not known'] == 0, 'preconditions that were not run are needed by nobody here'
+
+
+@pytest.mark.parametrize('settings', [
+    {'on_retry': 'confirm'}, {'states': {'PICK': {'on_retry': 'never'}}},
+    {'budget': {'recoveries': 1}}, {'budget': {'recoveries': 2, 'questions': 1}}])
+def test_so_it_is_where_states_are_not_repeated_and_a_budget_is_spent(settings):
+    trials = run(60, back_to='LOOK', **settings)
+    held_back = [event for trial in trials for event in trial
+                 if event.kind is EventKind.DECISION and event.data['decided_by'] == 'held_back']
+    assert bool(held_back) == ('budget' not in settings)
+    tried = what_if.compare(trials, {})
+    assert sum(tried.counts.values()) > 20
+    assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
 
 
 def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():

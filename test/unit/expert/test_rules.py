@@ -8,7 +8,7 @@ from waiting import Once
 
 from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
 from smach_oracle.expert.scripted_expert import load_rules, servers_of
-from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, StateChoice
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
@@ -51,6 +51,7 @@ def test_robots_do_not_use_up_each_other_s_rules():
     ({'PICK': dict(GOTO, delay_s=-1)}, 'PICK.delay_s: -1 is not allowed; allowed: seconds from 0'),
     ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
     ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
+    ({'PICK': dict(GOTO, confirm='yes')}, "PICK.confirm: 'yes' is not allowed; allowed: true or"),
     ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed; allowed: a string'),
     ({3: GOTO}, 'allowed: labels of states as keys')
 ])
@@ -104,6 +105,26 @@ def test_an_answer_that_comes_after_the_deadline_is_none():
     assert ask({'PICK': dict(GOTO, delay_s=60)}, deadline_s=0.1) is None
     assert ask({'PICK': {'kind': 'ignore'}}, deadline_s=0.1) is None
     assert 0.2 <= time.monotonic() - begun_s < 10.0
+
+
+POURED = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR',)),
+          StateChoice('DETECT', 0.9, 1, 1, (), (), repeats=('POUR',)))
+
+
+@pytest.mark.parametrize('rule, answered', [
+    ({'kind': 'goto', 'state': 'POUR'}, None),
+    ({'kind': 'goto', 'state': 'POUR', 'confirm': False}, None),
+    ({'kind': 'goto', 'state': 'POUR', 'confirm': True}, 'POUR'), (GOTO, 'DETECT')])
+def test_a_rule_has_a_state_repeated_only_where_it_confirms_that(rule, answered):
+    answer = ask({'PICK': rule}, choices=POURED, deadline_s=0.1)
+    assert (answer and answer.state) == answered
+
+
+def test_a_rule_that_does_not_confirm_says_so():
+    rule = Rules.parse({'PICK': {'kind': 'goto', 'state': 'POUR'}}).next('/r', 't', 'P', 'PICK')
+    assert rule.why_not(POURED) == (
+        'POUR was done in this trial, and only a rule with confirm: true has it repeated')
+    assert rule.why_not(POURED[1:]) == '' == rule.why_not([POURED[0]._replace(repeats=())])
 
 
 def test_a_question_taken_back_is_not_waited_for():

@@ -2,7 +2,11 @@
 import pytest
 
 from smach_oracle.oracle.decision.policy import Action
-from smach_oracle.oracle.decision.sentence import DecisionFacts, decision_sentence
+from smach_oracle.oracle.decision.sentence import (
+    DecisionFacts,
+    decision_sentence,
+    going_would_repeat,
+)
 
 
 def facts(action, **fields):
@@ -29,6 +33,15 @@ def facts(action, **fields):
      'PICK failed again after 1 recovery of this trial: asking an expert'),
     (facts(Action.ASK, blocked='MOVE still runs'),
      'PICK failed (1 of its last 10); MOVE still runs: asking an expert'),
+    (facts(Action.ASK, held_back='was done in this trial and is not repeated by itself'),
+     'PICK was done in this trial and is not repeated by itself: asking an expert'),
+    (facts(Action.ASK, blocked=going_would_repeat('PICK', 'DETECT', ['POUR', 'ARM/CUT'])),
+     'PICK failed (1 of its last 10); going back to DETECT would repeat POUR, ARM/CUT: asking an '
+     'expert'),
+    (facts(Action.ASK, blocked=going_would_repeat('PICK', 'PICK', ['PICK'])),
+     'PICK failed (1 of its last 10); it is not repeated by itself: asking an expert'),
+    (facts(Action.ASK, blocked=going_would_repeat('ARM', 'ARM', ['ARM/CUT'])),
+     'PICK failed (1 of its last 10); trying it again would repeat ARM/CUT: asking an expert'),
     (facts(Action.REVISIT, target='PICK', recent=(1, 1)),
      'PICK failed (its first result): trying it again'),
     (facts(Action.REVISIT, target='PICK', recent=(0, 0), rate=0.255),

@@ -27,6 +27,8 @@ def test_the_defaults_are_those_of_the_design():
     ({'moderate_from': 0.9}, 'moderate_from', 0.9, 'high_from'),
     ({'estimator': 'mean'}, 'estimator', 'mean', 'exponential, window'),
     ({'max_recoveries': -1}, 'max_recoveries', -1, 'from 0'),
+    ({'on_retry': 'ask'}, 'on_retry', 'ask', 'allow, confirm, never'),
+    ({'states': {'POUR': {'on_retry': True}}}, 'states.POUR.on_retry', True, 'allow, confirm'),
     ({'failing_outcomes': 'aborted'}, 'failing_outcomes', 'aborted', 'list of strings'),
     ({'failure_outcomes': ['']}, 'failure_outcomes', '', 'none of them empty'),
     ({'author_recoveries': 'drop'}, 'author_recoveries', 'drop', 'keep, override'),
@@ -145,7 +147,7 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
     assert set(str(raised.value).split('one of the keys ')[1].split(', ')) == {
         'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries',
         'failing_outcomes', 'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys',
-        'time_limit_s', 'grace_period_s', 'deadline_s', 'on_no_answer', 'escalate',
-        'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
-        'interfaces', 'states'
+        'time_limit_s', 'grace_period_s', 'on_retry', 'budget', 'deadline_s', 'on_no_answer',
+        'escalate', 'watch_preconditions', 'history_length', 'rates_file', 'oracle_label',
+        'nested', 'interfaces', 'states'
     }

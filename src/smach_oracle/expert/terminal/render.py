@@ -116,10 +116,12 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
 
 
 def _arrival(choice: StateChoice) -> Text:
-    """What would be missing, what must hold, or why it cannot be entered."""
+    """What would be missing or repeated, what must hold, or why it cannot be entered."""
     parts = []
     if choice.blocked:
         parts.append(Text('blocked: ' + clean(choice.blocked), 'bold #cc3333'))
+    if choice.repeats:
+        parts.append(Text('repeats: ' + _list(choice.repeats), 'bold #c77700'))
     if choice.missing_keys:
         parts.append(Text('missing: ' + _list(choice.missing_keys), 'bold #c77700'))
     if choice.preconditions:

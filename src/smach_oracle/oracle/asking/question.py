@@ -28,6 +28,9 @@ class StateChoice(NamedTuple):
     missing_keys: Tuple[str, ...]  # input keys that would be missing after the jump
     preconditions: Tuple[str, ...]  # names, in the order in which they run
     blocked: str = ''  # why it cannot be entered now, '' where it can
+    # states done in this trial that would come again behind it, though they are not repeated by
+    # themselves; its own label: going there repeats it
+    repeats: Tuple[str, ...] = ()
 
 
 class OutcomeChoice(NamedTuple):

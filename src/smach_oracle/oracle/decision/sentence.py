@@ -20,6 +20,7 @@ class DecisionFacts(NamedTuple):
     not_met: str = ''  # the one that could not
     spent: int = -1  # recoveries of this trial, where they are all spent; else -1
     blocked: str = ''  # why the policy's own choice is not possible
+    held_back: str = ''  # why the state was not executed, where it has not failed
     asked: str = ''  # who is asked, and how long: "an expert, 300 s"
 
 
@@ -34,7 +35,20 @@ def cause_of(facts: DecisionFacts) -> str:
     return _failed(facts) + _helped(facts) + blocked
 
 
+def going_would_repeat(state: str, target: str, repeated: Sequence[str]) -> str:
+    """Return the clause for a decision that would repeat states which are not to be repeated.
+
+    :param state: the failed one.
+    """
+    if state in repeated and target == state:
+        return 'it is not repeated by itself'
+    return '{} would repeat {}'.format(
+        'trying it again' if target == state else 'going back to ' + target, ', '.join(repeated))
+
+
 def _failed(facts: DecisionFacts) -> str:
+    if facts.held_back:
+        return '{} {}'.format(facts.state, facts.held_back)
     if facts.spent == 0:
         return '{} failed ({}), and no recovery of it is allowed'.format(facts.state, _rate(facts))
     if facts.spent > 0:

@@ -5,11 +5,13 @@ import smach
 
 from ..decision.policy import FailureContext
 from ..machine.learned_rates import save_rates
+from ..machine.repeats import leave_for, note_superseded
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
+from ..records.visits import VisitResult
 from ..recovery.failure import Failure, route_of
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
@@ -36,16 +38,27 @@ class OracleVisit:
         verdict = self._recover(meta, Recovery(self._node, self._record, self._failure, context,
                                                continuous))
         if verdict.kind is VerdictKind.SUPERSEDE:
-            self._record.take_back_failure()
-            self._node.records.history.supersede(verdict.outcome)
+            self._count_superseded(verdict.outcome)
         return self._leave(meta, verdict)
+
+    def _count_superseded(self, outcome: str) -> None:
+        node, record = self._node, self._record
+        if self._failure.is_held_back:
+            node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED)
+            note_superseded(node, record.label)
+            return
+        record.take_back_failure()
+        node.records.history.supersede(outcome)
 
     def _enter(self) -> OracleState:
         node, machine, failure = self._node, self._machine, self._failure
         label, meta_label = self._record.label, node.settings.oracle_label
-        what = failure.outcome or failure.kind.name.lower()
-        smach.logwarn('{}/{} failed: {}'.format(node.path, label,
-                                                failure.details or in_words(failure)))
+        if failure.is_held_back:
+            what, told = 'held_back', ' ' + failure.text
+        else:
+            what = failure.outcome or failure.kind.name.lower()
+            told = ' failed: ' + (failure.details or in_words(failure))
+        smach.logwarn('{}/{}{}'.format(node.path, label, told))
         self._record.left_by(what, meta_label)
         save_rates(node)
         machine._sync_oracle()
@@ -86,6 +99,7 @@ class OracleVisit:
         if restores is not None:
             restore(self._machine.userdata._data, restores, verdict.written,
                     node.in_force.deep_copy_keys)
+        leave_for(node, target)
         if missing:
             node.warn('jumping there without its input keys {}'.format(', '.join(missing)), target)
         self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,

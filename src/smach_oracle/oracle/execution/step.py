@@ -3,9 +3,11 @@ from typing import Any, Optional
 
 import smach
 
+from ..machine.repeats import note_visit
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
+from ..machine.workers import recall_preempts
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
@@ -17,7 +19,7 @@ from ..recovery.failure import (
     natural_ending,
     visit_result,
 )
-from ..recovery.judging import Overrun, judge
+from ..recovery.judging import HeldBack, Overrun, judge
 from ..settings.failing_outcomes import PREEMPTED
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
@@ -85,7 +87,7 @@ class Step:
         self._record = record
 
     def execute(self, state: smach.State, userdata: smach.Remapper) -> object:
-        """Execute the state, watched; return its outcome, or an Overrun.
+        """Execute the state, watched; return its outcome, an Overrun, or that it is held back.
 
         It raises what the state raises. With a time limit it gets a view of its own, which is shut
         when the state overruns, in place of `userdata`.
@@ -93,6 +95,10 @@ class Step:
         node, record = self._node, self._record
         if node.in_force.deep_copy_keys:
             record.snapshot = node.snapshot()
+        if node.tree.numbers_visits:
+            why_not = note_visit(node, record)
+            if why_not:
+                return HeldBack(why_not)
         node.emit(EventKind.STATE_START, state=record.label)
         blocked = node.tree.workers.blocked(state)
         if blocked:
@@ -137,10 +143,21 @@ class Step:
             result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
             node.records.visit_ended(record, outcome, result)
             return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)
+        if judged.is_held_back:
+            return self._held_back(judged, stopping)
         if stopping:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._preempted_ending(judged), judged)
         return self._failed(judged)
+
+    def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
+        """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""
+        node, record = self._node, self._record
+        if stopping:
+            recall_preempts(self._machine._states[record.label])  # it services none
+            return self._end_unrecovered(self._preempted_ending(failure), failure)
+        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        return OracleVisit(node, record, failure).run(context, False)
 
     def _failed(self, failure: Failure) -> Optional[str]:
         node, record = self._node, self._record
@@ -170,9 +187,9 @@ class Step:
     def _preempted_ending(self, failure: Failure) -> ContainerEnding:
         """Return how a failure ends the container while a preempt or a shutdown is under way.
 
-        An overrun ends it as preempted, all else as it would.
+        An overrun, and a state that was held back, end it as preempted, all else as it would.
         """
-        if (failure.kind is FailureKind.TIME_LIMIT
+        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.NOT_A_FAILURE)
                 and PREEMPTED in self._machine.get_registered_outcomes()):
             return ContainerEnding(outcome=PREEMPTED)
         return self._natural_ending(failure)

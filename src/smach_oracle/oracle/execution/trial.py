@@ -8,6 +8,7 @@ import smach
 
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
+from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
@@ -31,6 +32,8 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         # one that still runs was abandoned in an earlier trial, and is left there
         if not each.machine.is_running():
             each.begin_trial(node.tree.trial_id)
+    begin_watching(node)
+    node.tree.budget.begin(node.settings.budget)
     return _run_trial(node, execute)
 
 

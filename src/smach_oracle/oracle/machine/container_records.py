@@ -5,6 +5,7 @@ from typing import Any, Dict, Mapping
 from ..decision.policy import FailureContext
 from ..records.history import History
 from ..records.state_record import FastEdge, StateRecord
+from ..records.visit_marks import VisitMarks
 from ..records.visits import Visit, VisitResult
 from ..settings.settings import StateSettings
 
@@ -15,6 +16,7 @@ class ContainerRecords:
     def __init__(self, history_length: int) -> None:
         self.by_label: Dict[str, StateRecord] = {}
         self.history = History(history_length)
+        self.marks = VisitMarks()
         self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
         self._to_come: Dict[str, Dict[str, Any]] = {}
@@ -47,6 +49,7 @@ class ContainerRecords:
     def begin_trial(self) -> None:
         """Forget what belongs to a trial; the rates stay."""
         self.history.begin_trial()
+        self.marks.begin_trial()
         for record in self.by_label.values():
             record.begin_trial()
 
@@ -89,6 +92,7 @@ class ContainerRecords:
         twin = copy.copy(self)
         twin.by_label = copy.deepcopy(self.by_label)
         twin.history = copy.deepcopy(self.history)
+        twin.marks = VisitMarks()
         twin.oracle_edges = dict(self.oracle_edges)
         twin._to_come = dict(self._to_come)
         return twin

@@ -3,7 +3,7 @@ from typing import Any, Dict
 
 from ..decision.policy import Policy, policy_named
 from ..settings.failing_outcomes import FailingNames
-from ..settings.settings import Settings, StateSettings
+from ..settings.settings import ALLOW, Settings, StateSettings
 
 
 class ContainerSettings:
@@ -19,6 +19,12 @@ class ContainerSettings:
         self.policy: Policy = policy_named(settings.policy)
         self.failing = FailingNames(settings.failing_outcomes)
         self.deep_copy_keys = settings.deep_copy_keys
+
+    def guards_states(self) -> bool:
+        """Whether a state may be guarded: whether `on_retry` is set, for all or for one."""
+        given = list(self.of_machine.states.values()) + list(self.given_with_add.values())
+        return self.of_machine.defaults.on_retry != ALLOW or any(
+            each.get('on_retry', ALLOW) != ALLOW for each in given)
 
     def of_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state of the container at `path`, relative to the top machine.

@@ -2,6 +2,7 @@
 
 The trial, its events, the expert, the threads that were left behind.
 """
+import itertools
 import threading
 import uuid
 from typing import Any, Callable, Dict, Optional
@@ -10,6 +11,7 @@ import smach
 
 from ..asking.question import Expert
 from ..records.events import EventSource
+from .trial_budget import TrialBudget
 from .workers import Workers
 
 
@@ -39,6 +41,10 @@ class Tree:
         self.expert = expert
         self.events = EventSource(log_error)
         self.workers = Workers()
+        self.budget = TrialBudget()
+        # whether a state is guarded (`on_retry`), so that visits are numbered
+        self.numbers_visits = False
+        self._visits = itertools.count(1)
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
@@ -52,6 +58,10 @@ class Tree:
         self.trial_id = trial_id
         self._questions = 0
         self.events.begin_trial(trial_id)
+
+    def next_visit(self) -> int:
+        """Return the number of the next visit of a state, in whichever container."""
+        return next(self._visits)
 
     def next_question_id(self) -> str:
         """Return the id of the next question.

@@ -140,11 +140,15 @@ class TreeNode:
         self.records.history.resize(settings.history_length)
         self.checked_states = -1
         for label, record in self.records.by_label.items():
-            record.configure(self.settings_of(label), bool(settings.deep_copy_keys))
+            record.configure(self.settings_of(label), self.is_special())
 
     def settings_of(self, label: str) -> StateSettings:
         """Return the settings of a state."""
         return self.in_force.of_state(self.relative_path, label)
+
+    def is_special(self) -> bool:
+        """Whether more is to be done at each of its states than to execute it."""
+        return bool(self.in_force.deep_copy_keys) or self.tree.numbers_visits
 
     def is_oracle(self, label: str) -> bool:
         """Whether `label` is the meta state's."""
@@ -165,8 +169,7 @@ class TreeNode:
                 raise smach.InvalidStateError('{!r} is no state of {}'.format(label, self.path))
             if self.is_oracle(label):
                 raise entered_by_failures_alone(label)
-            record = self.records.make(label, self.settings_of(label),
-                                       bool(self.in_force.deep_copy_keys))
+            record = self.records.make(label, self.settings_of(label), self.is_special())
         return record
 
     # -- what goes on

@@ -20,6 +20,9 @@ class Decider(str, Enum):
 
     POLICY = 'policy'
     MAX_RECOVERIES = 'max_recoveries'  # the limit, outside every policy
+    BUDGET = 'budget'  # that of the whole trial
+    ON_RETRY = 'on_retry'  # where the policy wants to go, a state would be repeated
+    HELD_BACK = 'held_back'  # no failure: the machine came to a state that is not to be repeated
 
 
 class TrialEnd(str, Enum):

@@ -95,12 +95,16 @@ class StateRecord:
         """
         self.settings = settings
         self.has_preconditions = bool(settings.preconditions)
-        self.special = special or settings.time_limit_s is not None
+        self.be_special(special)
         with self._lock:
             learned = self._up_to_date().snapshot()
             self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
             self._estimator.restore(learned)
         self._retire_edges()
+
+    def be_special(self, special: bool) -> None:
+        """Have more done than to execute the state, which a time limit wants in any case."""
+        self.special = special or self.settings.time_limit_s is not None
 
     def _up_to_date(self) -> Estimator:
         """The estimator, told of the successes by way of edges; to be called with the lock held."""

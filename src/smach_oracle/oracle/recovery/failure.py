@@ -34,6 +34,11 @@ class Failure(NamedTuple):
     error: Optional[Callable[[], Exception]] = None
     details: str = ''  # the traceback
 
+    @property
+    def is_held_back(self) -> bool:
+        """Whether it is none: the state was not executed, since it is not to be repeated."""
+        return self.kind is FailureKind.NOT_A_FAILURE
+
 
 class ContainerEnding(NamedTuple):
     """How a container would end, or go on, without an oracle: exactly one is set."""

@@ -25,6 +25,12 @@ class Overrun(NamedTuple):
     text: str
 
 
+class HeldBack(NamedTuple):
+    """In place of the outcome of a state that was not executed, since it is not to be repeated."""
+
+    text: str
+
+
 def judge(node: TreeNode, record: StateRecord, outcome: Any,
           error: Optional[Exception]) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
@@ -36,6 +42,8 @@ def judge(node: TreeNode, record: StateRecord, outcome: Any,
                        partial(raised_error, label, state, error), traceback_of(error))
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
+    if isinstance(outcome, HeldBack):
+        return Failure(label, FailureKind.NOT_A_FAILURE, '', outcome.text, None)
     if outcome not in state.get_registered_outcomes():
         text = unregistered_text(label, state, outcome)
         return Failure(label, FailureKind.UNREGISTERED_OUTCOME,

@@ -2,11 +2,13 @@
 
 Runs of preconditions do not count as visits.
 """
+import contextlib
 import threading
-from typing import Any, Optional
+from typing import Any, Iterator, Optional
 
 import smach
 
+from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
 from ..machine.userdata_view import constants_of, view_behind, write_constants
@@ -74,7 +76,8 @@ class PreconditionRunner:
         elif spec.kind is PreconditionKind.CALLABLE:
             self._call(spec)
         elif spec.kind is PreconditionKind.STATE:
-            self._judge(spec.target, '', self._execute(spec.target, ''))
+            with self._noted(self._label_of(spec.target)):
+                self._judge(spec.target, '', self._execute(spec.target, ''))
         else:
             self._run_label(spec.target)
 
@@ -114,7 +117,32 @@ class PreconditionRunner:
         state = self._machine._states.get(label)
         if state is None or self._node.is_oracle(label):
             raise NotMet('there is no state {!r}'.format(label))
-        self._judge(state, label, self._execute(state, label))
+        with self._noted(label):
+            self._judge(state, label, self._execute(state, label))
+
+    def _label_of(self, state: smach.State) -> str:
+        """Return the label of a state that was given itself, '' where the container has it not."""
+        return next((label for label in self._node.labels()
+                     if self._machine._states[label] is state), '')
+
+    @contextlib.contextmanager
+    def _noted(self, label: str) -> Iterator[None]:
+        """Note that a state of the container is executed.
+
+        :raises NotMet: where it, or a state within, would be repeated and is not to be.
+        """
+        repeated = repeated_by_running(self._node, label) if label else ()
+        if repeated:
+            raise NotMet('{} was done in this trial and is not repeated by itself'.format(
+                ', '.join(repeated)))
+        if label:
+            self._check_free(self._machine._states[label])
+            note_precondition(self._node, label)
+        try:
+            yield
+        finally:
+            if label:
+                note_precondition(self._node, label)
 
     def _execute(self, state: smach.State, label: str) -> object:
         self._check_free(state)

@@ -1,6 +1,6 @@
 """One failure, from the policy's question to the verdict (paper, Algorithm 1)."""
 import threading
-from typing import Any, List, Mapping
+from typing import Any, List, Mapping, Optional, Tuple
 
 import smach
 
@@ -8,8 +8,14 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, AnswerKind, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
-from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
+from ..decision.sentence import (
+    DecisionFacts,
+    cause_of,
+    decision_sentence,
+    going_would_repeat,
+)
 from ..machine.limited_run import standing_still
+from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
@@ -17,6 +23,7 @@ from ..records.facts import DECIDED_BY, Decider
 from ..records.state_record import StateRecord
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.preconditions import PreconditionSpec
+from ..settings.settings import ALLOW
 from .failure import ContainerEnding, Failure, natural_ending
 from .precondition_runner import PreconditionRunner
 from .question_making import Account, make_question
@@ -42,6 +49,8 @@ class Recovery:
         self._cause = ''  # of the decision
         self._met: List[str] = []  # names of preconditions
         self._not_met = ''
+        self._budget = node.tree.budget
+        self._ends_budget = False  # whether the question's deadline is that of the trial
         self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, record.settings, self._watch)
         self.tried: List[str] = []
@@ -58,11 +67,14 @@ class Recovery:
         return self._cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
 
     def run(self) -> Verdict:
-        """Decide, and ask where the policy says so."""
-        decider = Decider.MAX_RECOVERIES if self._limit_is_reached() else Decider.POLICY
-        facts = self._decide(decider)
+        """Decide, and ask where the policy says so; neither where the trial's time is over."""
+        if self._budget.why_over():
+            return self._end_unaided()
+        decider, facts = self._decide()
         if self.stopped():
             return self._preempted()
+        if self._budget.why_over():
+            return self._end_unaided()
         record, self._cause, sentence = self._record, cause_of(facts), decision_sentence(facts)
         smach.loginfo('{}/{}'.format(self._node.path, sentence))
         self.emit(EventKind.DECISION, outcome=facts.action.value, target=facts.target,
@@ -76,23 +88,50 @@ class Recovery:
 
     # -- deciding
 
-    def _limit_is_reached(self) -> bool:
-        return self._record.recoveries >= self._record.settings.max_recoveries
+    def _decide(self) -> Tuple[Decider, DecisionFacts]:
+        return self._ask_at_once() or self._follow_policy()
 
-    def _decide(self, decider: Decider) -> DecisionFacts:
+    def _ask_at_once(self) -> Optional[Tuple[Decider, DecisionFacts]]:
+        """Return the decision where no policy has a say, and no precondition is run."""
+        record, ask = self._record, Action.ASK
+        if self._failure.is_held_back:
+            return Decider.HELD_BACK, self._facts_of(ask)
+        if record.recoveries >= record.settings.max_recoveries:
+            return Decider.MAX_RECOVERIES, self._facts_of(ask, spent=record.recoveries)
+        spent = self._budget.why_no_recovery()
+        if spent:
+            return Decider.BUDGET, self._facts_of(ask, blocked=spent)
+        if record.settings.on_retry != ALLOW:
+            return Decider.ON_RETRY, self._facts_of(ask, blocked=self._why_repeats(record.label))
+        return None
+
+    def _follow_policy(self) -> Tuple[Decider, DecisionFacts]:
         record, policy = self._record, self._node.in_force.policy
-        if decider is Decider.MAX_RECOVERIES:
-            return self._facts_of(Action.ASK, spent=record.recoveries)
         preconditions = self._run_preconditions(record.failure_class)
         action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
         target = ''
         if action is not Action.ASK:
             target = (record.label if action is Action.REVISIT
                       else policy.step_back_target(self._context))
-        why_not = self._why_not(target) if target else ''
+        decider, why_not = self._what_prevents(target) if target else (Decider.POLICY, '')
         if why_not:
             action, target = Action.ASK, ''
-        return self._facts_of(action, target=target, blocked=why_not)
+        return decider, self._facts_of(action, target=target, blocked=why_not)
+
+    def _what_prevents(self, target: str) -> Tuple[Decider, str]:
+        """Spend a recovery on going to a state; or return what prevents it, and why."""
+        for decider, why_not in ((Decider.POLICY, self._why_not),
+                                 (Decider.ON_RETRY, self._why_repeats)):
+            reason = why_not(target)
+            if reason:
+                return decider, reason
+        spent = self._budget.take_recovery()
+        return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
+
+    def _why_repeats(self, target: str) -> str:
+        """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
+        repeated = repeated_by_going_to(self._node, target)
+        return going_would_repeat(self._record.label, target, repeated) if repeated else ''
 
     def _why_not(self, target: str) -> str:
         """Return why the machine cannot go on to a state by itself now, '' where it can."""
@@ -112,20 +151,32 @@ class Recovery:
         record = self._record
         return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
                              met=self._met, not_met=self._not_met,
+                             held_back=self._failure.text if self._failure.is_held_back else '',
                              asked=self._asked_in_words() if action is Action.ASK else '', **fields)
 
     def _asked_in_words(self) -> str:
         node = self._node
-        if node.settings.escalate and node.has_running_ancestor():
+        if self._escalates():
             return 'the oracle above'
         if node.tree.expert is None:
             return 'nobody, since there is no expert'
-        limit_s = node.settings.deadline_s
+        spent = self._budget.why_no_question()
+        if spent:
+            return 'nobody, since ' + spent
+        limit_s, is_cut = self._budget.within(node.settings.deadline_s)
+        if is_cut:
+            return "an expert, {:.0f} s, which are the trial's last".format(limit_s)
         return 'an expert, {:g} s'.format(limit_s) if limit_s else 'an expert'
+
+    def _escalates(self) -> bool:
+        """Whether the oracle above is to ask; it cannot confirm that a state is repeated here."""
+        node = self._node
+        return (node.settings.escalate and node.has_running_ancestor()
+                and not self._failure.is_held_back)
 
     def _blocked(self, label: str) -> str:
         """Return why a state cannot be entered now, '' where it can."""
-        return self._node.tree.workers.blocked(self._machine._states[label])
+        return why_closed(self._node, label)
 
     def _run_preconditions(self, failure_class: FailureClass) -> Preconditions:
         specs = self._record.settings.preconditions
@@ -155,16 +206,18 @@ class Recovery:
 
     def _ask(self) -> Verdict:
         node = self._node
-        if node.settings.escalate and node.has_running_ancestor():
+        if self._escalates():
             return self._give_up('handed to the oracle above: ' + self._cause)
         expert = node.tree.expert
         if expert is None:
             return self._fall_back('no expert is there to ask')
-        return self._ask_expert(expert)
+        spent = self._budget.take_question()
+        return self._fall_back(spent) if spent else self._ask_expert(expert)
 
     def _ask_expert(self, expert: Expert) -> Verdict:
+        deadline_s, self._ends_budget = self._budget.within(self._node.settings.deadline_s)
         with standing_still(self._node.runs_around):
-            reply = Inquiry(self, expert, self._node.settings.deadline_s).run()
+            reply = Inquiry(self, expert, deadline_s).run()
         if self.stopped():
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
@@ -172,9 +225,10 @@ class Recovery:
             return self._preempted()
         if reply.answer is not None:
             return self._obey(reply.answer)
+        why = '; '.join(filter(None, (reply.why_none, self._budget.why_over())))
         self.emit(EventKind.QUERY_EXPIRED, query_id=reply.question_id,
-                  text='{}; fallback: {}'.format(reply.why_none, self._fallback_in_words()))
-        return self._fall_back(reply.why_none)
+                  text='{}; fallback: {}'.format(why, self._fallback_in_words()))
+        return self._fall_back(why)
 
     def _why_stopped(self) -> str:
         if self._cancelled.is_set():
@@ -231,6 +285,13 @@ class Recovery:
         ending = ContainerEnding(outcome=outcome) if outcome else self._natural_ending()
         return Verdict(VerdictKind.GIVE_UP, ending=ending, by=by, text=text)
 
+    def _end_unaided(self) -> Verdict:
+        """End the container as without an oracle, since the trial's time is over."""
+        cause = cause_of(self._facts_of(Action.ASK, blocked=self._budget.why_over()))
+        text = '{}: the machine ends as without an oracle'.format(cause)
+        smach.logwarn('{}/{}'.format(self._node.path, text))
+        return self._give_up(text)
+
     def _preempted(self) -> Verdict:
         """End the container as preempted.
 
@@ -251,7 +312,7 @@ class Recovery:
         """Do what is configured for a question that nobody answers."""
         verb, target = self._node.settings.on_no_answer
         if verb == 'goto':
-            problem = self._why_not_fall_back_to(target)
+            problem = self._why_not_fall_back_to(target) or self._budget.take_recovery()
             if not problem:
                 self._record.fallbacks += 1
                 return self._jump(target, text=why)
@@ -272,7 +333,11 @@ class Recovery:
             return 'this trial has gone there {} times for {} already'.format(
                 record.fallbacks, record.label)
         states = self.states_now()
-        return states.get(label, 'no such state; there are ' + names(states))
+        if label not in states:
+            return 'no such state; there are ' + names(states)
+        over = 'the trial is over then' if self._ends_budget else self._budget.why_over()
+        return (states[label] or self._why_repeats(label) or over
+                or self._budget.why_no_recovery())
 
     def _fallback_in_words(self) -> str:
         """Return what `_fall_back` will do."""

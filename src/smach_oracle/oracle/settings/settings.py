@@ -12,10 +12,12 @@ from ..decision.policy import POLICIES
 from ..errors import SettingsError
 from ..settings.interfaces import InterfaceOffer
 from . import checks as values
+from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .interfaces import checked_interfaces
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
+ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
 _MAX_HISTORY = 1000000  # visits; each question carries them all
 _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
 
@@ -30,6 +32,7 @@ class StateSettings:
     high_from: float = 0.75  # and HIGH
     estimator: str = 'window'
     max_recoveries: int = 5  # per trial; beyond it the oracle asks
+    on_retry: str = ALLOW  # whether it may be repeated
     failure_outcomes: Tuple[str, ...] = ()  # outcomes that are failures whatever they lead to
     author_recoveries: str = 'keep'
     time_limit_s: Optional[float] = None  # of each execution; None: no limit
@@ -44,6 +47,7 @@ _STATE_CHECKS: Dict[str, values.Check] = {
     'high_from': _RATE,
     'estimator': values.choice(sorted(ESTIMATORS)),
     'max_recoveries': values.whole(0, 'a whole number from 0'),
+    'on_retry': values.choice((ALLOW, CONFIRM, NEVER)),
     'failure_outcomes': values.words,
     'author_recoveries': values.choice(('keep', 'override')),
     'time_limit_s': values.time_limit,
@@ -51,6 +55,7 @@ _STATE_CHECKS: Dict[str, values.Check] = {
 }
 _MACHINE_CHECKS: Dict[str, values.Check] = {
     'policy': values.choice(sorted(POLICIES)),
+    'budget': checked_budget,
     'failing_outcomes': values.words,
     'userdata': values.choice(('restore', 'keep')),
     'deep_copy_keys': values.words,
@@ -90,6 +95,7 @@ class Settings:
     # offer, states it serves ((): all)
     interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()
     states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    budget: Budget = Budget()  # of a whole trial
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

@@ -30,6 +30,12 @@ def shown(renderable, width=100, colours=False):
     return console.file.getvalue()
 
 
+def test_what_would_come_again_is_shown_with_the_choice():
+    text = shown(render.question(goal(choices=(
+        StateChoice('DETECT', 0.5, 1, 0, (), (), repeats=('POUR', 'ARM/CUT')),)), 1.0))
+    assert 'repeats: POUR, ARM/CUT' in text
+
+
 @pytest.mark.parametrize('width', [80, 140])
 def test_the_whole_question_is_there_and_fits_the_terminal(width):
     text = shown(

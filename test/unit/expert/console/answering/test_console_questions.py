@@ -15,6 +15,8 @@ from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import OpenQuery
+from smach_oracle.oracle.asking.question import StateChoice
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.userdata_codec import decode_all
 
@@ -43,6 +45,14 @@ def test_a_question_is_told_whole():
     assert shown['supersede'][0] == {'outcome': 'succeeded', 'target': 'PLACE'}
     assert shown['outputs'] == ['grasped']
     assert shown['interfaces'] == [{'name': 'assist', 'description': 'do it by hand'}]
+
+
+def test_a_question_says_what_would_come_again_and_that_nothing_failed():
+    choices = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT')),)
+    held_back = view(failure_kind=FailureKind.NOT_A_FAILURE, choices=choices)
+    assert held_back['choices'][0]['repeats'] == ['POUR', 'ARM/CUT']
+    assert (held_back['failed'], held_back['what']) == (False, 'was not executed')
+    assert view()['failed'] and view()['choices'][0]['repeats'] == []
 
 
 class FakeFrontEnd:

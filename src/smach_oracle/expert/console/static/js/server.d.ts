@@ -61,6 +61,7 @@ export interface Question {
   robot: string;
   path: string; // of the container
   state: string; // that failed
+  failed: boolean; // false: it is held back, since it is not repeated by itself
   what: string; // went wrong, in words
   outcome: string;
   text: string; // of an exception
@@ -97,6 +98,7 @@ export interface StateChoice {
   missing: string[]; // userdata that it needs and would not have
   preconditions: string[];
   blocked: string; // why; '' where it is not
+  repeats: string[]; // states that are not repeated by themselves
   helped: [helped: number, tried: number]; // how often going there helped
 }
 

@@ -54,11 +54,14 @@ function successBar(success) {
  * @param {string} failed the state that failed
  * @returns {Child[]}
  */
-function stateChips({ class: rank, blocked, missing, visits, helped: [helped, tried] }, failed) {
+function stateChips(choice, failed) {
+  const { class: rank, blocked, repeats, missing, visits, helped: [helped, tried] } = choice;
   const words = FAILURE_CLASSES[rank];
   return [
     words && chip(words, 'class-' + rank),
     blocked && chip('blocked: ' + blocked, 'bad'),
+    repeats.length > 0 && chip('repeats: ' + repeats.join(', '), 'warn',
+      'Done in this trial, and not repeated by itself'),
     missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
       'Userdata that it needs and would not have'),
     visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),

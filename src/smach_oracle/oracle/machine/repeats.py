@@ -1,0 +1,124 @@
+"""States that are not repeated by themselves: `on_retry: confirm` or `never`.
+
+A repeat is a state that was executed in this trial and that the oracle leads the machine to again,
+at once or by the author's transitions from where it has jumped to. The author's own loops are none.
+"""
+from typing import Iterator, NamedTuple, Tuple
+
+from ..records.state_record import StateRecord
+from ..records.visit_marks import VisitMark
+from ..settings.settings import ALLOW, NEVER
+from .nesting import nodes_of
+from .tree_node import TreeNode
+
+
+class _Done(NamedTuple):
+    """A guarded state that was executed in this trial."""
+
+    name: str  # its label, behind the path from the container that asks
+    mark: VisitMark
+
+
+def begin_watching(node: TreeNode) -> None:
+    """At the beginning of a trial: number the visits where a state of the tree is guarded."""
+    nodes = list(nodes_of(node.machine))
+    node.tree.numbers_visits = node.tree.recover and any(
+        each.in_force.guards_states() for each in nodes)
+    for each in nodes:
+        for record in each.records.by_label.values():
+            record.be_special(each.is_special())
+
+
+def note_visit(node: TreeNode, record: StateRecord) -> str:
+    """Note that the machine has come to a state; return why it is not executed, '' where it is."""
+    mark = node.records.marks.of(record.label)
+    mark.reached = node.tree.next_visit()
+    on_retry = record.settings.on_retry
+    if mark.spent and on_retry != ALLOW:
+        return 'was done in this trial and {}'.format(
+            'must not be repeated' if on_retry == NEVER else 'is not repeated by itself')
+    mark.done = True
+    return ''
+
+
+def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
+    """Return the guarded states that would be repeated if the oracle went to a state.
+
+    They are those that were executed since the machine came to `target` last, itself among them. If
+    it has not been there in this trial, nobody knows what lies behind it, and they are all.
+    """
+    return tuple(done.name for done in _done_since(node, target))
+
+
+def leave_for(node: TreeNode, target: str) -> None:
+    """Note that the oracle goes to a state: what may come again now is spent.
+
+    Only an expert goes to a state that would be repeated itself, and has confirmed it so.
+    """
+    if not node.tree.numbers_visits:
+        return
+    for done in _done_since(node, target):
+        done.mark.spent = True
+    node.records.marks.of(target).spent = False
+
+
+def note_superseded(node: TreeNode, label: str) -> None:
+    """Note that an expert has done the work of a spent state: the author's loops are free again."""
+    node.records.marks.of(label).spent = False
+
+
+def why_closed(node: TreeNode, label: str) -> str:
+    """Return why a state cannot be entered now, whoever wants it; '' where it can."""
+    blocked = node.tree.workers.blocked(node.machine._states[label])
+    if blocked or not node.tree.numbers_visits:
+        return blocked
+    if node.records.marks.of(label).done and node.settings_of(label).on_retry == NEVER:
+        return 'was done in this trial and must not be repeated (on_retry: never)'
+    return ''
+
+
+def repeated_by_running(node: TreeNode, label: str) -> Tuple[str, ...]:
+    """Return the guarded states that would be repeated if a state were run as a precondition."""
+    if not node.tree.numbers_visits:
+        return ()
+    return tuple(done.name for done in _done_within(node, label))
+
+
+def note_precondition(node: TreeNode, label: str) -> None:
+    """Note that a state has begun as a precondition: that was no visit, and is not to come again.
+
+    To be called before it runs, for what happens in the middle, and after, for what it holds.
+    """
+    if not node.tree.numbers_visits:
+        return
+    node.record(label)
+    node.records.marks.of(label).done = True
+    for done in _done_within(node, label):
+        done.mark.spent = True
+        done.mark.reached = 0
+
+
+def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:
+    if not node.tree.numbers_visits:
+        return
+    since = node.records.marks.of(target).reached
+    for each in nodes_of(node.machine):
+        for done in _done_in(node, each):
+            if done.mark.reached >= since:
+                yield done
+
+
+def _done_within(node: TreeNode, label: str) -> Iterator[_Done]:
+    for each in nodes_of(node.machine):
+        for done in _done_in(node, each):
+            if done.name == label or done.name.startswith(label + '/'):
+                yield done
+
+
+def _done_in(node: TreeNode, each: TreeNode) -> Iterator[_Done]:
+    """Yield the guarded states of a container at or below `node` that were executed."""
+    path = each.path[len(node.path) + 1:]
+    for label, record in list(each.records.by_label.items()):
+        mark = each.records.marks.of(label)
+        if mark.done and record.settings.on_retry != ALLOW:
+            yield _Done('{}/{}'.format(path, label) if path else label, mark)

@@ -1,0 +1,87 @@
+"""What is left of a trial's budget, for all containers of a tree."""
+import threading
+from time import monotonic
+from typing import Any, Optional, Tuple
+
+from ..settings.budget import Budget
+
+_LEAST_S = 0.001  # 0 s would be without end
+
+
+class TrialBudget:
+    """Counts what a trial has spent. Safe to use from several threads.
+
+    Each answer is '' where there is something left, else a clause that says what is spent.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.begin(Budget())
+
+    def begin(self, limits: Budget) -> None:
+        """Begin a trial: nothing is spent, and its minutes begin now."""
+        with self._lock:
+            self._limits = limits
+            self._recoveries = self._questions = 0
+            self._begun_s = monotonic()
+
+    def why_over(self) -> str:
+        """Say that the minutes are over."""
+        left_s = self.left_s()
+        if left_s is None or left_s > 0:
+            return ''
+        minutes = '{:g}'.format(self._limits.minutes or 0.0)
+        return "the trial's {} over".format(
+            '1 minute is' if minutes == '1' else minutes + ' minutes are')
+
+    def left_s(self) -> Optional[float]:
+        """Return how many seconds are left, 0.0 where none are; None: they are not limited."""
+        minutes = self._limits.minutes
+        if minutes is None:
+            return None
+        return max(0.0, self._begun_s + 60.0 * minutes - monotonic())
+
+    def within(self, deadline_s: float) -> Tuple[float, bool]:
+        """Return a deadline that is not beyond the minutes, and whether they cut it.
+
+        :param deadline_s: s from now; 0: none.
+        """
+        left_s = self.left_s()
+        if left_s is None or 0 < deadline_s <= left_s:
+            return deadline_s, False
+        return max(left_s, _LEAST_S), True
+
+    def why_no_recovery(self) -> str:
+        """Say that the recoveries are spent."""
+        return _spent(self._limits.recoveries, self._recoveries, 'recovery', 'recoveries')
+
+    def take_recovery(self) -> str:
+        """Spend one, or say that they are spent."""
+        with self._lock:
+            why_not = self.why_no_recovery()
+            self._recoveries += not why_not
+            return why_not
+
+    def why_no_question(self) -> str:
+        """Say that the questions are spent."""
+        return _spent(self._limits.questions, self._questions, 'question', 'questions')
+
+    def take_question(self) -> str:
+        """Spend one, or say that they are spent."""
+        with self._lock:
+            why_not = self.why_no_question()
+            self._questions += not why_not
+            return why_not
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """What a trial has spent does not travel with a copied or pickled machine."""
+        return TrialBudget, ()
+
+
+def _spent(limit: Optional[int], used: int, one: str, many: str) -> str:
+    if limit is None or used < limit:
+        return ''
+    if limit == 0:
+        return 'this trial is allowed no {}'.format(many)
+    return "the trial's {} spent".format(
+        '1 {} is'.format(one) if limit == 1 else '{} {} are'.format(limit, many))

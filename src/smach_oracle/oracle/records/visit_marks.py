@@ -1,0 +1,36 @@
+"""What a trial has done to the states of one container, as far as repeats go. Pure; no smach."""
+from typing import Dict
+
+
+class VisitMark:
+    """Of one state in one trial.
+
+    `reached`: number of its latest visit, over the whole tree; 0: none. `done`: whether it was
+    executed, by a visit or as a precondition. `spent`: whether the oracle has left for a place from
+    which the machine may come here again: if it is guarded, it is not executed then.
+    """
+
+    __slots__ = ('reached', 'done', 'spent')
+
+    def __init__(self) -> None:
+        self.reached = 0
+        self.done = False
+        self.spent = False
+
+
+class VisitMarks:
+    """The marks of one container, by label; they are kept where a state of the tree is guarded."""
+
+    def __init__(self) -> None:
+        self._by_label: Dict[str, VisitMark] = {}
+
+    def begin_trial(self) -> None:
+        """Forget everything."""
+        self._by_label = {}
+
+    def of(self, label: str) -> VisitMark:
+        """Return the mark of a state."""
+        mark = self._by_label.get(label)
+        if mark is None:
+            mark = self._by_label[label] = VisitMark()
+        return mark
