@@ -10,6 +10,8 @@ import smach
 
 from ..asking.question import Expert
 from ..records.events import EventSource
+from ..settings.health import HealthFunction
+from .health_watch import HealthWatch
 from .workers import Workers
 
 
@@ -32,13 +34,15 @@ class Tree:
     """Shared by the top machine and all wrapped containers below it."""
 
     def __init__(self, container_class: type, recover: bool = True,
-                 expert: Optional[Expert] = None) -> None:
+                 expert: Optional[Expert] = None,
+                 health: Optional[HealthFunction] = None) -> None:
         # that of wrapped machines, and what nested ones become
         self.container_class = container_class
         self.recover = recover
         self.expert = expert
         self.events = EventSource(log_error)
         self.workers = Workers()
+        self.health = HealthWatch(health)
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
