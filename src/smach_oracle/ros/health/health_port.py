@@ -1,7 +1,7 @@
 """The port by which the executive learns of topics and diagnostics whether the robot is well."""
 import threading
 from functools import partial
-from typing import List, NamedTuple, Optional, Sequence, Set
+from typing import List, NamedTuple, Optional, Sequence
 
 import genpy
 import rospy
@@ -33,10 +33,13 @@ class TopicHealth:
             _Heard(each, topics.message(each.source) if each.kind is HealthKind.TOPIC
                    else topics.status(each.source)) for each in conditions
         ]
-        self._warned: Set[str] = set()
-        self._timer = threading.Timer(SILENT_AFTER_S, self._warn_of_silence)
-        self._timer.daemon = True
-        self._timer.start()
+        self._topics = topics
+        new = {_source_of(each) for each in conditions} - topics.watched
+        if new:
+            topics.watched.update(new)
+            timer = threading.Timer(SILENT_AFTER_S, self._warn_of_silence)
+            timer.daemon = True
+            timer.start()
 
     def why_unwell(self) -> str:
         """Return what is wrong, '' where all is well."""
@@ -59,11 +62,15 @@ class TopicHealth:
 
     def _warn_of_silence(self) -> None:
         for condition, latest in self._heard:
-            source = '{} {}'.format(condition.kind.value, condition.source)
-            if latest.age_s() is None and source not in self._warned and not rospy.is_shutdown():
-                self._warned.add(source)
+            source, warned = _source_of(condition), self._topics.warned
+            if latest.age_s() is None and source not in warned and not rospy.is_shutdown():
+                warned.add(source)
                 rospy.logwarn('healthy: nothing was heard of %s so far; it counts as %s', source,
                               'well' if condition.max_age_s is None else 'not well')
+
+
+def _source_of(condition: HealthCondition) -> str:
+    return '{} {}'.format(condition.kind.value, condition.source)
 
 
 def listen_to_health(topics: HealthTopics,

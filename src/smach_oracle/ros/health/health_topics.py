@@ -6,7 +6,7 @@ its publisher sends.
 """
 import threading
 import time
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
 import genpy.dynamic
 import rosgraph
@@ -50,6 +50,10 @@ class HealthTopics:
         self._unknown: Dict[str, Callable[[Any], None]] = {}  # topics without a type so far
         self._subscribers: List[rospy.Subscriber] = []
         self._looking = False
+        # sources that somebody warns of already, or has warned of: a script may build a machine
+        # for each trial
+        self.watched: Set[str] = set()
+        self.warned: Set[str] = set()
 
     def message(self, topic: str) -> Latest:
         """The latest message of a topic, listened to from now on; see `decoded`."""

@@ -13,6 +13,7 @@ class FakeTopics:
 
     def __init__(self):
         self.heard = {}
+        self.watched, self.warned = set(), set()
 
     def message(self, topic):
         return self.heard.setdefault(topic, Latest())
@@ -46,6 +47,15 @@ def test_what_was_never_heard_of_is_well_and_warned_of_once(warnings):
     assert warnings == [
         'healthy: nothing was heard of topic /motors_on so far; it counts as well',
         'healthy: nothing was heard of diagnostics Power so far; it counts as well']
+
+
+def test_a_machine_for_each_trial_warns_of_it_once_and_starts_one_timer(warnings, monkeypatch):
+    started = []
+    monkeypatch.setattr(health_port.threading.Timer, 'start', lambda timer: started.append(timer))
+    topics = FakeTopics()
+    for _ in range(3):
+        port_of(topics, {'topic': '/motors_on'}).why_unwell()
+    assert len(warnings) == len(started) == 1
 
 
 def test_with_a_largest_age_it_is_not_well(warnings):
