@@ -143,12 +143,14 @@ def write_json(target: IO[str], variants: Sequence[VariantCounts], trials: Seque
 def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
     """Write one line a trial, for a spreadsheet or for statistics of one's own."""
     plain = [name for name in TrialSummary._fields
-             if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth')]
+             if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth', 'unwell_s')]
     writer = csv.writer(target, lineterminator='\n')
-    writer.writerow(plain + ['seed', 'causes', 'true_success', 'why', 'sim_s', 'wall_s'])
+    writer.writerow(plain + ['seed', 'causes', 'true_success', 'why', 'sim_s', 'wall_s',
+                             'unwell_s'])
     for trial in trials:
         data = _trial_data(trial)
         cause, truth = trial.cause, trial.truth
         world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
         world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
-        writer.writerow(['' if data[name] is None else data[name] for name in plain] + world)
+        writer.writerow(['' if data[name] is None else data[name] for name in plain] + world
+                        + [trial.unwell_s])

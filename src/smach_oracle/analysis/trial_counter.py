@@ -32,6 +32,8 @@ class TrialCounter:
         self.experiment = ''  # path of the top machine
         self.start_time = 0.0  # s since the epoch, the machine's own clock
         self.recoveries = 0  # of the oracle, without the expert
+        self.unwell_s = 0.0  # in which it waited until the robot was well
+        self._unwell_since_s: Optional[float] = None
         self._failing = failing
         self._start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
@@ -121,6 +123,8 @@ class TrialCounter:
             self._state_seen = True
         elif event.kind == EventKind.FAILURE:
             self._failures['{}/{}'.format(event.path, event.state)] += 1
+        elif event.kind in (EventKind.HEALTH_WAIT_START, EventKind.HEALTH_WAIT_END):
+            self._count_wait(event)
         elif event.kind == EventKind.QUERY_OPENED:
             self._asked.add(event.query_id)
         elif event.kind == EventKind.QUERY_ANSWERED:
@@ -135,6 +139,13 @@ class TrialCounter:
         self._last_seq = max(self._last_seq, event.seq)
         self._earliest_s = min(self._earliest_s, event.wall_time)
         self._latest_s = max(self._latest_s, event.wall_time)
+
+    def _count_wait(self, event: Event) -> None:
+        if event.kind == EventKind.HEALTH_WAIT_START:
+            self._unwell_since_s = event.wall_time
+        elif self._unwell_since_s is not None:
+            self.unwell_s += max(0.0, event.wall_time - self._unwell_since_s)
+            self._unwell_since_s = None
 
     def _count_recovery(self, event: Event) -> None:
         """Count a decision to revisit or to step back, once it is carried out.

@@ -32,6 +32,7 @@ class TrialSummary(NamedTuple):
     settings: Tuple[Tuple[str, Any], ...] = ()
     cause: Optional[RecordedCause] = None  # what a simulated world was given to fail with
     truth: Optional[Truth] = None  # how it ended, by the judge of a simulated world
+    unwell_s: float = 0.0  # in which it waited until the robot was well
 
     @property
     def replicate(self) -> str:
@@ -108,4 +109,4 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
         outcome=counter.outcome, failures=counter.failures, recoveries=counter.recoveries,
         questions=counter.questions, answered=counter.answered,
         failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
-        settings=counter.settings)
+        settings=counter.settings, unwell_s=counter.unwell_s)

@@ -27,7 +27,7 @@ from smach_oracle.oracle.decision.policy import (
 )
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import Decider, decided_by
+from smach_oracle.oracle.records.facts import Decider, decided_by, is_counted
 from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
@@ -133,7 +133,7 @@ class Replay:
         # the end of the visit whose failure is known, or of none: the state was held back
         if state.context is not None or not event.outcome:
             return
-        if not is_preempted(event.outcome):
+        if not is_preempted(event.outcome) and is_counted(event):
             state.estimator.add(False)
             self._visited(event, VisitResult.SUCCESS)
 

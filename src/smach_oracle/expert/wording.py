@@ -46,6 +46,10 @@ def next_step_words(event: Union[OracleEvent, Event]) -> str:
         OracleEvent.STATE_START: '{} runs.'.format(state),
         OracleEvent.WARNING: 'The robot warns: {}'.format(clean(event.text)),
         OracleEvent.TRIAL_END: 'The trial ended{}.'.format(_with(outcome)),
+        OracleEvent.HEALTH_WAIT_START: 'The machine waits until the robot is well ({}).'.format(
+            clean(event.text)),
+        OracleEvent.HEALTH_WAIT_END: '{}.'.format(
+            clean(event.text[:1].upper() + event.text[1:])),
     }.get(event.kind, '')
 
 

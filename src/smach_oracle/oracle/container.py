@@ -22,6 +22,7 @@ from .machine.userdata_view import StateView, constants_of, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
+from .settings.health import HealthFunction
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
 
 EDGE_TO_ORACLE = 'failure'
@@ -51,24 +52,25 @@ class OracleContainer(smach.StateMachine):
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
                  preconditions: PreconditionLists = None, name: str = '',
                  expert: Optional[Expert] = None, recover: bool = True,
-                 strict: bool = True) -> None:
+                 strict: bool = True, health: Optional[HealthFunction] = None) -> None:
         """Make an empty machine under an oracle.
 
         `settings`: a Settings or a dictionary of them; `preconditions`: lists by LABEL or
-        PATH/LABEL.
+        PATH/LABEL; `health`: says whether the robot is well, by True or '', or what is wrong.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
         checked = as_settings(settings, preconditions)
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
-        self._oracle = TreeNode(self, Tree(OracleContainer, recover, expert), checked, name)
+        tree = Tree(OracleContainer, recover, expert, health)
+        self._oracle = TreeNode(self, tree, checked, name)
         self._oracle.strict = strict
 
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
              settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: bool = True,
-             recover: bool = True) -> 'OracleContainer':
+             expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
+             health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put `machine` under an oracle and return it.
 
         It stays the same object; its class is made of this one and its own.
@@ -80,7 +82,7 @@ class OracleContainer(smach.StateMachine):
         :raises SettingsError: naming key, value and what is allowed.
         """
         checked = as_settings(settings, preconditions)
-        tree = Tree(OracleContainer, recover, expert)
+        tree = Tree(OracleContainer, recover, expert, health)
         wrapped = wrap_machine(cls, machine, tree, checked,
                                                 checked.nested if nested is None else nested, name,
                                                 strict)

@@ -5,6 +5,7 @@ The expert, the publishers, the introspection, the recorder and the watch over t
 Started at the first execute of a machine that needs it, so that importing this package, building
 machines and wrapping them cost nothing and need no ROS master.
 """
+import functools
 import os
 import threading
 import time
@@ -31,6 +32,8 @@ from smach_oracle.oracle.settings.paths import path_of
 from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
+from .health.health_port import listen_to_health
+from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
 from .introspection.introspection_server import IntrospectionServer
 from .main_thread import keep_log_from_master
@@ -73,6 +76,8 @@ class Attachments:
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
+        # bound once: a machine listens anew where it is given another one
+        self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
         self._node_started = False
@@ -139,6 +144,7 @@ class Attachments:
         oracle = oracle_of(machine)
         if oracle.recovers and oracle.expert is None:
             oracle.expert = self._shared_expert()
+        oracle.listen_to_health(self._listen_to_health)
         if self._events is not None:
             oracle.events.observers.append(self._events)
         if self._rates is not None:

@@ -18,6 +18,7 @@ from smach_oracle.oracle.asking.question import Expert
 from smach_oracle.oracle.container import OracleContainer as BareContainer
 from smach_oracle.oracle.container import SettingsLike
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.settings import Settings
 
 from .attachment import attachments
@@ -51,21 +52,21 @@ class OracleContainer(BareContainer):
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
                  preconditions: PreconditionLists = None, name: str = '',
                  expert: Optional[Expert] = None, recover: bool = True,
-                 strict: bool = True) -> None:
+                 strict: bool = True, health: Optional[HealthFunction] = None) -> None:
         """See `smach_oracle.oracle.OracleContainer`.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
         super().__init__(outcomes, input_keys, output_keys,
                          settings=checked(settings, preconditions), name=name, expert=expert,
-                         recover=recover, strict=strict)
+                         recover=recover, strict=strict, health=health)
         _remember(self, settings, preconditions, None)
 
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
              settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: bool = True,
-             recover: bool = True) -> 'OracleContainer':
+             expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
+             health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put a machine under an oracle and return it: the same object.
 
         See `smach_oracle.oracle.OracleContainer.wrap`.
@@ -74,7 +75,7 @@ class OracleContainer(BareContainer):
         """
         wrapped: OracleContainer = super().wrap(  # type: ignore[assignment]
             machine, settings=checked(settings, preconditions), nested=nested, name=name,
-            expert=expert, strict=strict, recover=recover)
+            expert=expert, strict=strict, recover=recover, health=health)
         _remember(wrapped, settings, preconditions, nested)
         return wrapped
 

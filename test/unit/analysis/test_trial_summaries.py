@@ -116,6 +116,13 @@ def test_failures_are_counted_by_state_and_container():
     assert trial.failures_by_state == (('TOP/PICK', 2), ('TOP/SUB/PICK', 1))
 
 
+def test_a_wait_for_health_is_time_and_no_failure():
+    begin, end = (EventKind.HEALTH_WAIT_START, {}), (EventKind.HEALTH_WAIT_END, {})
+    trial = summarise(story(START, ENTERED, begin, ENTERED, end, ENTERED, begin, end, END))
+    assert (trial.failures, trial.recoveries, trial.unwell_s) == (0, 0, 3.0)
+    assert trial.ending is TrialEnding.SUCCESS
+
+
 def test_gaps_in_the_numbering_are_lost_events():
     events = story(START, FAILURE, REVISIT, JUMP, END)
     del events[1:3]

@@ -41,7 +41,7 @@ class Hand(Expert):
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='hand')
 
 
-def run(count, seed=1, states=None, back_to='', **settings):
+def run(count, seed=1, states=None, back_to='', health=None, **settings):
     """The events of some trials of one learning machine, by trial."""
     generator = random.Random(seed)
     inner = smach.StateMachine(outcomes=['succeeded', 'aborted'])
@@ -54,7 +54,7 @@ def run(count, seed=1, states=None, back_to='', **settings):
         smach.StateMachine.add('INNER', inner, {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Chance(generator, 0.3))
     OracleContainer.wrap(machine, name='TOP', expert=Hand(generator, back_to),
-                         preconditions={'PICK': ['LOOK']},
+                         preconditions={'PICK': ['LOOK']}, health=health,
                          settings=dict(KEPT, states=states or {}, **settings))
     events = []
     machine.events.observers.append(events.append)
@@ -86,6 +86,26 @@ def test_so_it_is_where_states_are_not_repeated_and_a_budget_is_spent(settings):
     tried = what_if.compare(trials, {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
+
+
+@pytest.mark.parametrize('author_recovers', [False, True])
+def test_what_was_not_counted_changes_no_replayed_decision(author_recovers, monkeypatch):
+    generator = random.Random(7)
+    if author_recovers:
+        add = smach.StateMachine.add
+
+        def add_with_recovery(label, state, transitions=None, **more):
+            if label == 'PICK':
+                transitions = dict(transitions, aborted='LOOK')
+            return add(label, state, transitions, **more)
+        monkeypatch.setattr(smach.StateMachine, 'add', staticmethod(add_with_recovery))
+    trials = run(40, health=lambda: generator.random() < 0.6, health_settle_s=0)
+    events = [event for trial in trials for event in trial]
+    assert any(event.kind == EventKind.HEALTH_WAIT_START for event in events)
+    assert author_recovers == any(
+        event.kind == EventKind.TRANSITION and event.data for event in events)
+    tried = what_if.compare(trials, {})
+    assert tried.counts['same'] == sum(tried.counts.values()) > 5
 
 
 def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():

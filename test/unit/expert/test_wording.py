@@ -15,11 +15,13 @@ def test_what_happens_after_an_answer_is_said_in_words():
             OracleEvent(kind=kind, path='P', state='PICK', target='DETECT', outcome='done',
                         text='low battery'))
         for kind in (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
-                     OracleEvent.WARNING)
+                     OracleEvent.WARNING, OracleEvent.HEALTH_WAIT_START,
+                     OracleEvent.HEALTH_WAIT_END)
     }
     assert list(said.values()) == [
         'The machine goes to DETECT.', 'PICK counts as having ended with done.',
-        'P gives up with done.', 'The robot warns: low battery'
+        'P gives up with done.', 'The robot warns: low battery',
+        'The machine waits until the robot is well (low battery).', 'Low battery.'
     ]
 
 

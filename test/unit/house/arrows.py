@@ -10,8 +10,8 @@ MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
-            'oracle.errors', 'oracle.records', 'oracle.settings', 'oracle.OracleContainer',
-            'oracle.oracle_of'},
+            'oracle.errors', 'oracle.number_checks', 'oracle.records', 'oracle.settings',
+            'oracle.OracleContainer', 'oracle.oracle_of'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -41,7 +41,7 @@ LAYERS: Dict[str, List[Layer]] = {
         'settings', 'decision', 'number_checks', 'background', 'errors'
     ],
     'ros': [
-        'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers'},
+        'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health'},
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread'},

@@ -53,6 +53,22 @@ class FakeExpert(Expert):
         return self._interface(offer, question, cancelled, progress) if self._interface else None
 
 
+class FakeHealth:
+    """A fake of what knows whether the robot is well; says what a test tells it to."""
+
+    def __init__(self, *said):
+        self.said = list(said)  # then for good what `now` is
+        self.now = ''
+        self.asked = 0
+
+    def __call__(self):
+        self.asked += 1
+        said = self.said.pop(0) if self.said else self.now
+        if isinstance(said, Exception):
+            raise said
+        return said
+
+
 def contents(userdata: Any) -> Dict[str, Any]:
     """What is in a machine's userdata."""
     return {key: userdata[key] for key in userdata.keys()}

@@ -149,5 +149,6 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'failing_outcomes', 'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys',
         'time_limit_s', 'grace_period_s', 'on_retry', 'budget', 'deadline_s', 'on_no_answer',
         'escalate', 'watch_preconditions', 'history_length', 'rates_file', 'oracle_label',
-        'nested', 'interfaces', 'states'
+        'nested', 'interfaces', 'states',
+        'healthy', 'health_settle_s'
     }

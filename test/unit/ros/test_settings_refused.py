@@ -61,6 +61,34 @@ def test_a_wrong_python_name_is_told_before_the_script_runs(run, name, why):
     assert name in errors and why in errors and 'Traceback' not in errors
 
 
+@pytest.mark.parametrize('name, why', [
+    ('python:no_such_module:well', "No module named 'no_such_module'"),
+    ('python:checks:wlel', "checks has no 'wlel'"),
+    ('checks', "'checks' is not allowed; allowed: 'python:module:attribute'"),
+])
+def test_a_wrong_function_of_health_is_told_before_the_script_runs(run, name, why):
+    code, out, errors = run('policy: prose\nhealthy:\n- {{function: "{}"}}\n'.format(name))
+    assert (code, out) == (2, '')
+    assert errors.startswith('oracle_run: oracle.yaml line 2: healthy[0].function: ')
+    assert why in errors and 'Traceback' not in errors
+
+
+def test_a_right_function_of_health_is_asked_at_a_failure(run):
+    code, out, errors = run('healthy: {function: "python:__main__:well"}\n', '''
+        said = [False]
+        def well():
+            print('ASKED', flush=True)
+            return not said or said.pop()
+        sm = machine('HOME', 'PICK')
+        outcomes = ['aborted']
+        sm['PICK'].execute = lambda userdata: outcomes.pop() if outcomes else 'succeeded'
+        print(sm.execute())
+    ''')
+    assert code == 0 and out.splitlines()[-1] == 'succeeded', errors
+    assert out.count('ASKED') > 2
+    assert 'TASK/PICK failed while the robot is not well (well)' in out + errors
+
+
 @pytest.mark.parametrize('name', ['python:checks:clear', 'python:__main__:ready',
                                   'python:os.path:exists', 'python:math:isnan'])
 def test_a_right_python_name_is_taken(run, name):

@@ -35,38 +35,51 @@ class OracleVisit:
         Where the oracle gives up, it raises what the machine would raise without one.
         """
         meta = self._enter()
-        verdict = self._recover(meta, Recovery(self._node, self._record, self._failure, context,
-                                               continuous))
+        verdict = self._recover(meta, self._recovery(context, continuous))
         if verdict.kind is VerdictKind.SUPERSEDE:
-            self._count_superseded(verdict.outcome)
+            self._note_superseded(verdict.outcome)
         return self._leave(meta, verdict)
 
-    def _count_superseded(self, outcome: str) -> None:
+    def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
+        return Recovery(self._node, self._record, self._failure, context, continuous)
+
+    def _enter(self) -> OracleState:
+        node, machine = self._node, self._machine
+        meta_label = node.settings.oracle_label
+        machine._sync_oracle()
+        self._note_failure()
+        # _sync_oracle refuses any other state of this name
+        meta = cast(OracleState, machine._states[meta_label])
+        go_to(node, message_of(self._record.label, self._what_failed(), meta_label), meta_label)
+        return meta
+
+    def _what_failed(self) -> str:
+        if self._failure.is_held_back:
+            return 'held_back'
+        return self._failure.outcome or self._failure.kind.name.lower()
+
+    def _note_failure(self) -> None:
+        node, label, failure = self._node, self._record.label, self._failure
+        meta_label = node.settings.oracle_label
+        told = (' ' + failure.text if failure.is_held_back
+                else ' failed: ' + (failure.details or in_words(failure)))
+        smach.logwarn('{}/{}{}'.format(node.path, label, told))
+        self._record.left_by(self._what_failed(), meta_label)
+        save_rates(node)
+        node.emit(EventKind.TRANSITION, state=label, outcome=failure.outcome, target=meta_label)
+
+    def _note_superseded(self, outcome: str) -> None:
         node, record = self._node, self._record
         if self._failure.is_held_back:
-            node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED)
-            note_superseded(node, record.label)
+            self._count_superseded(outcome)
             return
         record.take_back_failure()
         node.records.history.supersede(outcome)
 
-    def _enter(self) -> OracleState:
-        node, machine, failure = self._node, self._machine, self._failure
-        label, meta_label = self._record.label, node.settings.oracle_label
-        if failure.is_held_back:
-            what, told = 'held_back', ' ' + failure.text
-        else:
-            what = failure.outcome or failure.kind.name.lower()
-            told = ' failed: ' + (failure.details or in_words(failure))
-        smach.logwarn('{}/{}{}'.format(node.path, label, told))
-        self._record.left_by(what, meta_label)
-        save_rates(node)
-        machine._sync_oracle()
-        node.emit(EventKind.TRANSITION, state=label, outcome=failure.outcome, target=meta_label)
-        # _sync_oracle refuses any other state of this name
-        meta = cast(OracleState, machine._states[meta_label])
-        go_to(node, message_of(label, what, meta_label), meta_label)
-        return meta
+    def _count_superseded(self, outcome: str) -> None:
+        """Count a visit that was none before: an expert did the work of the state."""
+        self._node.records.visit_ended(self._record, outcome, VisitResult.SUPERSEDED)
+        note_superseded(self._node, self._record.label)
 
     def _recover(self, meta: OracleState, recovery: Recovery) -> Verdict:
         meta.begin(recovery)
@@ -146,10 +159,14 @@ class OracleVisit:
         node = self._node
         if missing is None:
             missing = missing_keys(self._machine, target, self._machine.userdata._data)
-        node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
-                  data={'missing_keys': list(missing), 'userdata': userdata})
-        node.records.count_oracle_edge(target)
+        self._note_jump(target, userdata, missing, by, text)
         go_to(node, message_of(node.settings.oracle_label, target, target), target)
+
+    def _note_jump(self, target: str, userdata: str, missing: Sequence[str], by: str,
+                   text: str) -> None:
+        self._node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
+                        data={'missing_keys': list(missing), 'userdata': userdata})
+        self._node.records.count_oracle_edge(target)
 
     def _terminate(self, outcome: str) -> str:
         """Leave the meta state for a container outcome."""

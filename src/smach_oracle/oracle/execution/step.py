@@ -9,6 +9,7 @@ from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind, FailureKind
+from ..records.facts import UNCOUNTED
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery.failure import (
@@ -21,6 +22,7 @@ from ..recovery.failure import (
 )
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..settings.failing_outcomes import PREEMPTED
+from .held_failure import HeldVisit, why_held
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 
@@ -148,6 +150,10 @@ class Step:
         if stopping:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._preempted_ending(judged), judged)
+        if node.tree.recover and node.tree.health.is_set:
+            why = why_held(node)
+            if why is not None:
+                return self._held(judged, why)
         return self._failed(judged)
 
     def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
@@ -158,6 +164,18 @@ class Step:
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
         return OracleVisit(node, record, failure).run(context, False)
+
+    def _held(self, failure: Failure, why: str) -> Optional[str]:
+        """Go on after a failure while the robot was not well; `why`: see `why_held`."""
+        node, record = self._node, self._record
+        if node.is_left_behind():
+            stop_left_behind(node)
+            return None
+        if self._author_recovers(failure):
+            node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
+            return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
+        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        return HeldVisit(node, record, failure, why).run(context, False)
 
     def _failed(self, failure: Failure) -> Optional[str]:
         node, record = self._node, self._record
@@ -194,20 +212,26 @@ class Step:
             return ContainerEnding(outcome=PREEMPTED)
         return self._natural_ending(failure)
 
-    def _end_unrecovered(self, ending: ContainerEnding, failure: Failure) -> Optional[str]:
+    def _end_unrecovered(self, ending: ContainerEnding, failure: Failure,
+                         counted: bool = True) -> Optional[str]:
         if ending.error is not None:
             if isinstance(ending.error, smach.InvalidUserCodeError):
                 smach.logerr("State '{}' ended in an error.".format(self._record.label))
             raise ending.error
         route = (Route(ending.state, True) if ending.state is not None
                  else Route(str(ending.outcome), False))
-        return self._advance(failure.outcome, route)
+        return self._advance(failure.outcome, route, counted=counted)
 
-    def _advance(self, outcome: str, route: Route, learn: bool = False) -> Optional[str]:
-        """Make the transition that the author drew; `learn`: take the short way next time."""
+    def _advance(self, outcome: str, route: Route, learn: bool = False,
+                 counted: bool = True) -> Optional[str]:
+        """Make the transition that the author drew; `learn`: take the short way next time.
+
+        `counted`: whether it says how good the state is.
+        """
         node, label = self._node, self._record.label
         self._record.left_by(outcome, route.target)
-        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target)
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target,
+                  **({} if counted else UNCOUNTED))
         if not route.is_state:
             return terminate(node, label, outcome, route.target)
         message = message_of(label, outcome, route.target)

@@ -27,6 +27,8 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
     adopt(machine)
     for each in nodes_of(machine):
         bring_up_to_date(each)
+    if node.tree.recover:
+        node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
     node.tree.begin_trial(machine.new_trial_id())
     for each in nodes_of(machine):
         # one that still runs was abandoned in an earlier trial, and is left there

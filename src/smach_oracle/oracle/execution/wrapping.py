@@ -87,6 +87,8 @@ def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested:
         top.name = name or top.name
         if tree.expert is not None:
             top.tree.expert = tree.expert
+        if tree.health.given is not None:
+            top.tree.health.given = tree.health.given
         _configure(machine, settings)
         _put_in_order(machine, settings, nested, strict)
     except SettingsError:

@@ -7,7 +7,9 @@ from ..asking.question import Expert
 from ..errors import TrialError
 from ..records.events import EventSource
 from ..records.rate_rows import StateRateRow, TransitionRow
+from ..settings.health import HealthFunction
 from ..settings.settings import Settings
+from .health_watch import ListenToHealth
 from .nesting import nodes_of
 from .tree_node import TreeNode, WrappedMachine
 
@@ -77,6 +79,19 @@ class Oracle:
     @expert.setter
     def expert(self, expert: Optional[Expert]) -> None:
         self._node.tree.expert = expert
+
+    @property
+    def health(self) -> Optional[HealthFunction]:
+        """Says whether the robot is well, beside the setting `healthy`; from the next trial on."""
+        return self._node.tree.health.given
+
+    @health.setter
+    def health(self, health: Optional[HealthFunction]) -> None:
+        self._node.tree.health.given = health
+
+    def listen_to_health(self, listen: ListenToHealth) -> None:
+        """Have a port made for the topics and diagnostics of the setting `healthy`."""
+        self._node.tree.health.listen = listen
 
     @property
     def describe_failure(self) -> Callable[[smach.State], str]:

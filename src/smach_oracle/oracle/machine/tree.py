@@ -11,6 +11,8 @@ import smach
 
 from ..asking.question import Expert
 from ..records.events import EventSource
+from ..settings.health import HealthFunction
+from .health_watch import HealthWatch
 from .trial_budget import TrialBudget
 from .workers import Workers
 
@@ -34,7 +36,8 @@ class Tree:
     """Shared by the top machine and all wrapped containers below it."""
 
     def __init__(self, container_class: type, recover: bool = True,
-                 expert: Optional[Expert] = None) -> None:
+                 expert: Optional[Expert] = None,
+                 health: Optional[HealthFunction] = None) -> None:
         # that of wrapped machines, and what nested ones become
         self.container_class = container_class
         self.recover = recover
@@ -45,6 +48,7 @@ class Tree:
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
         self._visits = itertools.count(1)
+        self.health = HealthWatch(health)
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last

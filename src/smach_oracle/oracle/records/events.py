@@ -41,6 +41,8 @@ class EventKind(IntEnum):
     GIVE_UP = 21
     PREEMPT = 22
     WARNING = 23
+    HEALTH_WAIT_START = 24
+    HEALTH_WAIT_END = 25
 
 
 class FailureKind(IntEnum):

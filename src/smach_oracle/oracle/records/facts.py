@@ -1,4 +1,4 @@
-"""Facts about a trial that events carry in their `data`: who decided, and why the trial ended.
+"""Facts about a trial that events carry in their `data`: who decided, why the trial ended.
 
 Bags that were recorded before events carried them tell the same by the words of a text; those words
 are known here and nowhere else. Pure; no smach.
@@ -10,6 +10,11 @@ from .events import NO_OUTCOME, Event
 
 DECIDED_BY = 'decided_by'  # key in the data of DECISION
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
+# key in the data of TRANSITION: true where it says nothing of how good the state is
+NOT_COUNTED = 'not_counted'
+# fields of such a TRANSITION: the author's own, from a failure while the robot was not well
+UNCOUNTED: Mapping[str, Any] = {'text': 'not counted, as the robot is not well',
+                                'data': {NOT_COUNTED: True}}
 
 _OLD_SPENT = ' spent on it'
 _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
@@ -57,6 +62,11 @@ def ended_by(event: Event, entered_a_state: bool) -> TrialEnd:
     if event.text == NO_OUTCOME:
         return TrialEnd.SHUTDOWN if entered_a_state else TrialEnd.INCONSISTENT
     return TrialEnd.OUTCOME if event.outcome else TrialEnd.ERROR
+
+
+def is_counted(event: Event) -> bool:
+    """Whether a TRANSITION without a FAILURE before it is a success of its state."""
+    return not _stated(event, NOT_COUNTED)
 
 
 def _stated(event: Event, key: str) -> Optional[Any]:

@@ -192,6 +192,8 @@ class Recovery:
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
         self.emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
+        while why_not and self._has_waited_after('precondition {} was not met'.format(spec.name)):
+            why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
         self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
         if why_not:
@@ -201,6 +203,22 @@ class Recovery:
         self.tried.append('precondition {}: {}'.format(
             spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
         return not why_not
+
+    # -- health
+
+    def _has_waited_after(self, what: str) -> bool:
+        """Wait where the robot was not well at what has happened; whether it is well again."""
+        health = self._node.tree.health
+        if not health.is_set:
+            return False
+        why = health.unwell_after(self.stopped, self._cancelled.wait)
+        return bool(why) and self._wait_until_well(what, why)
+
+    def _wait_until_well(self, what: str, why: str) -> bool:
+        """Wait until the robot is well; False where something has ended the recovery."""
+        with standing_still(self._node.runs_around):
+            return self._node.tree.health.wait_until_well(
+                self._node, self._record.label, what, why, self.stopped, self._cancelled.wait)
 
     # -- asking
 
@@ -276,7 +294,11 @@ class Recovery:
         return self._give_up(answer.why, answer.outcome, answer.by)
 
     def _jump(self, target: str, by: str = '', text: str = '') -> Verdict:
-        """Go to a state."""
+        """Go to a state, once the robot is well."""
+        health = self._node.tree.health
+        why = health.why_unwell(self.stopped) if health.is_set else ''
+        if why and not self._wait_until_well('is to be left for ' + target, why):
+            return self._preempted()
         return Verdict(VerdictKind.JUMP, state=target, by=by, text=text,
                        written=frozenset(self._watch.written()))
 

@@ -14,6 +14,7 @@ from ..settings.interfaces import InterfaceOffer
 from . import checks as values
 from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
+from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
@@ -68,6 +69,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'rates_file': values.file,
     'oracle_label': values.label,
     'nested': values.flag,
+    'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
 }
 
 
@@ -96,18 +98,22 @@ class Settings:
     interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()
     states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     budget: Budget = Budget()  # of a whole trial
+    healthy: Tuple[HealthCondition, ...] = ()  # what must hold for the robot to be well
+    # how long it must hold after a failure and at the end of a wait
+    health_settle_s: float = 0.5
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],
                   resolver: Optional[Resolver] = None) -> 'Settings':
         """Check a dictionary of settings.
 
-        `resolver` turns 'python:module:attribute' of a precondition into that object.
+        `resolver` turns 'python:module:attribute' of a precondition or of a condition of health
+        into that object.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
         given = values.mapping('settings', given)
-        allowed = sorted(list(_STATE_CHECKS) + list(_MACHINE_CHECKS) + ['states', 'interfaces'])
+        allowed = sorted([*_STATE_CHECKS, *_MACHINE_CHECKS, 'states', 'interfaces', 'healthy'])
         _refuse_unknown('', given, allowed)
         defaults = _checked_defaults(given)
         machine = {
@@ -117,7 +123,7 @@ class Settings:
         states = {name: _checked_state(name, overrides, defaults, resolver)
                   for name, overrides in values.mapping('states', given.get('states')).items()}
         return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')),
-                   states=states, **machine)
+                   states=states, healthy=checked_health(given.get('healthy'), resolver), **machine)
 
     def for_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state.

@@ -13,7 +13,7 @@ import roslib.message
 from . import bag_format
 from .bag_format import BagFormatError, Fields
 from .bag_writer import MessageType
-from .event_packing import EVENT_TYPE, PACKED_MD5, event_number
+from .event_packing import EARLIER_MD5S, EVENT_TYPE, PACKED_MD5, event_number
 
 EVENTS = '/oracle/events'  # the end of the topic's name
 _OF_THE_SAME_NODE = ('/oracle/rates', '/record/status')
@@ -31,8 +31,8 @@ class BagConnection(NamedTuple):
 
     @property
     def has_events(self) -> bool:
-        """Whether its messages are OracleEvents of the definition that is packed here."""
-        return self.kind.md5sum == PACKED_MD5
+        """Whether its messages are OracleEvents with the fields that are packed here."""
+        return self.kind.md5sum == PACKED_MD5 or self.kind.md5sum in EARLIER_MD5S
 
 
 class Connections:
@@ -104,7 +104,7 @@ def is_readable(kind: MessageType, data: bytes, is_sure: bool) -> bool:
     :param is_sure: whether the length of `data` is known to be right.
     """
     message_class = _installed(kind.name)
-    if message_class is None or message_class._md5sum != kind.md5sum:
+    if message_class is None or kind.md5sum not in (message_class._md5sum, *EARLIER_MD5S):
         return is_sure
     message, again = message_class(), io.BytesIO()
     try:

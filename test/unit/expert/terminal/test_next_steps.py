@@ -69,6 +69,13 @@ def test_the_way_to_the_next_state_is_told_and_no_more(robot):
     assert kinds(steps) == [OracleEvent.JUMP, OracleEvent.STATE_START]
 
 
+def test_a_wait_for_health_before_the_next_state_is_told(robot):
+    steps = steps_after(robot, event(OracleEvent.HEALTH_WAIT_START),
+                        event(OracleEvent.HEALTH_WAIT_END), event(OracleEvent.STATE_START))
+    assert kinds(steps) == [OracleEvent.HEALTH_WAIT_START, OracleEvent.HEALTH_WAIT_END,
+                            OracleEvent.STATE_START]
+
+
 def test_other_trials_and_what_came_before_the_answer_are_not_told(robot):
     steps = steps_after(robot, event(OracleEvent.WARNING))
     steps.forget()

@@ -7,6 +7,7 @@ from typing import Any, Dict, Optional
 
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted
 
 from ...wording import event_words
 
@@ -15,10 +16,13 @@ _KINDS = {int(kind): kind for kind in EventKind}
 
 
 def event_of(message: OracleEvent) -> Event:
-    """The event as the executive emitted it; of its data only what a trial's start has."""
+    """The event as the executive emitted it; of its data only what the console needs."""
     kind: Any = _KINDS.get(message.kind, message.kind)
-    data = {'recovers': '"recovers": false' not in message.data
-            } if kind == EventKind.TRIAL_START else None
+    data = None
+    if kind == EventKind.TRIAL_START:
+        data = {'recovers': '"recovers": false' not in message.data}
+    elif kind == EventKind.TRANSITION and NOT_COUNTED in message.data:
+        data = {NOT_COUNTED: True}
     return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
                  message.state, message.outcome, message.target, message.failure_kind,
                  message.failure_class, message.rate, message.continuous, message.query_id,
@@ -31,8 +35,8 @@ def event_view(event: Event) -> Dict[str, Any]:
         'seq': event.seq, 'kind': getattr(event.kind, 'name', str(event.kind)).lower(),
         't': event.wall_time, 'path': event.path, 'state': event.state, 'outcome': event.outcome,
         'target': event.target, 'class': event.failure_class, 'rate': number(event.rate),
-        'continuous': event.continuous, 'query': event.query_id, 'by': event.by,
-        'text': event.text[:LONGEST_TEXT], 'words': event_words(event)
+        'continuous': event.continuous, 'counted': is_counted(event), 'query': event.query_id,
+        'by': event.by, 'text': event.text[:LONGEST_TEXT], 'words': event_words(event)
     }
 
 

@@ -21,6 +21,7 @@ from ..web.sections import PageSections
 MOST_CONTAINERS = 200
 _LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
                   OracleEvent.TRIAL_END)
+_ENDS_WAIT = (OracleEvent.HEALTH_WAIT_END, OracleEvent.TRIAL_START, OracleEvent.TRIAL_END)
 
 
 class FollowedRobot:
@@ -40,6 +41,7 @@ class FollowedRobot:
         self._rates: Dict[str, Dict[str, Dict[str, Any]]] = {}
         self._counts: Dict[str, List[List[Any]]] = {}
         self._trial = ''
+        self._unwell = ''  # why it waits until it is well
 
     def on_structure(self, message: SmachContainerStructure) -> None:
         """A container's graph; most repeat what is known."""
@@ -79,6 +81,7 @@ class FollowedRobot:
         """The path that is taken, and where it failed."""
         with self._lock:
             self._trial = message.trial_id
+            self._take_health(message)
             if message.kind == OracleEvent.TRIAL_START:
                 self._failed.clear()
                 self._latest.clear()
@@ -92,6 +95,12 @@ class FollowedRobot:
                 self._failed.pop(message.path, None)
             self.changed = True
 
+    def _take_health(self, message: OracleEvent) -> None:
+        if message.kind == OracleEvent.HEALTH_WAIT_START:
+            self._unwell = message.text or 'it does not say why'
+        elif message.kind in _ENDS_WAIT:
+            self._unwell = ''
+
     def write_sections(self, sections: PageSections, layouts: LayoutWorker) -> None:
         """Write this robot's sections where something has changed."""
         with self._lock:
@@ -101,10 +110,10 @@ class FollowedRobot:
             reshaped, self._reshaped = self._reshaped, False
             structures = self._all_structures()
             live = {
-                'trial': self._trial, 'alive': self.alive, 'active': dict(self._active),
-                'latest': dict(self._latest), 'failed': dict(self._failed),
-                'rates': dict(self._rates), 'counts': dict(self._counts),
-                'paths': sorted(structures)
+                'trial': self._trial, 'alive': self.alive, 'unwell': self._unwell,
+                'active': dict(self._active), 'latest': dict(self._latest),
+                'failed': dict(self._failed), 'rates': dict(self._rates),
+                'counts': dict(self._counts), 'paths': sorted(structures)
             }
         sections.put('live ' + self.name, live)
         if reshaped:

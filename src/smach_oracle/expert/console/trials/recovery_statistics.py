@@ -3,6 +3,7 @@ from collections import OrderedDict
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import is_counted
 
 _REMEMBERED = 2000  # trials under way
 _MOST_PAIRS = 20000  # pairs of states
@@ -38,7 +39,7 @@ class RecoveryStatistics:
             trying[event.state] = ''  # the jump that follows is where its outcome leads, and no try
         elif event.kind == EventKind.JUMP and trying.pop(event.state, None) is None:
             trying[event.state] = event.target
-        elif event.kind == EventKind.TRANSITION:
+        elif event.kind == EventKind.TRANSITION and is_counted(event):
             self._count(robot, event.path, event.state, trying.pop(event.state, None), True)
         elif event.kind == EventKind.CONTAINER_END:
             for state, target in trying.items():

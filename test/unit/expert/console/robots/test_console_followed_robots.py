@@ -43,6 +43,20 @@ def test_a_robot_s_topics_become_its_sections():
     assert sections.since(0)[1] == []
 
 
+def test_a_robot_that_waits_to_be_well_says_so_until_it_goes_on_or_its_trial_is_over():
+    robot, sections = FollowedRobot('/robot'), PageSections()
+
+    def unwell_after(kind, text=''):
+        robot.on_event(OracleEvent(kind=kind, path='TASK', state='A', text=text))
+        robot.write_sections(sections, NoLayouts())
+        return sections.get('live /robot')['unwell']
+    assert unwell_after(OracleEvent.STATE_START) == ''
+    for end in (OracleEvent.HEALTH_WAIT_END, OracleEvent.TRIAL_END, OracleEvent.TRIAL_START):
+        assert unwell_after(OracleEvent.HEALTH_WAIT_START, 'motors: off') == 'motors: off'
+        assert unwell_after(OracleEvent.STATE_START) == 'motors: off', 'another branch runs'
+        assert unwell_after(end) == ''
+
+
 class FakeSubscriber:
     made, unregistered = [], []
 

@@ -162,7 +162,11 @@ FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT'
          FAILED,
          event(EventKind.SUPERSEDE), JUMPED,
          event(EventKind.CONTAINER_END, '', outcome='succeeded')
-     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0))])
+     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0)),
+     # the author's own way from a failure while the robot was not well
+     ([FAILED, JUMPED, event(EventKind.TRANSITION, data={'not_counted': True})], (0, 0)),
+     ([FAILED, JUMPED, event(EventKind.HEALTH_WAIT_START), event(EventKind.HEALTH_WAIT_END),
+       event(EventKind.TRANSITION)], (1, 1))])
 def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, recovery_counts):
     assert scored(*events) == recovery_counts
 

@@ -141,6 +141,7 @@ export interface InterfaceOutput {
 export interface LiveMachines {
   trial: string;
   alive: boolean;
+  unwell: string; // why it waits until it is well; '' where it does not
   active: ByPath<string[]>;
   latest: ByPath<[from: string, to: string]>; // transitions; from '': the oracle
   failed: ByPath<{ state: string; rate: number | null }>;
@@ -190,7 +191,7 @@ export type EventKind = 'trial_start' | 'trial_end' | 'container_start' | 'conta
   | 'state_start' | 'transition' | 'failure' | 'precondition_start' | 'precondition_end'
   | 'decision' | 'jump' | 'query_opened' | 'query_claimed' | 'query_released' | 'query_answered'
   | 'query_expired' | 'query_cancelled' | 'interface_start' | 'interface_end' | 'supersede'
-  | 'give_up' | 'preempt' | 'warning'
+  | 'give_up' | 'preempt' | 'warning' | 'health_wait_start' | 'health_wait_end'
   | `${number}`; // of a later release
 
 export interface TrialEvent {
@@ -204,6 +205,7 @@ export interface TrialEvent {
   class: FailureClass;
   rate: number | null;
   continuous: boolean;
+  counted: boolean; // false: of a transition that says nothing of how good its state is
   query: string; // id of the question
   by: string; // the expert
   text: string;

@@ -80,8 +80,9 @@ class MachinePanel {
     arrange(this.root, robots.length ? [this.picker, this.body] : this.empty);
     this.showPicker(robots);
     setText(this.title, this.path || this.robot);
-    const gone = this.source.state(this.robot).alive === false;
-    setText(this.state, this.robot + (gone ? ' · gone' : ''));
+    const { alive, unwell } = this.source.state(this.robot);
+    setText(this.state, this.robot + (alive === false ? ' · gone' : '')
+      + (unwell ? ' · waits until it is well: ' + unwell : ''));
     if (this.robot) this.view.show(this.robot, this.path);
     this.toggle.hidden = !this.view.drawable;
   }

@@ -4,6 +4,7 @@ import { ByPath, ByState, Graph, LearnedRate, TransitionCount } from '../server'
 /** What the containers of a robot do at a moment. */
 export interface MachineState {
   alive?: boolean; // false: the robot is gone
+  unwell?: string; // why it waits until it is well
   active: ByPath<string[]>;
   latest: ByPath<[from: string, to: string]>;
   failed: ByPath<{ state: string }>;

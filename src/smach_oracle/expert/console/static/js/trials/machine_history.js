@@ -115,9 +115,10 @@ function take(now, event) {
  * @param {Snapshot} now
  * @param {TrialEvent} event
  */
-function takeTransition(now, { path, state, outcome, target }) {
+function takeTransition(now, { path, state, outcome, target, counted }) {
   count(now, path, state, outcome, target);
-  if (!now.asked[path]) rateOf(now, path, state).successes += 1; // else it is the way to the oracle
+  // of one who is asked about it is the way to the oracle
+  if (counted && !now.asked[path]) rateOf(now, path, state).successes += 1;
   now.latest[path] = [state, target];
   delete now.active[path];
 }

@@ -13,7 +13,7 @@ export const MARKS = { failure: 'bad', decision: 'oracle', jump: 'oracle', super
   give_up: 'bad', warning: 'warn', query_opened: 'expert', query_claimed: 'expert',
   query_answered: 'expert', query_expired: 'bad', interface_start: 'expert',
   interface_end: 'expert', precondition_start: 'oracle', precondition_end: 'oracle',
-  preempt: 'warn' };
+  preempt: 'warn', health_wait_start: 'warn', health_wait_end: 'warn' };
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800,
   3600];
 const MOST_TICKS = 8;
@@ -53,8 +53,12 @@ export function stateBars(events, end) {
   const running = new Map(); // by lane, since when
   for (const { kind, path, state, t, words } of events) {
     const lane = path + '/' + state;
-    if (kind === 'state_start') running.set(lane, t);
     const from = running.get(lane);
+    if (kind === 'state_start') {
+      // it failed while the robot was not well, and runs again
+      if (from !== undefined) bars.push({ lane, from, to: t, kind: 'running', words });
+      running.set(lane, t);
+    }
     if (from === undefined || (kind !== 'failure' && kind !== 'transition')) continue;
     running.delete(lane);
     bars.push({ lane, from, to: t, kind: kind === 'failure' ? 'bad' : 'good', words });

@@ -1,0 +1,55 @@
+"""Who says whether the robot is well: ports, and functions of the user's own."""
+import time
+from typing import Callable, Optional, Protocol
+
+from ..background import BackgroundCall
+from ..settings.health import HealthFunction
+
+_LOOK_S = 0.05  # how soon a preempt or a shutdown is noticed while a function runs
+# a function that takes longer counts as one that says no
+FUNCTION_LIMIT_S = 2.0
+
+
+class HealthPort(Protocol):
+    """Knows one thing, or several, that must hold. Called from any thread; does not wait."""
+
+    def why_unwell(self) -> str:
+        """Return what is wrong, '' where all is well."""
+
+
+class HealthFunctionPort:
+    """A function of the user's own, called in a thread that nobody has to wait for.
+
+    Several may ask at once: one call answers them all.
+    """
+
+    def __init__(self, name: str, function: HealthFunction) -> None:
+        self._name = name
+        self._function = function
+        self._call: Optional[BackgroundCall] = None
+        self._since_s = 0.0
+
+    def why_unwell(self, stopped: Callable[[], bool] = lambda: False) -> str:
+        """Return what is wrong, '' where all is well; also where `stopped()` ends the asking."""
+        call = self._call
+        if call is None:
+            self._since_s = time.monotonic()
+            call = self._call = BackgroundCall(self._function, 'smach_oracle health')
+            call.start()
+        while not call.done.wait(_LOOK_S):
+            if time.monotonic() > self._since_s + FUNCTION_LIMIT_S:
+                return '{} does not return'.format(self._name)
+            if stopped():
+                return ''
+        self._call = None
+        return self._in_words(call)
+
+    def _in_words(self, call: BackgroundCall) -> str:
+        if call.error is not None:
+            return '{}: {}: {}'.format(self._name, type(call.error).__name__, call.error)
+        result = call.result
+        if isinstance(result, str):
+            return '{}: {}'.format(self._name, result) if result else ''
+        if isinstance(result, bool) or type(result).__name__ == 'bool_':  # numpy's, too
+            return '' if result else self._name
+        return '{} returned {!r}; True and \'\' are well'.format(self._name, result)

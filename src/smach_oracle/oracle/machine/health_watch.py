@@ -1,0 +1,199 @@
+"""Whether the robot is well, asked for a whole tree of machines; the one notice that it is not."""
+import threading
+import time
+from typing import Any, Callable, Dict, List, Optional, Protocol, Sequence, Set, Tuple
+
+import smach
+
+from ..records.events import EventKind
+from ..settings.health import (
+    HealthCondition,
+    HealthFunction,
+    HealthKind,
+    sources_of,
+)
+from .health_ports import HealthFunctionPort, HealthPort
+
+LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
+
+# makes a port for topics and diagnostics
+ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
+Pause = Callable[[float], object]
+Stopped = Callable[[], bool]
+
+
+class Teller(Protocol):
+    """A container that tells the observers of what goes on in it (`TreeNode`)."""
+
+    @property
+    def path(self) -> str:
+        """Its path."""
+
+    def emit(self, kind: EventKind, **fields: Any) -> None:
+        """Tell the observers."""
+
+
+class _UnwellPhase:
+    """From the first container that waits to the last; `tell` is the first's."""
+
+    def __init__(self, teller: Teller, state: str, why: str) -> None:
+        self.teller = teller
+        self.state = state
+        self.why = why
+        self.since_s = time.monotonic()
+        self.waiting = 0
+        self.held: Set[str] = set()  # paths of the states that wait, or have waited
+        self.well_since_s: Optional[float] = None
+        self.over = False
+
+
+class HealthWatch:
+    """The health of one tree. Safe to use from several threads.
+
+    `given`: the function that was given to the machine. `listen`: makes a port for topics and
+    diagnostics; None where this process listens to none.
+    """
+
+    def __init__(self, given: Optional[HealthFunction] = None) -> None:
+        self.given = given
+        self.listen: Optional[ListenToHealth] = None
+        self._lock = threading.RLock()
+        self._asking = threading.Lock()
+        self._conditions: Tuple[HealthCondition, ...] = ()
+        self._settle_s = 0.0
+        self._functions: List[HealthFunctionPort] = []
+        self._listening: Optional[HealthPort] = None
+        self._made_of: object = None
+        self._phase: Optional[_UnwellPhase] = None
+
+    @property
+    def is_set(self) -> bool:
+        """Whether anything says how the robot is."""
+        return bool(self._functions) or self._listening is not None
+
+    def use(self, conditions: Tuple[HealthCondition, ...], settle_s: float) -> None:
+        """Ask these from now on. Called before each trial; costs nothing where nothing is new."""
+        self._settle_s = settle_s
+        made_of = (conditions, self.given, self.listen)
+        if made_of == self._made_of:
+            return
+        self._made_of = made_of
+        functions = [HealthFunctionPort(each.name, each.function) for each in conditions
+                     if each.function is not None]
+        if self.given is not None:
+            functions.append(HealthFunctionPort(
+                str(getattr(self.given, '__name__', type(self.given).__name__)), self.given))
+        self._functions = functions
+        self._listening = self._listen_to(conditions)
+
+    def _listen_to(self, conditions: Tuple[HealthCondition, ...]) -> Optional[HealthPort]:
+        heard = [each for each in conditions if each.kind is not HealthKind.FUNCTION]
+        if heard and self.listen is None:
+            smach.logwarn('healthy: nobody listens to {} here, as this process is no ROS node; '
+                          'it counts as well'.format(', '.join(sources_of(conditions))))
+        return self.listen(heard) if heard and self.listen is not None else None
+
+    def why_unwell(self, stopped: Stopped) -> str:
+        """Ask once; return all that is wrong, '' where all is well or `stopped()`."""
+        # one thread asks at a time, and the others have their look a little later
+        while not self._asking.acquire(timeout=0.05):
+            if stopped():
+                return ''
+        try:
+            wrong = [self._listening.why_unwell()] if self._listening is not None else []
+            wrong += [port.why_unwell(stopped) for port in self._functions]
+        finally:
+            self._asking.release()
+        return '; '.join(why for why in wrong if why)
+
+    def unwell_after(self, stopped: Stopped, pause: Pause) -> str:
+        """Return why the robot was not well at what has just happened, '' where it was.
+
+        What stops a robot may be heard of after what it has stopped: it is looked again until the
+        settle time is over. `stopped()` ends that.
+        """
+        until_s = time.monotonic() + self._settle_s
+        while True:
+            phase = self._phase
+            why = phase.why if phase is not None else self.why_unwell(stopped)
+            left_s = until_s - time.monotonic()
+            if why or stopped() or left_s <= 0:
+                return why
+            pause(min(LOOK_PERIOD_S, left_s))
+
+    def wait_until_well(self, teller: Teller, state: str, what: str, why: str, stopped: Stopped,
+                        pause: Pause) -> bool:
+        """Wait until the robot has been well for the settle time.
+
+        The first who waits gives the notice, for the whole tree; it is ended once.
+
+        :param what: happened to `state`, or is about to; the log says it.
+        :param why: the robot is not well.
+        :returns: False where `stopped()` has ended the wait.
+        """
+        phase = self._join(teller, state, what, why)
+        try:
+            while not stopped():
+                if self._has_settled(phase, stopped):
+                    return True
+                pause(LOOK_PERIOD_S)
+            return False
+        finally:
+            self._leave(phase)
+
+    def _join(self, teller: Teller, state: str, what: str, why: str) -> _UnwellPhase:
+        place = '{}/{}'.format(teller.path, state)
+        with self._lock:
+            phase = self._phase
+            is_first = phase is None
+            if phase is None:
+                phase = self._phase = _UnwellPhase(teller, state, why)
+            phase.waiting += 1
+            phase.held.add(place)
+            if is_first:
+                smach.logwarn('{} {} while the robot is not well ({}): waiting; no failure is '
+                              'counted'.format(place, what, why))
+                teller.emit(EventKind.HEALTH_WAIT_START, state=state, text=why)
+            else:
+                smach.loginfo('{} {}; it waits, too'.format(place, what))
+        return phase
+
+    def _has_settled(self, phase: _UnwellPhase, stopped: Stopped) -> bool:
+        """Look once; whether the phase is over, by this look or another's."""
+        why = '' if phase.over else self.why_unwell(stopped)
+        with self._lock:
+            if phase.over or (not why and stopped()):
+                return phase.over
+            now_s = time.monotonic()
+            if why:
+                phase.well_since_s = None
+                return False
+            if phase.well_since_s is None:
+                phase.well_since_s = now_s
+            if now_s - phase.well_since_s < self._settle_s:
+                return False
+            self._end(phase, 'well')
+            return True
+
+    def _leave(self, phase: _UnwellPhase) -> None:
+        with self._lock:
+            phase.waiting -= 1
+            if not phase.waiting and not phase.over:
+                self._end(phase, 'stopped')
+
+    def _end(self, phase: _UnwellPhase, outcome: str) -> None:
+        phase.over = True
+        self._phase = None
+        waited_s = time.monotonic() - phase.since_s
+        text = ('the robot is well again after {:.1f} s' if outcome == 'well' else
+                'the wait for the robot to be well was ended after {:.1f} s').format(waited_s)
+        smach.loginfo('{}/{}: {}'.format(phase.teller.path, phase.state, text))
+        phase.teller.emit(EventKind.HEALTH_WAIT_END, state=phase.state, outcome=outcome, text=text,
+                          data={'waited_s': round(waited_s, 3), 'held': sorted(phase.held)})
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Neither who is asked nor a wait travels with a pickled machine."""
+        return {}
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__init__()  # type: ignore[misc]

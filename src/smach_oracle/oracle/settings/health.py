@@ -1,0 +1,164 @@
+"""What must hold for the robot to be well: the setting `healthy`. Pure.
+
+A topic, a status of the diagnostics, or a function. In YAML a list of them, or one alone:
+{topic: /motors_on}, {diagnostics: Power System}, {function: 'python:module:attribute'}.
+"""
+import math
+import re
+from enum import Enum
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
+
+from ..errors import SettingsError
+from . import checks as values
+from .preconditions import PYTHON, Resolver
+
+# no arguments; True or '' is well, else what is wrong
+HealthFunction = Callable[[], Union[bool, str]]
+WORST = ('ok', 'warn')
+_FIELD = re.compile(r'[A-Za-z_]\w*(\.\w+)*')
+_ALLOWED = 'a mapping with one of the keys topic, diagnostics and function'
+_NUMBER = values.number(-math.inf, math.inf, 'a number')
+_AGE = values.number(0.001, math.inf, 'seconds from 0.001')
+
+
+class HealthKind(Enum):
+    """Kinds of condition."""
+
+    TOPIC = 'topic'
+    DIAGNOSTICS = 'diagnostics'
+    FUNCTION = 'function'
+
+
+class HealthCondition(NamedTuple):
+    """One condition: what it looks at, and when the robot is well by it."""
+
+    kind: HealthKind
+    name: str  # what people call it
+    source: str = ''  # the topic, or the name of the status in the diagnostics
+    field: str = 'data'  # of the topic's messages, dotted
+    equals: Any = None  # bool, number or text; None: the limits count
+    at_least: float = -math.inf
+    at_most: float = math.inf
+    max_age_s: Optional[float] = None  # what is older, or was never received, is unwell
+    worst: str = 'warn'  # the highest level of the diagnostics that is still well
+    function: Optional[HealthFunction] = None
+
+
+_KEYS = {
+    HealthKind.TOPIC: ('topic', 'field', 'equals', 'at_least', 'at_most', 'name', 'max_age_s'),
+    HealthKind.DIAGNOSTICS: ('diagnostics', 'worst', 'name', 'max_age_s'),
+    HealthKind.FUNCTION: ('function', 'name'),
+}
+
+
+def checked_health(given: object,
+                   resolver: Optional[Resolver] = None) -> Tuple[HealthCondition, ...]:
+    """Check the conditions. `resolver` turns 'python:module:attribute' into that object.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    if given is None:
+        return ()
+    if isinstance(given, Mapping):
+        return (_condition('healthy', given, resolver),)
+    if not isinstance(given, (list, tuple)):
+        raise SettingsError('healthy', given, 'a list of conditions, or one')
+    return tuple(_condition('healthy[{}]'.format(index), entry, resolver)
+                 for index, entry in enumerate(given))
+
+
+def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthCondition:
+    if isinstance(given, HealthCondition):
+        return given
+    if not isinstance(given, Mapping):
+        raise SettingsError(key, given, _ALLOWED)
+    entry = values.mapping(key, given)
+    kinds = [kind for kind in HealthKind if kind.value in entry]
+    if len(kinds) != 1:
+        raise SettingsError(key, dict(entry), _ALLOWED)
+    kind = kinds[0]
+    for name in entry:
+        if name not in _KEYS[kind]:
+            raise SettingsError('{}.{}'.format(key, name), entry[name],
+                                'one of the keys ' + ', '.join(_KEYS[kind]))
+    prefix = key + '.'
+    make = {HealthKind.TOPIC: _topic, HealthKind.DIAGNOSTICS: _diagnostics}.get(kind)
+    made = make(prefix, entry) if make else _function(prefix, entry, resolver)
+    if 'name' in entry:
+        made = made._replace(name=values.label(prefix + 'name', entry['name']))
+    if 'max_age_s' in entry:
+        made = made._replace(max_age_s=_AGE(prefix + 'max_age_s', entry['max_age_s']))
+    return made
+
+
+def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
+    topic = values.label(prefix + 'topic', entry['topic'])
+    field = entry.get('field', 'data')
+    if not isinstance(field, str) or not _FIELD.fullmatch(field):
+        raise SettingsError(prefix + 'field', field, 'a field of the message, such as data or '
+                            'status.level')
+    return HealthCondition(HealthKind.TOPIC, topic.strip('/') or topic, topic, field,
+                           **_wanted(prefix, entry))
+
+
+def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
+    """What the field must be: `equals`, or limits; true where nothing is said."""
+    limits = [name for name in ('at_least', 'at_most') if name in entry]
+    if not limits:
+        return {'equals': _plain(prefix + 'equals', entry.get('equals', True))}
+    if 'equals' in entry:
+        raise SettingsError(prefix + 'equals', entry['equals'],
+                            'equals, or at_least and at_most, not both')
+    wanted = {name: _NUMBER(prefix + name, entry[name]) for name in limits}
+    if wanted.get('at_least', -math.inf) > wanted.get('at_most', math.inf):
+        raise SettingsError(prefix + 'at_least', wanted['at_least'],
+                            'at most at_most, which is {:g}'.format(wanted['at_most']))
+    return wanted
+
+
+def _plain(key: str, value: object) -> object:
+    if isinstance(value, (bool, str)):
+        return value
+    return _plain_number(key, value)
+
+
+_plain_number = values.number(-math.inf, math.inf, 'true, false, a number or a text')
+
+
+def _diagnostics(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
+    source = values.label(prefix + 'diagnostics', entry['diagnostics'])
+    worst = values.choice(WORST)(prefix + 'worst', entry.get('worst', 'warn'))
+    return HealthCondition(HealthKind.DIAGNOSTICS, source.strip('/') or source, source, worst=worst)
+
+
+def _function(prefix: str, entry: Mapping[str, Any],
+              resolver: Optional[Resolver]) -> HealthCondition:
+    given = entry['function']
+    name, found = '', given
+    if isinstance(given, str):
+        name, found = _resolved(prefix + 'function', given, resolver)
+    if not callable(found) or isinstance(found, type) or values.is_state(found):
+        raise SettingsError(prefix + 'function', given,
+                            "'python:module:attribute' of a function without arguments, "
+                            'or such a function')
+    name = name or str(getattr(found, '__name__', type(found).__name__))
+    return HealthCondition(HealthKind.FUNCTION, name, function=found)
+
+
+def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, object]:
+    """The name and the object of 'python:module:attribute'."""
+    if not given.startswith(PYTHON):
+        raise SettingsError(key, given, "'python:module:attribute'")
+    if resolver is None:
+        raise SettingsError(key, given, 'a function here: nobody told how to import names')
+    try:
+        return given.rpartition(':')[2], resolver(given)
+    except Exception as err:
+        raise SettingsError(
+            key, given, 'python:module:attribute that can be imported ({!r})'.format(err)) from err
+
+
+def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:
+    """What is to be listened to, in words; functions are called instead."""
+    return ['{} {}'.format(condition.kind.value, condition.source) for condition in conditions
+            if condition.kind is not HealthKind.FUNCTION]

@@ -1,0 +1,1 @@
+"""Whether the robot is well, by topics and diagnostics (setting `healthy`)."""

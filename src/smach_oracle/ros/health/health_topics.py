@@ -1,0 +1,131 @@
+"""Listens to topics and to the diagnostics: what was heard last, and when.
+
+rospy has one subscriber per topic and process, of the type that came first, so a topic is
+subscribed to with its true type. A type that is not installed here is read by its definition, which
+its publisher sends.
+"""
+import threading
+import time
+from typing import Any, Callable, Dict, List, Optional, Set, Tuple
+
+import genpy.dynamic
+import rosgraph
+import rospy
+
+from ..recording.recorder_topics import types_at_master, types_in_process
+from .field_rules import Status
+
+DIAGNOSTICS = ('/diagnostics', '/diagnostics_agg')
+LOOK_AGAIN_S = 0.5  # for the types of topics that nobody has advertised yet
+
+
+class Latest:
+    """What was heard last of one thing."""
+
+    def __init__(self) -> None:
+        self._heard: Optional[Tuple[Any, float]] = None
+
+    def put(self, what: Any) -> None:
+        """Take what was heard now."""
+        self._heard = (what, time.monotonic())
+
+    def heard(self) -> Any:
+        """What was heard; None where nothing was."""
+        heard = self._heard
+        return heard[0] if heard is not None else None
+
+    def age_s(self) -> Optional[float]:
+        """How long ago that was, monotonic; None where nothing was heard."""
+        heard = self._heard
+        return time.monotonic() - heard[1] if heard is not None else None
+
+
+class HealthTopics:
+    """Those of one process; each topic is subscribed to once. Not for the main thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._messages: Dict[str, Latest] = {}
+        self._statuses: Dict[str, Latest] = {}
+        self._unknown: Dict[str, Callable[[Any], None]] = {}  # topics without a type so far
+        self._subscribers: List[rospy.Subscriber] = []
+        self._looking = False
+        # sources that somebody warns of already, or has warned of: a script may build a machine
+        # for each trial
+        self.watched: Set[str] = set()
+        self.warned: Set[str] = set()
+
+    def message(self, topic: str) -> Latest:
+        """The latest message of a topic, listened to from now on; see `decoded`."""
+        name = rospy.resolve_name(topic)
+        with self._lock:
+            is_new = name not in self._messages
+            latest = self._messages.setdefault(name, Latest())
+            if is_new:
+                self._unknown[name] = latest.put
+        self._subscribe()
+        return latest
+
+    def status(self, name: str) -> Latest:
+        """The latest Status of a name in the diagnostics, listened to from now on."""
+        with self._lock:
+            is_first = not self._statuses
+            latest = self._statuses.setdefault(name.strip('/'), Latest())
+            if is_first:
+                self._unknown.update((rospy.resolve_name(topic), self._take_diagnostics)
+                                     for topic in DIAGNOSTICS)
+        self._subscribe()
+        return latest
+
+    def _take_diagnostics(self, message: Any) -> None:
+        for status in decoded(message).status:
+            latest = self._statuses.get(status.name.strip('/'))
+            if latest is not None:
+                latest.put(Status(level_of(status.level), status.message))
+
+    def _subscribe(self) -> None:
+        """Subscribe to what has a type; look again where one has none."""
+        try:
+            known = {**types_at_master(), **types_in_process()}
+        except (OSError, rosgraph.MasterException, ValueError):
+            known = types_in_process()  # the master is away; it is asked again
+        with self._lock:
+            for topic in [topic for topic in self._unknown if topic in known]:
+                take = self._unknown.pop(topic)
+                self._subscribers.append(rospy.Subscriber(topic, known[topic], take))
+            if self._unknown and not self._looking:
+                self._looking = True
+                threading.Thread(target=self._look, name='health topics', daemon=True).start()
+
+    def _look(self) -> None:
+        while not rospy.core.is_shutdown_requested():
+            time.sleep(LOOK_AGAIN_S)
+            self._subscribe()
+            with self._lock:
+                if not self._unknown:
+                    self._looking = False
+                    return
+
+
+_classes: Dict[Tuple[str, str], Any] = {}  # of types that are not installed, by name and md5
+
+
+def decoded(message: Any) -> Any:
+    """A received message with its fields.
+
+    :raises genpy.MessageError: where its type is not installed here, and cannot be read either.
+    """
+    if not isinstance(message, rospy.AnyMsg):
+        return message
+    header = message._connection_header
+    key = (header['type'], header['md5sum'])
+    if key not in _classes:
+        definition = header.get('message_definition', '')
+        made = genpy.dynamic.generate_dynamic(header['type'], definition)
+        _classes[key] = made[header['type']]
+    return _classes[key]().deserialize(message._buff)
+
+
+def level_of(level: Any) -> int:
+    """The level of a status, which some releases of genpy give as a byte."""
+    return level[0] if isinstance(level, bytes) and level else int(level)

@@ -1,0 +1,117 @@
+"""Who says whether the robot is well: functions, given with the machine or in the settings, and
+ports.
+"""
+import copy
+import threading
+
+import pytest
+from machines import FakeHealth, Scripted, chain_of, in_thread, watched
+from waiting import wait_for
+
+import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.machine import health_ports
+from smach_oracle.oracle.records.events import EventKind
+
+SETTINGS = {'health_settle_s': 0.05}
+
+
+@pytest.fixture
+def health():
+    return FakeHealth()
+
+
+@pytest.mark.parametrize('said, text', [
+    (False, 'FakeHealth'), ('motors: off', 'FakeHealth: motors: off'),
+    (ValueError('no answer'), 'FakeHealth: ValueError: no answer'),
+    (None, "FakeHealth returned None; True and '' are well"),
+])
+def test_what_a_function_may_say(said, text):
+    machine = watched(Scripted('aborted'), health=FakeHealth(said), settings=SETTINGS)
+    assert machine.run() == 'done'
+    assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == text
+
+
+def test_a_function_that_does_not_return_counts_as_unwell(monkeypatch):
+    monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.1)
+    go = threading.Event()
+
+    def sleeps():
+        return go.wait(20)
+    machine = watched(Scripted('aborted'), health=sleeps, settings=SETTINGS)
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START), 10)
+    assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'sleeps does not return'
+    go.set()
+    assert run.result() == 'done'
+
+
+def test_a_preempt_does_not_wait_for_a_function():
+    entered = threading.Event()
+
+    def sleeps():
+        entered.set()
+        threading.Event().wait(30)
+    machine = watched(Scripted('aborted'), health=sleeps, settings=SETTINGS)
+    run = in_thread(machine.run)
+    assert entered.wait(10)
+    machine.machine.request_preempt()
+    assert run.result(10) == 'preempted'
+
+
+def test_functions_of_the_settings_and_the_given_one_must_all_be_well(health):
+    other = FakeHealth()
+    machine = watched(Scripted('aborted'), health=health,
+                      settings=dict(SETTINGS, healthy={'function': other, 'name': 'battery'}))
+    health.said, other.said = [False], [False]
+    assert machine.run() == 'done'
+    assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'battery; FakeHealth'
+
+
+def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
+    machine = watched(Scripted('aborted'), settings={'healthy': {'topic': '/motors_on'}})
+    assert machine.run() == 'done'
+    assert machine.run() == 'done'
+    assert len(machine.of(EventKind.FAILURE)) == 1
+    said = [text for level, text in log if level == 'warn' and text.startswith('healthy')]
+    assert said == ['healthy: nobody listens to topic /motors_on here, as this process is no ROS '
+                    'node; it counts as well']
+
+
+def test_a_port_for_topics_is_made_once(health):
+    heard = []
+
+    class Port:
+        def why_unwell(self):
+            return health()
+
+    def listen(conditions):
+        heard.append([condition.source for condition in conditions])
+        return Port()
+    machine = watched(Scripted('aborted'), settings=dict(SETTINGS, healthy=[
+        {'topic': '/motors_on'}, {'function': FakeHealth()}, {'diagnostics': 'Power'}]))
+    oracle_of(machine.machine).listen_to_health(listen)
+    health.said = ['motors: off']
+    assert machine.run() == 'done'
+    assert machine.run() == 'done'
+    assert heard == [['/motors_on', 'Power']]
+    assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'motors: off'
+
+
+def test_wrapping_again_keeps_the_function_unless_another_is_given(health):
+    machine = chain_of(Scripted())
+    OracleContainer.wrap(machine, health=health)
+    OracleContainer.wrap(machine)
+    assert oracle_of(machine).health is health
+    other = FakeHealth()
+    OracleContainer.wrap(machine, health=other)
+    assert oracle_of(machine).health is other
+
+
+def test_a_copied_machine_leaves_its_health_behind(health):
+    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'], health=health)
+    with machine:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'done'})
+    twin = copy.deepcopy(machine)
+    assert oracle_of(twin).health is None and oracle_of(machine).health is health
+    assert twin.execute() == 'done'

@@ -1,0 +1,81 @@
+"""The port that listens: what was never heard of, and what was heard too long ago."""
+import pytest
+from std_msgs.msg import Bool
+
+from smach_oracle.oracle.settings.health import checked_health
+from smach_oracle.ros.health import health_port, health_topics
+from smach_oracle.ros.health.field_rules import Status
+from smach_oracle.ros.health.health_topics import Latest
+
+
+class FakeTopics:
+    """A fake of what listens to topics; hears what a test puts into its places."""
+
+    def __init__(self):
+        self.heard = {}
+        self.watched, self.warned = set(), set()
+
+    def message(self, topic):
+        return self.heard.setdefault(topic, Latest())
+
+    status = message
+
+
+@pytest.fixture
+def warnings(monkeypatch):
+    texts = []
+    monkeypatch.setattr(health_port.rospy, 'logwarn', lambda text, *args: texts.append(text % args))
+    monkeypatch.setattr(health_port.rospy, 'is_shutdown', lambda: False)
+    return texts
+
+
+@pytest.fixture
+def now(monkeypatch):
+    """Monotonic time by which ages are told."""
+    clock = [100.0]
+    monkeypatch.setattr(health_topics.time, 'monotonic', lambda: clock[0])
+    return clock
+
+
+def port_of(topics, *given):
+    return health_port.TopicHealth(checked_health(list(given)), topics)
+
+
+def test_what_was_never_heard_of_is_well_and_warned_of_once(warnings):
+    port = port_of(FakeTopics(), {'topic': '/motors_on'}, {'diagnostics': 'Power'})
+    assert [port.why_unwell(), port.why_unwell()] == ['', '']
+    assert warnings == [
+        'healthy: nothing was heard of topic /motors_on so far; it counts as well',
+        'healthy: nothing was heard of diagnostics Power so far; it counts as well']
+
+
+def test_a_machine_for_each_trial_warns_of_it_once_and_starts_one_timer(warnings, monkeypatch):
+    started = []
+    monkeypatch.setattr(health_port.threading.Timer, 'start', lambda timer: started.append(timer))
+    topics = FakeTopics()
+    for _ in range(3):
+        port_of(topics, {'topic': '/motors_on'}).why_unwell()
+    assert len(warnings) == len(started) == 1
+
+
+def test_with_a_largest_age_it_is_not_well(warnings):
+    port = port_of(FakeTopics(), {'topic': '/motors_on', 'max_age_s': 5})
+    assert port.why_unwell() == 'motors_on: not heard of yet'
+    assert warnings == [
+        'healthy: nothing was heard of topic /motors_on so far; it counts as not well']
+
+
+def test_all_that_is_wrong_is_named(warnings, now):
+    topics = FakeTopics()
+    port = port_of(topics, {'topic': '/motors_on', 'name': 'motors', 'max_age_s': 5},
+                   {'diagnostics': 'Power'}, {'topic': '/other'})
+    topics.message('/motors_on').put(Bool(False))
+    topics.message('/other').put(Bool(True))
+    topics.status('Power').put(Status(2, 'low voltage'))
+    assert port.why_unwell() == 'motors: off; Power: error (low voltage)'
+    topics.message('/motors_on').put(Bool(True))
+    topics.status('Power').put(Status(1, ''))
+    assert port.why_unwell() == ''
+    now[0] += 7.0
+    assert port.why_unwell() == 'motors: not heard of for 7 s'
+    assert not warnings
