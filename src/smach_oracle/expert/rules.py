@@ -23,6 +23,7 @@ from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 DEFAULT = 'default'
+OLD_NAME = 'SM_ROOT'  # of machines that were given none, before they had that of their node
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
 KINDS = {kind.name.lower(): kind for kind in AnswerKind}
 _NAMED_BY = {'goto': 'state', 'supersede': 'outcome', 'interface': 'interface'}
@@ -69,8 +70,8 @@ class Rules:
     def next(self, robot: str, trial_id: str, container_path: str, state: str) -> Rule:
         """The rule for one more question; each call counts."""
         path = '{}/{}'.format(container_path, state)
-        rules = next(
-            (self._by_state[key] for key in (path, state, DEFAULT) if key in self._by_state), ())
+        keys = (path, '/'.join([OLD_NAME] + path.split('/')[1:]), state, DEFAULT)
+        rules = next((self._by_state[key] for key in keys if key in self._by_state), ())
         trial, count = self._asked.get((robot, path), (trial_id, 0))
         if trial != trial_id:
             count = 0

@@ -23,6 +23,15 @@ def test_the_most_specific_rule_answers():
     assert rules.next('/r', 't', 'HALL', 'PLACE').kind == 'give_up'
 
 
+def test_a_rule_for_a_machine_that_had_no_name_holds_now_that_it_has_its_nodes():
+    rules = Rules.parse({'SM_ROOT/PICK': GOTO, 'SM_ROOT/ARM/PICK': ASSIST, 'task/PICK': ASSIST,
+                         'default': {'kind': 'give_up'}})
+    assert rules.next('/task', 't', 'task', 'PICK').kind == 'interface'
+    assert rules.next('/robot', 't', 'robot', 'PICK').kind == 'goto'
+    assert rules.next('/robot', 't', 'robot/ARM', 'PICK').kind == 'interface'
+    assert rules.next('/robot', 't', 'robot', 'PLACE').kind == 'give_up'
+
+
 def test_without_a_rule_the_question_is_left_to_others():
     assert Rules.parse({'PICK': GOTO}).next('/r', 't', 'HALL', 'PLACE') == Rule(IGNORE)
 
