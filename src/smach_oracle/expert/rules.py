@@ -11,7 +11,7 @@
 
 A key is the label of the failed state, alone or behind its container path, which is the more
 specific one; `default` is for all others. The same questions in the same order get the same
-answers.
+answers. A question about a state that still runs is ignored: rules are for failures.
 """
 import math
 import threading
@@ -19,6 +19,7 @@ from typing import Any, Dict, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
@@ -98,8 +99,10 @@ class RuleExpert(Expert):
 
         None by the deadline where the rule ignores or comes too late.
         """
-        rule = self._rules.next('', question.trial_id, question.container_path,
-                                question.failed_state)
+        rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
+        if question.failure_kind is not FailureKind.NOT_A_FAILURE:
+            rule = self._rules.next('', question.trial_id, question.container_path,
+                                    question.failed_state)
         ignores = rule.kind == IGNORE
         limit_s = question.deadline_s or math.inf
         wait_s = min(math.inf if ignores else rule.delay_s, limit_s)

@@ -19,10 +19,16 @@ def clean(text: str, lines: bool = False) -> str:
     return ''.join(_visible(character, lines) for character in text)
 
 
+def still_runs(goal: ExpertQueryGoal) -> bool:
+    """Whether a question is about a state that still runs; GOTO that state is to wait on."""
+    return bool(goal.failure_kind == OracleEvent.NOT_A_FAILURE)
+
+
 def failure_words(goal: ExpertQueryGoal) -> str:
-    """How the state of a question failed."""
+    """How the state of a question failed, or that it still runs."""
     outcome = clean(goal.outcome)
     return {
+        OracleEvent.NOT_A_FAILURE: 'still runs',
         OracleEvent.FAILING_OUTCOME: 'ended with the failing outcome {}'.format(outcome),
         OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(
             outcome, clean(goal.container_path)),

@@ -10,6 +10,7 @@ from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
 from smach_oracle.expert.scripted_expert import load_rules, servers_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 GOTO = {'kind': 'goto', 'state': 'DETECT'}
@@ -113,6 +114,16 @@ def test_an_answer_that_comes_after_the_deadline_is_none():
     assert ask({'PICK': dict(GOTO, delay_s=60)}, deadline_s=0.1) is None
     assert ask({'PICK': {'kind': 'ignore'}}, deadline_s=0.1) is None
     assert 0.2 <= time.monotonic() - begun_s < 10.0
+
+
+def test_rules_for_failures_are_not_for_a_state_that_still_runs():
+    cancelled = threading.Event()
+    cancelled.set()
+    expert = RuleExpert(Rules.parse({'PICK': [GOTO, ASSIST], 'default': {'kind': 'give_up'}}))
+    still_runs = make_question(failure_kind=FailureKind.NOT_A_FAILURE)
+    assert expert.ask(still_runs, cancelled, None) is None
+    answer = expert.ask(make_question(), threading.Event(), None)
+    assert answer.kind is AnswerKind.GOTO, 'the first rule is for the first failure'
 
 
 def test_a_question_taken_back_is_not_waited_for():

@@ -10,6 +10,7 @@ import smach
 
 from ..asking.question import Expert
 from ..records.events import EventSource
+from .alarm_clock import AlarmClock
 from .workers import Workers
 
 
@@ -39,6 +40,7 @@ class Tree:
         self.expert = expert
         self.events = EventSource(log_error)
         self.workers = Workers()
+        self.clock = AlarmClock()
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last

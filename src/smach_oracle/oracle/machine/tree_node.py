@@ -118,7 +118,7 @@ class TreeNode:
         return not self.is_left_behind()
 
     def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
-        """Return the executions with a time limit inside which this container executes.
+        """Return the watched executions inside which this container executes.
 
         Those of its thread, and, as a Concurrence has threads of its own, those of the states
         above it.

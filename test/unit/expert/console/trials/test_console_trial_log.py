@@ -162,7 +162,12 @@ FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT'
          FAILED,
          event(EventKind.SUPERSEDE), JUMPED,
          event(EventKind.CONTAINER_END, '', outcome='succeeded')
-     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0))])
+     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0)),
+     # asked while it still ran: wait on, and taken out
+     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PICK'),
+       event(EventKind.TRANSITION)], (1, 1)),
+     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PLACE'),
+       event(EventKind.TRANSITION)], (0, 1))])
 def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, recovery_counts):
     assert scored(*events) == recovery_counts
 

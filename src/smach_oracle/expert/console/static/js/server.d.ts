@@ -62,6 +62,7 @@ export interface Question {
   path: string; // of the container
   state: string; // that failed
   what: string; // went wrong, in words
+  running: boolean; // it still runs: to go to it is to wait on
   outcome: string;
   text: string; // of an exception
   class: FailureClass;

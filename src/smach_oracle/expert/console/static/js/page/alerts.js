@@ -63,10 +63,11 @@ export class Alerts {
   }
 
   /** @param {Question} question */
-  notify({ state, robot, key }) {
+  notify({ state, running, robot, key }) {
     if (!document.hidden || !CAN_NOTIFY || Notification.permission !== 'granted') return;
     try {
-      const shown = new Notification(state + ' failed', { body: robot + ' asks', tag: key });
+      const title = state + (running ? ' still runs' : ' failed');
+      const shown = new Notification(title, { body: robot + ' asks', tag: key });
       shown.onclick = () => { window.focus(); shown.close(); };
     } catch (err) { /* some phones know the class, and allow it to service workers alone */ }
   }

@@ -71,10 +71,11 @@ export class QuestionDetail {
   }
 
   head() {
-    const { state, robot, path } = this.question;
+    const { state, running, robot, path } = this.question;
     return h('header', { class: 'detail-head' },
       h('button', { class: 'back', 'aria-label': 'Back to the list', onclick: this.onLeave }, '‹'),
-      h('div', {}, h('h2', {}, state, ' failed'), h('p', { class: 'dim' }, robot, ' · ', path)),
+      h('div', {}, h('h2', {}, state, running ? ' still runs' : ' failed'),
+        h('p', { class: 'dim' }, robot, ' · ', path)),
       h('span', { class: 'spacer' }), this.time);
   }
 
