@@ -105,15 +105,18 @@ class Step:
         if blocked:
             return Overrun(blocked)
         begun_s = time.monotonic()
-        if record.settings.time_limit_s is not None and node.tree.recover:
-            outcome = self._execute_limited(state, record.settings.time_limit_s)
-        elif entered_by_oracle:
-            outcome = WatchedVisit(node, record).execute(userdata)
-        else:
-            outcome = state.execute(userdata)
-        if not (isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
-            record.took(time.monotonic() - begun_s)
-        return outcome
+        outcome: object = None
+        try:
+            if record.settings.time_limit_s is not None and node.tree.recover:
+                outcome = self._execute_limited(state, record.settings.time_limit_s)
+            elif entered_by_oracle:
+                outcome = WatchedVisit(node, record).execute(userdata)
+            else:
+                outcome = state.execute(userdata)
+            return outcome
+        finally:
+            if not (isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
+                record.took(time.monotonic() - begun_s)
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
