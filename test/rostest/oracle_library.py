@@ -11,6 +11,7 @@ from actionlib_msgs.msg import GoalStatus
 from oracle_support import EventLog, FrontEnd, Process, oracle_run, script
 from waiting import wait_for
 
+from smach_msgs.msg import SmachContainerStructure
 from smach_oracle.msg import (
     ExpertDecision,
     MoveArmsAsideAction,
@@ -98,6 +99,23 @@ for attempt in range(3):
     except (ValueError, OSError) as err:
         print('ATTEMPT', attempt, err, flush=True)
 '''
+TWO_MACHINES = PRELUDE + '''
+rospy.init_node('task')
+machines = []
+for labels in ['PICK'], ['PLACE'], ['PICK']:
+    sm = smach.StateMachine(outcomes=OUTCOMES)
+    with sm:
+        for label in labels:
+            smach.StateMachine.add(label, Turn('aborted'))
+    machines.append(OracleContainer.wrap(sm))
+viewer = smach_ros.IntrospectionServer('mine', machines[1], '/SM_PLACE')
+viewer.start()
+for sm in machines:
+    sm.execute()
+print('PATHS', [sm.path for sm in machines], flush=True)
+sys.stdin.readline()
+viewer.stop()
+'''
 ACTION_SERVER = PRELUDE + '''
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
@@ -132,6 +150,18 @@ class LibraryTest(unittest.TestCase):
         reply = expert.answer(AnswerQueryRequest(question.query.query_id, ExpertDecision(
             kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann')))
         self.assertTrue(reply.ok, reply.message)
+
+    def test_machines_without_a_name_have_their_nodes_and_viewers_keep_theirs(self) -> None:
+        program = self.start(TWO_MACHINES)
+        self.assertTrue(program.says("PATHS ['task', 'task_2', 'task']"), program.output())
+        theirs = rospy.wait_for_message('/mine/smach/container_structure', SmachContainerStructure,
+                                        20.0)
+        self.assertEqual(theirs.path, '/SM_PLACE')
+        ours = rospy.wait_for_message('/task/smach/container_structure', SmachContainerStructure,
+                                      20.0)
+        self.assertEqual(ours.path, '/task')
+        program.go_on()
+        self.assertEqual(program.wait(), 0, program.output())
 
     def published(self, topic: str) -> bool:
         return topic in dict(rosgraph.Master('/test').getPublishedTopics(''))

@@ -114,14 +114,14 @@ class OracleRunTest(unittest.TestCase):
         # latched: nothing moves any more
         rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)
         self.assertEqual({(row.path, row.state, row.successes) for row in rates.states},
-                         {('TASK', 'MOVE', 1), ('TASK', 'AGAIN', 1)})
+                         {('task', 'MOVE', 1), ('task', 'AGAIN', 1)})
         self.assertIn(
             ('MOVE', 'succeeded', 'AGAIN', 1),
             [(edge.state, edge.outcome, edge.target, edge.count) for edge in rates.transitions])
         structure = rospy.wait_for_message('/task/smach/container_structure',
                                            SmachContainerStructure, 10.0)
         edges = set(zip(structure.outcomes_from, structure.outcomes_to))
-        self.assertEqual(structure.path, '/TASK')
+        self.assertEqual(structure.path, '/task')
         self.assertIn(('MOVE', 'ORACLE'), edges)
         self.assertIn(('ORACLE', 'AGAIN'), edges)
         task.go_on()

@@ -126,7 +126,7 @@ class DrinkRetrievalTest(unittest.TestCase):
             ], check=True, timeout=140)
             trial, = load_trials([folder]).trials
         self.assertEqual((trial.outcome, trial.questions), ('succeeded', 0))
-        self.assertIn('DRINK_RETRIEVAL/DETECT_DRINK', dict(trial.failures_by_state))
+        self.assertIn('drink_retrieval/DETECT_DRINK', dict(trial.failures_by_state))
         self.assertGreater(trial.recoveries, 0)
         self.assert_true_success()
 

@@ -55,7 +55,7 @@ class Recoveries(unittest.TestCase):
     def test_without_the_oracle_it_ends_the_trial_as_the_author_wrote_it(self) -> None:
         trial = self.run_task('--without-oracle')
         self.assertEqual((trial.outcome, trial.recoveries, trial.questions), ('aborted', 0, 0))
-        self.assertEqual(trial.failures_by_state, (('PICK_AND_PLACE/DETECT_TABLETOP', 1),))
+        self.assertEqual(trial.failures_by_state, (('pick_and_place/DETECT_TABLETOP', 1),))
         self.assertFalse(self.truth())
 
     def test_the_oracle_looks_again(self) -> None:

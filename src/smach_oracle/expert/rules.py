@@ -11,7 +11,7 @@
 
 A key is the label of the failed state, alone or behind its container path, which is the more
 specific one; `default` is for all others. The same questions in the same order get the same
-answers.
+answers. A question about a state that still runs is ignored: rules are for failures.
 """
 import math
 import threading
@@ -19,10 +19,12 @@ from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Protocol,
 
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 DEFAULT = 'default'
+OLD_NAME = 'SM_ROOT'  # of machines that were given none, before they had that of their node
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
 KINDS = {kind.name.lower(): kind for kind in AnswerKind}
 _NAMED_BY = {'goto': 'state', 'supersede': 'outcome', 'interface': 'interface'}
@@ -89,8 +91,8 @@ class Rules:
     def next(self, robot: str, trial_id: str, container_path: str, state: str) -> Rule:
         """The rule for one more question; each call counts."""
         path = '{}/{}'.format(container_path, state)
-        rules = next(
-            (self._by_state[key] for key in (path, state, DEFAULT) if key in self._by_state), ())
+        keys = (path, '/'.join([OLD_NAME] + path.split('/')[1:]), state, DEFAULT)
+        rules = next((self._by_state[key] for key in keys if key in self._by_state), ())
         trial, count = self._asked.get((robot, path), (trial_id, 0))
         if trial != trial_id:
             count = 0
@@ -118,8 +120,10 @@ class RuleExpert(Expert):
         None by the deadline where the rule ignores or comes too late, or would have a state
         repeated that it does not confirm.
         """
-        rule = self._rules.next('', question.trial_id, question.container_path,
-                                question.failed_state)
+        rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
+        if question.failure_kind is not FailureKind.STILL_RUNNING:
+            rule = self._rules.next('', question.trial_id, question.container_path,
+                                    question.failed_state)
         ignores = rule.kind == IGNORE or bool(rule.why_not(question.choices))
         limit_s = question.deadline_s or math.inf
         wait_s = min(math.inf if ignores else rule.delay_s, limit_s)

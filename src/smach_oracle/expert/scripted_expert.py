@@ -19,6 +19,7 @@ from smach_oracle.ros.service_calls import ServerGoneError
 from .followed_server import ListedQuestion
 from .front_end import FrontEnd
 from .rules import IGNORE, Rule, Rules
+from .wording import still_runs
 
 ALL_SERVERS = 'all'
 _IDLE_S = 0.5
@@ -79,7 +80,10 @@ class ScriptedExpert:
 
     def _begin(self, key: str, listed: ListedQuestion) -> None:
         goal = listed.goal
-        rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path, goal.failed_state)
+        rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
+        if not still_runs(goal):
+            rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path,
+                                    goal.failed_state)
         why_not = rule.why_not(goal.choices)
         if why_not:
             rospy.logwarn('The rule for %s does not answer: %s', goal.failed_state, why_not)

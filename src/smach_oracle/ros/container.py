@@ -24,6 +24,7 @@ from smach_oracle.oracle.settings.settings import Settings
 from .attachment import attachments
 from .expert.failure_text import describe_failure
 from .loaded_settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_python
+from .machine_names import machine_names
 from .main_thread import outside_main_thread
 
 PreconditionLists = Optional[Mapping[str, List[Any]]]
@@ -89,10 +90,11 @@ class OracleContainer(BareContainer):
         if not oracle.is_top or self.is_running():
             return super().execute(*args, **kwargs)
         oracle.describe_failure = describe_failure
-        if not attachments().has(self):
-            self._attach()
-        with attachments().trial(self):
-            return super().execute(*args, **kwargs)
+        with machine_names().running(self):
+            if not attachments().has(self):
+                self._attach()
+            with attachments().trial(self):
+                return super().execute(*args, **kwargs)
 
     def _attach(self) -> None:
         try:

@@ -10,6 +10,7 @@ from smach_oracle.expert.rules import IGNORE, Rule, RuleExpert, Rules
 from smach_oracle.expert.scripted_expert import load_rules, servers_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, StateChoice
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 GOTO = {'kind': 'goto', 'state': 'DETECT'}
@@ -21,6 +22,15 @@ def test_the_most_specific_rule_answers():
     assert rules.next('/r', 't', 'KITCHEN', 'PICK').kind == 'interface'
     assert rules.next('/r', 't', 'HALL', 'PICK').kind == 'goto'
     assert rules.next('/r', 't', 'HALL', 'PLACE').kind == 'give_up'
+
+
+def test_a_rule_for_a_machine_that_had_no_name_holds_now_that_it_has_its_nodes():
+    rules = Rules.parse({'SM_ROOT/PICK': GOTO, 'SM_ROOT/ARM/PICK': ASSIST, 'task/PICK': ASSIST,
+                         'default': {'kind': 'give_up'}})
+    assert rules.next('/task', 't', 'task', 'PICK').kind == 'interface'
+    assert rules.next('/robot', 't', 'robot', 'PICK').kind == 'goto'
+    assert rules.next('/robot', 't', 'robot/ARM', 'PICK').kind == 'interface'
+    assert rules.next('/robot', 't', 'robot', 'PLACE').kind == 'give_up'
 
 
 def test_without_a_rule_the_question_is_left_to_others():
@@ -125,6 +135,16 @@ def test_a_rule_that_does_not_confirm_says_so():
     assert rule.why_not(POURED) == (
         'POUR was done in this trial, and only a rule with confirm: true has it repeated')
     assert rule.why_not(POURED[1:]) == '' == rule.why_not([POURED[0]._replace(repeats=())])
+
+
+def test_rules_for_failures_are_not_for_a_state_that_still_runs():
+    cancelled = threading.Event()
+    cancelled.set()
+    expert = RuleExpert(Rules.parse({'PICK': [GOTO, ASSIST], 'default': {'kind': 'give_up'}}))
+    still_runs = make_question(failure_kind=FailureKind.STILL_RUNNING)
+    assert expert.ask(still_runs, cancelled, None) is None
+    answer = expert.ask(make_question(), threading.Event(), None)
+    assert answer.kind is AnswerKind.GOTO, 'the first rule is for the first failure'
 
 
 def test_a_question_taken_back_is_not_waited_for():

@@ -44,7 +44,8 @@ LAYERS: Dict[str, List[Layer]] = {
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health'},
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
-         'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread'},
+         'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
+         'machine_names'},
         {'sendable_text', 'strict_json'}
     ],
     'expert': [

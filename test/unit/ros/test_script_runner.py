@@ -210,6 +210,13 @@ def test_machines_of_one_structure_share_a_name_and_others_get_their_own(run):
     assert result.stdout == "['TASK', 'TASK', 'TASK_2']\n", result.stderr
 
 
+def test_a_name_can_be_given(run):
+    text = 'sm = machine(); sm.execute(); print(sm.name)'
+    assert run(text, options=['--name', 'KITCHEN']).stdout == 'KITCHEN\n'
+    refused = run(text, options=['--name', 'a/b'])
+    assert refused.returncode == 2 and 'a name without /' in refused.stderr
+
+
 def test_learned_rates_are_kept_across_runs(run):
     text = '''
         sm = machine('aborted')

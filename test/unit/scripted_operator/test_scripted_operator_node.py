@@ -8,7 +8,7 @@ import pytest
 import rospy
 from geometry_msgs.msg import Point, PoseStamped
 
-from smach_oracle.msg import OpenQuery
+from smach_oracle.msg import OpenQuery, OracleEvent
 from smach_oracle.scripted_operator.ground_truth import GroundTruthError
 from smach_oracle.scripted_operator.manual_task import ManualTask, carry_out, point_in_base
 from smach_oracle.scripted_operator.node import ScriptedOperator
@@ -17,14 +17,15 @@ from smach_oracle.scripted_operator.topic_hand import GoalEndedError
 from smach_oracle.scripted_operator.true_scene import TrueScene
 
 QUESTION = SimpleNamespace(key='r/q1', status=OpenQuery.PENDING, goal=SimpleNamespace(
-    failed_state='PICK', container_path='SM', robot='r', trial_id='t'))
+    failed_state='PICK', container_path='SM', robot='r', trial_id='t', failure_kind=1))
 
 
 class Questions:
     """A front end with one question that stays open, for so many looks at the list."""
 
-    def __init__(self, rounds):
+    def __init__(self, rounds, failure_kind=1):
         self._rounds = rounds
+        QUESTION.goal.failure_kind = failure_kind
         self.claims = 0
 
     def wait_for_change(self, version, _timeout_s):
@@ -65,6 +66,13 @@ def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_e
     with pytest.raises(KeyboardInterrupt):
         ScriptedOperator(SimpleNamespace(seed=1), questions, world, None).run()
     assert (world.looks, questions.claims) == (looks, claims)
+
+
+def test_a_state_that_still_runs_is_left_alone():
+    questions, world = Questions(10, OracleEvent.STILL_RUNNING), World(0)
+    with pytest.raises(KeyboardInterrupt):
+        ScriptedOperator(SimpleNamespace(seed=1), questions, world, None).run()
+    assert (world.looks, questions.claims) == (0, 0)
 
 
 @pytest.mark.parametrize('offered, told', [([

@@ -50,7 +50,7 @@ from smach_oracle.msg import (
     TransitionCount,
 )
 from smach_oracle.oracle.asking.question import StateChoice
-from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.images import cloud_message, colour_image, depth_image, mask_image
@@ -78,7 +78,8 @@ def questions():
                 'unsent': object()}
     asked = [listed(), listed(OpenQuery.CLAIMED, 20.0, userdata=userdata, history=visits),
              listed(OpenQuery.INTERFACE_RUNNING, interface='assist', rate=math.nan,
-                    choices=unknown)]
+                    choices=unknown),
+             listed(failure_kind=FailureKind.STILL_RUNNING, outcome='', interfaces=())]
     return [question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)) for each in asked]
 
 

@@ -5,6 +5,8 @@ from smach_oracle.msg import ExpertDecision, ExpertQueryGoal
 from smach_oracle.oracle.asking.question import names
 from smach_oracle.oracle.errors import AnswerError
 
+from ..wording import still_runs
+
 
 class AnswerOption(NamedTuple):
     """One possible answer."""
@@ -25,8 +27,8 @@ class AnswerOption(NamedTuple):
 def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
     """All possible answers, in the order in which they are shown."""
     found = [
-        AnswerOption(str(number), 'goto ' + choice.state, ExpertDecision.GOTO, choice.state,
-               choice.blocked) for number, choice in enumerate(goal.choices, 1)
+        AnswerOption(str(number), _goto_words(goal, choice.state), ExpertDecision.GOTO,
+                     choice.state, choice.blocked) for number, choice in enumerate(goal.choices, 1)
     ]
     states = {choice.state for choice in goal.choices}
     # first those with which the machine goes on: s1 is then seldom the failure itself
@@ -45,6 +47,15 @@ def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
                offer.name) for number, offer in enumerate(goal.interfaces, 1)
     ]
     return found
+
+
+def is_wait_on(goal: ExpertQueryGoal, state: str) -> bool:
+    """Whether to go to a state means to let it run on."""
+    return still_runs(goal) and state == goal.failed_state
+
+
+def _goto_words(goal: ExpertQueryGoal, state: str) -> str:
+    return 'wait on' if is_wait_on(goal, state) else 'goto ' + state
 
 
 def choose(text: str, available: List[AnswerOption]) -> AnswerOption:

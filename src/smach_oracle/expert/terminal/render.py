@@ -21,8 +21,8 @@ from smach_oracle.msg import (
 )
 
 from ..followed_server import ListedQuestion
-from ..wording import clean, failure_words
-from .options import AnswerOption, options
+from ..wording import clean, failure_words, still_runs
+from .options import AnswerOption, is_wait_on, options
 from .text import CLASS_NAMES, duration, rate_bar, rate_colour
 
 _VISITS = {VisitedState.SUCCESS: ('✓', '#2e9e3f'), VisitedState.FAILURE: ('✗', '#cc3333'),
@@ -38,6 +38,9 @@ def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
         parts += [_heading('History'), history(goal.history)]
     found = options(goal)
     parts += [_heading('Go to'), _states(goal, found)]
+    if still_runs(goal):
+        parts.append(Text('{} is preempted by every answer but to wait on'.format(
+            clean(goal.failed_state)), 'dim'))
     if goal.supersede_outcomes:
         parts += [_heading('Supersede {} (you did its work)'.format(clean(goal.failed_state))),
                   _supersede(goal, found)]
@@ -88,7 +91,9 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
         facts.append(' · continuous', 'bold')
     facts.append(' · {} {} so far'.format(goal.recoveries,
                                           'recovery' if goal.recoveries == 1 else 'recoveries'))
-    lines += [facts, Text('asked because ' + clean(goal.reason))]
+    lines.append(facts)
+    if not still_runs(goal):  # there the text says it
+        lines.append(Text('asked because ' + clean(goal.reason)))
     if goal.tried:
         lines.append(Text('tried: ' + ', '.join(clean(step) for step in goal.tried)))
     if goal.deadline > 0:
@@ -109,7 +114,10 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
         rate = 1.0 - choice.predicted_success
         bar = rate_bar(choice.predicted_success, 6)
         bar.stylize(dim or rate_colour(rate))  # the colour is that of its failure rate
-        table.add_row(keys[choice.state], Text(clean(choice.state), dim or 'bold'), bar,
+        name = Text(clean(choice.state), dim or 'bold')
+        if is_wait_on(goal, choice.state):
+            name = Text.assemble(('wait on', 'bold green'), ' (', name, ' runs on)')
+        table.add_row(keys[choice.state], name, bar,
                       Text(CLASS_NAMES.get(choice.failure_class, '?'), dim or rate_colour(rate)),
                       str(choice.visits), _arrival(choice))
     return table
@@ -148,7 +156,8 @@ def _give_up(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
             table.add_row(
                 option.key,
                 Text(clean(option.name), 'bold') if option.name else Text(
-                    'end as the failure would have ended {}'.format(clean(goal.container_path))))
+                    'end as {} failure would have ended {}'.format(
+                        'a' if still_runs(goal) else 'the', clean(goal.container_path))))
     return table
 
 

@@ -2,7 +2,7 @@
 
 "PICK failed (1 of its last 10): trying it again."
 """
-from typing import NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 from .policy import Action
 
@@ -44,6 +44,26 @@ def going_would_repeat(state: str, target: str, repeated: Sequence[str]) -> str:
         return 'it is not repeated by itself'
     return '{} would repeat {}'.format(
         'trying it again' if target == state else 'going back to ' + target, ', '.join(repeated))
+
+
+def still_running_sentence(state: str, ran_s: float, longest_s: Optional[float]) -> str:
+    """Return what a person is told of a state that takes much longer than ever before.
+
+    `longest_s`: of its visits that have ended; None: not known.
+    """
+    return '{} still runs after {}. It has no time limit, so it is not abandoned.'.format(
+        state, ran_in_words(ran_s, longest_s))
+
+
+def ran_in_words(ran_s: float, longest_s: Optional[float]) -> str:
+    """Return how long a state has run, and how long it took before."""
+    before = ('how long it took before is not known' if longest_s is None
+              else 'its longest so far was {}'.format(_seconds(longest_s)))
+    return '{}; {}'.format(_seconds(ran_s), before)
+
+
+def _seconds(seconds: float) -> str:
+    return ('{:.0f} s' if seconds >= 10 else '{:.2g} s').format(seconds)
 
 
 def _failed(facts: DecisionFacts) -> str:

@@ -52,10 +52,13 @@ class HeldVisit(OracleVisit):
     def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
         return HeldRecovery(self._node, self._record, self._failure, context, self._why)
 
-    def _note_failure(self) -> None:
+    def _tell_failure(self) -> None:
         # what the wait says in the log is one sentence for all who wait
         smach.loginfo('{}/{} failed, which is not counted: {}'.format(
             self._node.path, self._record.label, self._failure.details or in_words(self._failure)))
+
+    def _note_passage(self, outcome: str, what: str) -> None:
+        """Tell nothing: the visit was none."""
 
     def _note_superseded(self, outcome: str) -> None:
         self._count_superseded(outcome)

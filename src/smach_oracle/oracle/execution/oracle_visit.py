@@ -3,17 +3,20 @@ from typing import Optional, Sequence, cast
 
 import smach
 
+from ..asking.question import Answer
 from ..decision.policy import FailureContext
 from ..machine.learned_rates import save_rates
 from ..machine.repeats import leave_for, note_superseded
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
-from ..recovery.failure import Failure, route_of
+from ..recovery.failure import Failure, natural_ending, route_of
 from ..recovery.judging import in_words
+from ..recovery.obeying import verdict_of
 from ..recovery.recovery import Recovery
 from ..recovery.verdict import Verdict, VerdictKind
 from .oracle_state import OracleState
@@ -43,30 +46,44 @@ class OracleVisit:
     def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
         return Recovery(self._node, self._record, self._failure, context, continuous)
 
+    def follow(self, answer: Answer, outcome: str) -> Optional[str]:
+        """Go as an expert has answered who was asked while the state still ran.
+
+        `outcome`: with what it ended then. It returns, and raises, what `run` does.
+        """
+        node = self._node
+        meta = self._pass_to_meta(outcome, outcome or 'taken_out')
+        watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
+        return self._leave(meta, verdict_of(
+            answer, node, self._record.label, watch, lambda: natural_ending(
+                self._failure, node.machine.get_registered_outcomes(), node.in_force.failing)))
+
     def _enter(self) -> OracleState:
-        node, machine = self._node, self._machine
+        self._tell_failure()
+        what = self._failure.outcome or self._failure.kind.name.lower()
+        return self._pass_to_meta(self._failure.outcome, what)
+
+    def _pass_to_meta(self, outcome: str, what: str) -> OracleState:
+        node, machine, label = self._node, self._machine, self._record.label
         meta_label = node.settings.oracle_label
         machine._sync_oracle()
-        self._note_failure()
+        self._note_passage(outcome, what)
         # _sync_oracle refuses any other state of this name
         meta = cast(OracleState, machine._states[meta_label])
-        go_to(node, message_of(self._record.label, self._what_failed(), meta_label), meta_label)
+        go_to(node, message_of(label, what, meta_label), meta_label)
         return meta
 
-    def _what_failed(self) -> str:
-        if self._failure.is_held_back:
-            return 'held_back'
-        return self._failure.outcome or self._failure.kind.name.lower()
-
-    def _note_failure(self) -> None:
-        node, label, failure = self._node, self._record.label, self._failure
-        meta_label = node.settings.oracle_label
+    def _tell_failure(self) -> None:
+        failure = self._failure
         told = (' ' + failure.text if failure.is_held_back
                 else ' failed: ' + (failure.details or in_words(failure)))
-        smach.logwarn('{}/{}{}'.format(node.path, label, told))
-        self._record.left_by(self._what_failed(), meta_label)
+        smach.logwarn('{}/{}{}'.format(self._node.path, self._record.label, told))
+
+    def _note_passage(self, outcome: str, what: str) -> None:
+        node, label, meta_label = self._node, self._record.label, self._node.settings.oracle_label
+        self._record.left_by(what, meta_label)
         save_rates(node)
-        node.emit(EventKind.TRANSITION, state=label, outcome=failure.outcome, target=meta_label)
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=meta_label)
 
     def _note_superseded(self, outcome: str) -> None:
         node, record = self._node, self._record
@@ -115,6 +132,7 @@ class OracleVisit:
         leave_for(node, target)
         if missing:
             node.warn('jumping there without its input keys {}'.format(', '.join(missing)), target)
+        self._note_entry(target)
         self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,
                     verdict.text)
 
@@ -124,8 +142,14 @@ class OracleVisit:
                         target=route.target, by=verdict.by, text=verdict.text)
         if not route.is_state:
             return self._terminate(route.target)
+        self._note_entry(route.target)
         self._go_on(route.target, by=verdict.by)
         return None
+
+    def _note_entry(self, label: str) -> None:
+        """Note that the machine comes to this state by the oracle alone."""
+        if self._node.settings.still_running_s:
+            self._node.record(label).enter_by_oracle()
 
     def _give_up(self, verdict: Verdict) -> Optional[str]:
         ending, text = verdict.ending, verdict.text

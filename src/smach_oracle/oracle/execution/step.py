@@ -1,8 +1,10 @@
 """What happens around a state, off the short way of a plain success in container.py."""
+import time
 from typing import Any, Optional
 
 import smach
 
+from ..asking.question import AnswerKind
 from ..machine.repeats import note_visit
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
@@ -21,6 +23,7 @@ from ..recovery.failure import (
     visit_result,
 )
 from ..recovery.judging import HeldBack, Overrun, judge
+from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
 from .held_failure import HeldVisit, why_held
 from .oracle_visit import OracleVisit
@@ -103,11 +106,24 @@ class Step:
                 return HeldBack(why_not)
         node.emit(EventKind.STATE_START, state=record.label)
         blocked = node.tree.workers.blocked(state)
+        entered_by_oracle = record.entered_by_oracle
+        if entered_by_oracle:
+            record.forget_entry()
         if blocked:
             return Overrun(blocked)
-        if record.settings.time_limit_s is not None and node.tree.recover:
-            return self._execute_limited(state, record.settings.time_limit_s)
-        return state.execute(userdata)
+        begun_s = time.monotonic()
+        outcome: object = None
+        try:
+            if record.settings.time_limit_s is not None and node.tree.recover:
+                outcome = self._execute_limited(state, record.settings.time_limit_s)
+            elif entered_by_oracle:
+                outcome = WatchedVisit(node, record).execute(userdata)
+            else:
+                outcome = state.execute(userdata)
+            return outcome
+        finally:
+            if not (isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
+                record.took(time.monotonic() - begun_s)
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
@@ -137,6 +153,10 @@ class Step:
         if node.is_left_behind():
             stop_left_behind(node)
             return None
+        if isinstance(outcome, TakenOut):
+            if not (self._machine.preempt_requested() or smach.is_shutdown()):
+                return self._taken_out(outcome)
+            outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
         stopping = self._machine.preempt_requested() or smach.is_shutdown()
         if self._machine.preempt_requested():
@@ -192,6 +212,18 @@ class Step:
             return self._end_unrecovered(self._natural_ending(failure), failure)
         return OracleVisit(node, record, failure).run(context, continuous)
 
+    def _taken_out(self, taken: TakenOut) -> Optional[str]:
+        """Go as an expert has answered while the state still ran; what it ended with is nothing."""
+        node, record, answer = self._node, self._record, taken.answer
+        recall_preempts(self._machine._states[record.label])
+        if taken.error is not None:
+            smach.logwarn('{}/{}: raised {!r} when it was preempted'.format(
+                node.path, record.label, taken.error))
+        outcome = taken.outcome if isinstance(taken.outcome, str) else ''
+        node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
+                                 AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
+        return OracleVisit(node, record, taken.failure).follow(answer, outcome)
+
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings
         return failure.route is not None and author_recovers(
@@ -207,7 +239,7 @@ class Step:
 
         An overrun, and a state that was held back, end it as preempted, all else as it would.
         """
-        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.NOT_A_FAILURE)
+        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
                 and PREEMPTED in self._machine.get_registered_outcomes()):
             return ContainerEnding(outcome=PREEMPTED)
         return self._natural_ending(failure)

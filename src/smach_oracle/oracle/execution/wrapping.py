@@ -84,7 +84,7 @@ def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested:
         for container in containers_in(machine):
             container._remove_oracle()
         top.tree.recover = tree.recover
-        top.name = name or top.name
+        top.take_name(name)
         if tree.expert is not None:
             top.tree.expert = tree.expert
         if tree.health.given is not None:

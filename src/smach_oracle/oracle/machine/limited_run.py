@@ -1,4 +1,4 @@
-"""Executions of states with a time limit, as the machines see them that run inside."""
+"""Executions of states whose time is watched, as the machines see them that run inside."""
 import contextlib
 import contextvars
 import threading
@@ -12,7 +12,7 @@ _LEAST_S = 0.05
 
 
 class LimitedRun:
-    """One execution of a state with a time limit.
+    """One execution of a state that has a time limit, or is asked about when it takes long.
 
     Its time stands still while a person is asked about something inside. Once it is abandoned, the
     machines inside stop at their next state boundary. Safe to use from several threads.
@@ -85,6 +85,16 @@ def runs_of_thread() -> Tuple[LimitedRun, ...]:
 def enter(run: LimitedRun) -> None:
     """Be inside `run` from now on; to be called in a context of its own."""
     _AROUND.set(_AROUND.get() + (run,))
+
+
+@contextlib.contextmanager
+def inside(run: LimitedRun) -> Iterator[None]:
+    """Be inside `run` within it, in the caller's own thread."""
+    token = _AROUND.set(_AROUND.get() + (run,))
+    try:
+        yield
+    finally:
+        _AROUND.reset(token)
 
 
 @contextlib.contextmanager

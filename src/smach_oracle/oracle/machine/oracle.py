@@ -57,6 +57,15 @@ class Oracle:
         return self._node.below[-1] if self._node.below else self._node.name
 
     @property
+    def is_named(self) -> bool:
+        """Whether the machine was given a name, or has taken one."""
+        return self._node.is_named
+
+    def take_name(self, name: str) -> None:
+        """Let the machine go by this name from its next trial on."""
+        self._node.take_name(name)
+
+    @property
     def path(self) -> str:
         """Container path, such as TOP/PICK."""
         return self._node.path

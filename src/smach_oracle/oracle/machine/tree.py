@@ -12,6 +12,7 @@ import smach
 from ..asking.question import Expert
 from ..records.events import EventSource
 from ..settings.health import HealthFunction
+from .alarm_clock import AlarmClock
 from .health_watch import HealthWatch
 from .trial_budget import TrialBudget
 from .workers import Workers
@@ -49,6 +50,7 @@ class Tree:
         self.numbers_visits = False
         self._visits = itertools.count(1)
         self.health = HealthWatch(health)
+        self.clock = AlarmClock()
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last

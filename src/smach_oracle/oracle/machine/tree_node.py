@@ -51,6 +51,7 @@ class TreeNode:
         self.machine = machine
         self.parent: Optional['TreeNode'] = None
         self.below: Labels = ()
+        self.is_named = bool(name)
         self.name = name or DEFAULT_NAME
         self.strict = True
         self.nested = True
@@ -62,6 +63,11 @@ class TreeNode:
         self.preempt_told = False
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
         self.join(tree)
+
+    def take_name(self, name: str) -> None:
+        """Go by this name, unless it is empty."""
+        if name:
+            self.name, self.is_named = name, True
 
     def join(self, tree: Tree) -> None:
         """Become part of a tree."""
@@ -112,7 +118,7 @@ class TreeNode:
         return not self.is_left_behind()
 
     def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
-        """Return the executions with a time limit inside which this container executes.
+        """Return the watched executions inside which this container executes.
 
         Those of its thread, and, as a Concurrence has threads of its own, those of the states
         above it.

@@ -44,7 +44,8 @@ class Workers:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.abandoned: Dict[int, _Left] = {}
-        # states with a time limit whose thread lives
+        # states with a time limit whose thread lives, and those that are asked about if they take
+        # long
         self.under_way: Dict[int, LimitedRun] = {}
 
     def blocked(self, target: object) -> str:

@@ -54,6 +54,9 @@ class FailureKind(IntEnum):
     EXCEPTION = 3
     UNREGISTERED_OUTCOME = 4
     TIME_LIMIT = 5
+    # none, but causes to ask an expert about a state
+    STILL_RUNNING = 6
+    HELD_BACK = 7  # the state was not executed, since it is not to be repeated
 
 
 class Event(NamedTuple):

@@ -68,8 +68,9 @@ class StateRecord:
     """
 
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
-                 'has_preconditions', 'special', 'view', '_estimator', '_lock', '_learned',
-                 '_retired', '_edges', '_visits', '_visits_before')
+                 'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
+                 '_is_special', '_estimator', '_lock', '_learned', '_retired', '_edges', '_visits',
+                 '_visits_before')
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
@@ -79,6 +80,10 @@ class StateRecord:
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
         self.fallbacks = 0
+        # s, of the visits that ended by themselves and were timed; a plain success that nobody
+        # observes is not
+        self.longest_s: Optional[float] = None
+        self.entered_by_oracle = False  # at the coming visit
         self._learned = 0  # successes by way of edges that the estimator knows
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
@@ -104,7 +109,22 @@ class StateRecord:
 
     def be_special(self, special: bool) -> None:
         """Have more done than to execute the state, which a time limit wants in any case."""
-        self.special = special or self.settings.time_limit_s is not None
+        self._is_special = special or self.settings.time_limit_s is not None
+        self.special = self._is_special or self.entered_by_oracle
+
+    def enter_by_oracle(self) -> None:
+        """Note that the oracle leads to the state, which is visited next."""
+        self.entered_by_oracle = self.special = True
+
+    def forget_entry(self) -> None:
+        """Note that the visit to which the oracle led begins now, or never."""
+        self.entered_by_oracle = False
+        self.special = self._is_special
+
+    def took(self, seconds: float) -> None:
+        """Note how long a visit has taken that ended by itself."""
+        if self.longest_s is None or seconds > self.longest_s:
+            self.longest_s = seconds
 
     def _up_to_date(self) -> Estimator:
         """The estimator, told of the successes by way of edges; to be called with the lock held."""
@@ -161,6 +181,7 @@ class StateRecord:
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = 0
+        self.forget_entry()  # of a trial that ended before the visit began
         self._visits_before = self._visits + self._by_edges()
 
     def left_by(self, outcome: str, target: str) -> None:

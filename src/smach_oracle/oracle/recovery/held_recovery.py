@@ -30,6 +30,6 @@ class HeldRecovery(Recovery):
         if not repeated_by_going_to(self._node, label):
             return self._jump(label)
         self._failure = self._failure._replace(
-            kind=FailureKind.NOT_A_FAILURE,
+            kind=FailureKind.HELD_BACK,
             text='failed while the robot was not well, and is not repeated by itself')
         return super().run()

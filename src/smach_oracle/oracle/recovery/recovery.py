@@ -5,7 +5,7 @@ from typing import Any, List, Mapping, Optional, Tuple
 import smach
 
 from ..asking.inquiry import Inquiry
-from ..asking.question import Answer, AnswerKind, Expert, Question, names
+from ..asking.question import Answer, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
 from ..decision.sentence import (
@@ -25,6 +25,7 @@ from ..settings.failing_outcomes import PREEMPTED
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from .failure import ContainerEnding, Failure, natural_ending
+from .obeying import verdict_of
 from .precondition_runner import PreconditionRunner
 from .question_making import Account, make_question
 from .verdict import Verdict, VerdictKind
@@ -283,29 +284,28 @@ class Recovery:
     # -- verdicts
 
     def _obey(self, answer: Answer) -> Verdict:
-        remapping = self._machine._remappings.get(self._record.label) or {}
-        for key, value in (answer.outputs or {}).items():
-            self._watch.gate[remapping.get(key, key)] = value
-        if answer.kind is AnswerKind.GOTO:
-            return self._jump(answer.state, answer.by, answer.why)
-        if answer.kind is AnswerKind.SUPERSEDE:
-            return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by,
-                           text=answer.why)
-        return self._give_up(answer.why, answer.outcome, answer.by)
+        return self._when_well(verdict_of(answer, self._node, self._record.label, self._watch,
+                                          self._natural_ending))
 
-    def _jump(self, target: str, by: str = '', text: str = '') -> Verdict:
+    def _jump(self, target: str, text: str = '') -> Verdict:
         """Go to a state, once the robot is well."""
-        health = self._node.tree.health
-        why = health.why_unwell(self.stopped) if health.is_set else ''
-        if why and not self._wait_until_well('is to be left for ' + target, why):
-            return self._preempted()
-        return Verdict(VerdictKind.JUMP, state=target, by=by, text=text,
-                       written=frozenset(self._watch.written()))
+        return self._when_well(Verdict(VerdictKind.JUMP, state=target, text=text,
+                                       written=frozenset(self._watch.written())))
 
-    def _give_up(self, text: str, outcome: str = '', by: str = '') -> Verdict:
+    def _when_well(self, verdict: Verdict) -> Verdict:
+        """Return a verdict, after a wait where it leads to a state and the robot is not well."""
+        health = self._node.tree.health
+        if verdict.kind is not VerdictKind.JUMP or not health.is_set:
+            return verdict
+        why = health.why_unwell(self.stopped)
+        if why and not self._wait_until_well('is to be left for ' + verdict.state, why):
+            return self._preempted()
+        return verdict
+
+    def _give_up(self, text: str, outcome: str = '') -> Verdict:
         """End the container with an outcome, or ('') as the failure would have ended it."""
         ending = ContainerEnding(outcome=outcome) if outcome else self._natural_ending()
-        return Verdict(VerdictKind.GIVE_UP, ending=ending, by=by, text=text)
+        return Verdict(VerdictKind.GIVE_UP, ending=ending, text=text)
 
     def _end_unaided(self) -> Verdict:
         """End the container as without an oracle, since the trial's time is over."""

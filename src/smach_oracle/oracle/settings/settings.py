@@ -63,6 +63,8 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'deadline_s': values.deadline,
     'on_no_answer': values.on_no_answer,
     'escalate': values.flag,
+    'still_running_s': values.number(0, math.inf, 'seconds from 0'),
+    'still_running_factor': values.number(1, math.inf, 'a number from 1'),
     'watch_preconditions': values.flag,
     'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY),
                                    _MAX_HISTORY),
@@ -101,6 +103,10 @@ class Settings:
     healthy: Tuple[HealthCondition, ...] = ()  # what must hold for the robot to be well
     # how long it must hold after a failure and at the end of a wait
     health_settle_s: float = 0.5
+    # a state that the oracle has entered is asked about when it takes so long, and so many times as
+    # long as ever before; 0 s: never
+    still_running_s: float = 60.0
+    still_running_factor: float = 10.0
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

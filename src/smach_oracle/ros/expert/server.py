@@ -19,6 +19,7 @@ from smach_oracle.msg import (
     ExpertQueryResult,
     OpenQueries,
     OpenQuery,
+    OracleEvent,
 )
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.srv import (
@@ -137,8 +138,10 @@ class ExpertQueryServer:
             _end(handle, settled)
             return
         if not goal.interface:
-            rospy.loginfo('Question %s of %s: %s in %s failed', goal.query_id, goal.robot,
-                          goal.failed_state, goal.container_path)
+            still_runs = goal.failure_kind == OracleEvent.STILL_RUNNING
+            rospy.loginfo('Question %s of %s: %s in %s %s', goal.query_id, goal.robot,
+                          goal.failed_state, goal.container_path,
+                          'still runs' if still_runs else 'failed')
         self._askers.setdefault(goal.query_id, []).append(_AskingGoal(handle))
         self._send_claim(goal.query_id, handle)
         self._changed()

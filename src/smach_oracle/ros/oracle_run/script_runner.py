@@ -21,7 +21,6 @@ from typing import (
     NamedTuple,
     Optional,
     Sequence,
-    Tuple,
 )
 
 import smach
@@ -32,6 +31,7 @@ from smach_oracle.oracle.settings.settings import Settings
 
 from .. import attachment
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python
+from ..machine_names import machine_names
 from ..shutdown import ShutdownGuard
 from .precondition_labels import is_label_elsewhere, misplaced_preconditions
 from .python_names import check_python_name
@@ -39,7 +39,8 @@ from .refusal import USAGE_ERROR, Refusal
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
-OPTIONS_WITH_VALUE = ('--config', '--record', '--record-topic', '--policy', '--rates-file')
+OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--record',
+                      '--record-topic')
 
 
 class CommandLine(NamedTuple):
@@ -87,6 +88,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--policy', choices=sorted(POLICIES), help='how the oracle decides')
     parser.add_argument('--rates-file', metavar='FILE',
                         help='learned failure rates are kept here across runs')
+    parser.add_argument('--name', default='',
+                        help="name of the first machine (default: the node's)")
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
     parser.add_argument('--without-oracle', action='store_true',
                         help='recover nothing: events and bags only, everything ends as without us')
@@ -105,6 +108,7 @@ class Invocation(NamedTuple):
     overrides: Mapping[str, Any]
     recover: bool
     options: attachment.RecordingOptions
+    name: str
 
 
 def parse(args: Sequence[str]) -> Invocation:
@@ -112,6 +116,8 @@ def parse(args: Sequence[str]) -> Invocation:
     line = split(args)
     parser = make_parser()
     given = parser.parse_args(line.options)
+    if '/' in given.name:
+        parser.error('--name {}: a name without / is wanted'.format(given.name))
     if line.script is None or line.script == NONE:
         parser.error('which SCRIPT? (under roslaunch: script:=FILE)')
     script = path_of(line.script)
@@ -127,7 +133,7 @@ def parse(args: Sequence[str]) -> Invocation:
         overrides['nested'] = False
     record = os.path.abspath(path_of(given.record)) if given.record else ''
     return Invocation(script, line.script_args, given.config, overrides, not given.without_oracle,
-                      attachment.RecordingOptions(record, tuple(given.record_topic)))
+                      attachment.RecordingOptions(record, tuple(given.record_topic)), given.name)
 
 
 def _why_not_readable(script: str) -> str:
@@ -193,18 +199,12 @@ def _located(loaded: LoadedSettings) -> Iterator[None]:
 
 
 class MachineWrapper:
-    """Wraps the script's machines, and finds names for them.
-
-    The first is named after the script; machines of the same structure share a name, so that a
-    script that builds a new one for each trial goes on learning where it was.
-    """
+    """Wraps the script's machines."""
 
     def __init__(self, invocation: Invocation, refusal: Refusal) -> None:
         self._invocation = invocation
         self._refusal = refusal
-        self._names: Dict[Tuple[Any, ...], str] = {}
-        file_name = os.path.basename(invocation.script)
-        self._stem = os.path.splitext(file_name)[0].upper().replace(' ', '_')
+        self._is_first = True
 
     def __call__(self, machine: smach.StateMachine) -> None:
         """Swap the machine's class.
@@ -221,8 +221,9 @@ class MachineWrapper:
             settings = read_settings(loaded)
             if self._invocation.recover:
                 self._check_preconditions(machine, settings)
+            self._is_first = False
             OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
-                                 name=self.name(machine), strict=False,
+                                 name=machine_names().name_of(machine), strict=False,
                                  recover=self._invocation.recover)
 
     def _check_preconditions(self, machine: smach.StateMachine, settings: Settings) -> None:
@@ -231,21 +232,14 @@ class MachineWrapper:
         One file serves all machines of a script, and not each of them has every state.
         """
         for problem in misplaced_preconditions(machine, settings):
-            if not self._names and not is_label_elsewhere(str(problem.value), machine):
+            if self._is_first and not is_label_elsewhere(str(problem.value), machine):
                 raise problem
-            smach.logwarn('{}: {}'.format(self.name(machine), problem))
+            smach.logwarn('A machine of the script: {}'.format(problem))
 
-    def name(self, machine: smach.StateMachine) -> str:
-        """A name for the machine, such as "PICK_AND_PLACE".
 
-        A machine of another structure in the same script is "PICK_AND_PLACE_2".
-        """
-        structure = (tuple(machine.get_children()),
-                     tuple(sorted(machine.get_registered_outcomes())))
-        if structure not in self._names:
-            count = len(self._names) + 1
-            self._names[structure] = self._stem if count == 1 else '{}_{}'.format(self._stem, count)
-        return self._names[structure]
+def named_after(script: str) -> str:
+    """Return a machine's name for a script: PICK_AND_PLACE for pick_and_place.py."""
+    return os.path.splitext(os.path.basename(script))[0].upper().replace(' ', '_')
 
 
 def run_script(script: str, script_args: Sequence[str]) -> None:
@@ -298,6 +292,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
         sys.exit(USAGE_ERROR)
     from .interception import Interception
     attachment.configure(invocation.options)
+    machine_names().given, machine_names().script = invocation.name, named_after(invocation.script)
     guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)

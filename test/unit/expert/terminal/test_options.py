@@ -7,6 +7,7 @@ from smach_oracle.expert.terminal.options import choose, options
 from smach_oracle.msg import ExpertDecision
 from smach_oracle.oracle.asking.question import OutcomeChoice
 from smach_oracle.oracle.errors import AnswerError
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.ros.expert.answer_rules import check_decision
 from smach_oracle.ros.expert.question_messages import to_goal
 
@@ -20,6 +21,15 @@ def test_every_answer_has_a_key():
                                              ('s2', 'supersede aborted'), ('g', 'give_up'),
                                              ('g1', 'give_up succeeded'), ('g2', 'give_up aborted'),
                                              ('i1', 'interface assist')]
+
+
+def test_a_state_that_still_runs_may_be_waited_for():
+    still = to_goal(make_question(failure_kind=FailureKind.STILL_RUNNING), '/robot', rospy.Time(1))
+    assert [option.words for option in options(still)[:3]] == ['goto DETECT', 'wait on',
+                                                               'goto PLACE']
+    for typed in ('2', 'wait on', 'PICK'):
+        decision = choose(typed, options(still)).decision()
+        assert (decision.kind, decision.state) == (ExpertDecision.GOTO, 'PICK')
 
 
 def test_outcomes_with_which_the_machine_goes_on_come_first():

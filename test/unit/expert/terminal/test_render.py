@@ -54,6 +54,16 @@ def test_the_whole_question_is_there_and_fits_the_terminal(width):
     assert all(len(line.rstrip('\n')) <= width for line in text.splitlines())
 
 
+def test_a_state_that_still_runs_may_be_waited_for():
+    text = shown(render.question(goal(failure_kind=FailureKind.STILL_RUNNING, outcome='',
+                                      text='PICK still runs after 62 s', interfaces=()), 1.0))
+    for part in ('PICK still runs', 'PICK still runs after 62 s', '2   wait on (PICK runs on)',
+                 'PICK is preempted by every answer but to wait on', '1   DETECT',
+                 'end as a failure would have ended PICK_AND_PLACE'):
+        assert part in text, part
+    assert 'asked because' not in text
+
+
 def test_what_is_not_there_takes_no_room():
     text = shown(
         render.question(

@@ -166,7 +166,12 @@ FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT'
      # the author's own way from a failure while the robot was not well
      ([FAILED, JUMPED, event(EventKind.TRANSITION, data={'not_counted': True})], (0, 0)),
      ([FAILED, JUMPED, event(EventKind.HEALTH_WAIT_START), event(EventKind.HEALTH_WAIT_END),
-       event(EventKind.TRANSITION)], (1, 1))])
+       event(EventKind.TRANSITION)], (1, 1)),
+     # asked while it still ran: wait on, and taken out
+     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PICK'),
+       event(EventKind.TRANSITION)], (1, 1)),
+     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PLACE'),
+       event(EventKind.TRANSITION)], (0, 1))])
 def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, recovery_counts):
     assert scored(*events) == recovery_counts
 

@@ -61,8 +61,9 @@ export interface Question {
   robot: string;
   path: string; // of the container
   state: string; // that failed
-  failed: boolean; // false: it is held back, since it is not repeated by itself
+  stands: string; // 'failed', 'still runs' or 'is held back', to follow its name
   what: string; // went wrong, in words
+  running: boolean; // it still runs: to go to it is to wait on
   outcome: string;
   text: string; // of an exception
   class: FailureClass;

@@ -95,8 +95,15 @@ export class AnswerForm {
     const { choices } = this.question;
     const first = choices.length <= MOST_AT_ONCE ? choices : likeliest(this.question);
     const rest = choices.filter((choice) => !first.includes(choice));
-    return [h('h4', {}, 'Go to'), choicesBox(first.map((choice, index) => (
+    return [h('h4', {}, 'Go to', this.preemptHint()), choicesBox(first.map((choice, index) => (
       this.state(choice, String(index + 1))))), rest.length > 0 && this.otherStates(rest)];
+  }
+
+  /** @returns {Child} */
+  preemptHint() {
+    const { state, running } = this.question;
+    return running && h('span', { class: 'dim' },
+      ' · every answer but to wait on preempts ', state);
   }
 
   /** @param {StateChoice[]} choices */
@@ -120,7 +127,7 @@ export class AnswerForm {
    */
   state(choice, key) {
     const { state, preconditions, blocked } = choice;
-    const words = stateLines(choice, this.question.state);
+    const words = stateLines(choice, this.question);
     if (preconditions.length) {
       const list = new PreconditionList(preconditions);
       this.preconditions.set(state, list);
@@ -154,8 +161,9 @@ export class AnswerForm {
 
   /** @returns {Child} */
   giveUp() {
-    const { give_up: outcomes, path } = this.question;
-    const asFailed = h('strong', {}, 'as the failure would have ended ', path);
+    const { give_up: outcomes, path, running } = this.question;
+    const asFailed = h('strong', {}, running ? 'as a failure' : 'as the failure',
+      ' would have ended ', path);
     return [h('h4', {}, 'Give up'), choicesBox([this.choice('give_up', '', 'g', asFailed),
       ...outcomes.map((outcome) => (
         this.choice('give_up', outcome, '', h('strong', {}, 'with ', outcome))))], 'short')];

@@ -31,6 +31,7 @@ export class FollowUp {
     /** @type {TrialEvent[]} */
     this.events = []; // of the question's trial
     this.since = 0; // ms, since the answer; 0 before
+    this.silent = false; // it does nothing new: the state runs on
     this.steps = h('ol', { class: 'steps' });
     this.hint = h('p', { class: 'dim' });
     this.title = h('h3', { class: 'done' });
@@ -42,8 +43,13 @@ export class FollowUp {
 
   /** @param {Pick<Answer, 'kind' | 'name'>} answer */
   begin(answer) {
-    setText(this.title, '✓ The robot has your answer: ' + answerWords(answer, this.question.state));
-    setText(this.hint, 'Waiting for what it does…');
+    const { state, running } = this.question;
+    const waits = running && answer.kind === 'goto' && answer.name === state;
+    this.silent = waits;
+    setText(this.title, '✓ The robot has your answer: '
+      + (waits ? 'wait on' : answerWords(answer, state)));
+    setText(this.hint, waits ? state + ' runs on. You are asked again if it takes twice as long.'
+      : 'Waiting for what it does…');
     this.since = Date.now();
     this.watch();
   }
@@ -64,11 +70,12 @@ export class FollowUp {
       .slice(0, MOST_SHOWN);
     redraw(this.steps, shown.map((event) => h('li', { class: event.kind },
       event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
+    if (this.silent && !shown.length) return;
     setText(this.hint, shown.some((event) => event.kind === 'query_opened') ? AGAIN : '');
   }
 
   update() {
-    if (!this.since || this.steps.childElementCount) return;
+    if (!this.since || this.silent || this.steps.childElementCount) return;
     if (Date.now() - this.since > SILENCE_MS) {
       setText(this.hint, 'What it does next is not known: nothing is heard on '
         + this.question.robot + '/oracle/events.');

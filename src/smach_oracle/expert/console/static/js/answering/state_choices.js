@@ -31,14 +31,17 @@ export function likeliest({ choices, state, supersede, history }) {
 /**
  * What a button says of a state.
  * @param {StateChoice} choice
- * @param {string} failed the state that failed
+ * @param {Pick<Question, 'state' | 'running'>} question
  * @returns {Child[]}
  */
-export function stateLines(choice, failed) {
+export function stateLines(choice, { state: failed, running }) {
+  const same = choice.state === failed;
   return [
     h('span', { class: 'row' },
-      h('strong', { class: 'ellipsis' }, breakable(choice.state, '_')),
-      choice.state === failed && chip('again', '', 'The state that failed'),
+      h('strong', { class: 'ellipsis' }, same && running && 'Wait on: ',
+        breakable(choice.state, '_')),
+      same && (running ? chip('runs on', '', 'You are asked again if it takes twice as long')
+        : chip('again', '', 'The state that failed')),
       h('span', { class: 'spacer' }), successBar(choice.success)),
     h('span', { class: 'chips' }, stateChips(choice, failed)),
   ];

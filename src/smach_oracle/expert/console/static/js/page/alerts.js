@@ -63,11 +63,10 @@ export class Alerts {
   }
 
   /** @param {Question} question */
-  notify({ state, failed, robot, key }) {
+  notify({ state, stands, robot, key }) {
     if (!document.hidden || !CAN_NOTIFY || Notification.permission !== 'granted') return;
     try {
-      const shown = new Notification(state + (failed ? ' failed' : ' is held back'),
-        { body: robot + ' asks', tag: key });
+      const shown = new Notification(state + ' ' + stands, { body: robot + ' asks', tag: key });
       shown.onclick = () => { window.focus(); shown.close(); };
     } catch (err) { /* some phones know the class, and allow it to service workers alone */ }
   }

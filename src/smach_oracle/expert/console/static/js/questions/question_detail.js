@@ -71,10 +71,10 @@ export class QuestionDetail {
   }
 
   head() {
-    const { state, failed, robot, path } = this.question;
+    const { state, stands, robot, path } = this.question;
     return h('header', { class: 'detail-head' },
       h('button', { class: 'back', 'aria-label': 'Back to the list', onclick: this.onLeave }, '‹'),
-      h('div', {}, h('h2', {}, state, failed ? ' failed' : ' is held back'),
+      h('div', {}, h('h2', {}, state, ' ', stands),
         h('p', { class: 'dim' }, robot, ' · ', path)),
       h('span', { class: 'spacer' }), this.time);
   }

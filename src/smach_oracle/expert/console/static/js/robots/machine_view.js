@@ -37,7 +37,8 @@ function machineState(store, robot) {
   /** @type {MachineState['failed']} */
   const failed = { ...live.failed };
   for (const question of store.questions) {
-    if (question.robot === robot) failed[question.path] = { state: question.state };
+    const { path, state, running } = question;
+    if (question.robot === robot && !running) failed[path] = { state };
   }
   return { ...live, failed };
 }

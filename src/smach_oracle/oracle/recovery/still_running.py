@@ -1,0 +1,221 @@
+"""A state that the oracle has entered and that takes much longer than ever before.
+
+Without an oracle the machine might have ended before it came to this state. A state without a time
+limit is never abandoned, so a person is asked, while it runs, whether to wait on.
+"""
+import threading
+import time
+from typing import Any, List, Mapping, NamedTuple, Optional
+
+import smach
+
+from ..asking.inquiry import Inquiry, Reply
+from ..asking.question import Answer, AnswerKind, Expert, Question
+from ..decision.sentence import ran_in_words, still_running_sentence
+from ..machine.limited_run import LimitedRun, inside, standing_still
+from ..machine.repeats import why_closed
+from ..machine.tree_node import TreeNode
+from ..records.events import EventKind, FailureKind
+from ..records.state_record import StateRecord
+from .failure import Failure
+from .question_making import Account, make_question
+
+
+class TakenOut(NamedTuple):
+    """In place of the outcome of a state that an expert's answer ended while it still ran."""
+
+    answer: Answer
+    failure: Failure  # as if it had failed, for giving up as the failure would
+    outcome: Any
+    error: Optional[Exception]
+
+
+class WatchedVisit:
+    """One visit of a state that the oracle has entered.
+
+    The machine's thread runs the state. The tree's alarm clock tells when it has run too long; each
+    question has a thread of its own, in which this is an `inquiry.Asker`.
+    """
+
+    def __init__(self, node: TreeNode, record: StateRecord) -> None:
+        self._node = node
+        self._machine = node.machine
+        self._record = record
+        self._state: smach.State = node.machine._states[record.label]
+        self._run = LimitedRun()  # its time stands still while a person is asked inside the state
+        self._begun_s = time.monotonic()
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        self._answer: Optional[Answer] = None
+        self._open_id = ''  # of the question that is open
+        self.tried: List[str] = []
+        self.question_cancelled = threading.Event()
+
+    def execute(self, userdata: smach.Remapper) -> object:
+        """Execute the state; return its outcome, or a TakenOut.
+
+        It raises what the state raises.
+        """
+        node, settings = self._node, self._node.settings
+        longest_s = self._record.longest_s or 0.0
+        limit_s = max(settings.still_running_s, settings.still_running_factor * longest_s)
+        under_way = node.tree.workers.under_way
+        under_way[id(self._state)] = self._run
+        node.tree.clock.ring_in(limit_s, self._ring)
+        outcome, error = None, None
+        try:
+            with inside(self._run):
+                outcome = self._state.execute(userdata)
+        except Exception as err:
+            error = err
+        finally:
+            under_way.pop(id(self._state), None)
+            answer = self._end()
+        if answer is not None:
+            return TakenOut(answer, self._failure(), outcome, error)
+        if error is not None:
+            raise error
+        return outcome
+
+    def _end(self) -> Optional[Answer]:
+        """The state has ended: close the question; return the answer that has ended it, if any."""
+        with self._lock:
+            self._ended.set()
+        self._node.tree.clock.forget(self._ring)
+        self.question_cancelled.set()
+        self._close('{} has ended'.format(self._record.label))
+        return self._answer
+
+    def _ran_s(self) -> float:
+        return time.monotonic() - self._begun_s
+
+    # -- asking; in threads of its own
+
+    def _ring(self) -> None:
+        left_s = self._run.take_stood_s()
+        if left_s:
+            self._node.tree.clock.ring_in(left_s, self._ring)
+        else:
+            threading.Thread(target=self._ask, name='smach_oracle still running',
+                             daemon=True).start()
+
+    def _ask(self) -> None:
+        expert = self._node.tree.expert
+        if self.stopped():
+            return
+        if expert is None:
+            self.warn(self._sentence())
+            return
+        reply = self._inquire(expert)
+        if self.stopped():
+            self._close(self._why_stopped())
+        elif reply.answer is None:
+            self._expire(reply.why_none)
+            self._ask_later()
+        elif self._is_wait_on(reply.answer):
+            self._open_id = ''
+            smach.loginfo('{}: {} waits on'.format(self._place(), reply.answer.by or 'the expert'))
+            self._ask_later()
+        else:
+            self._open_id = ''
+            self._take_out(reply.answer)
+
+    def _inquire(self, expert: Expert) -> Reply:
+        with standing_still(self._node.runs_around):
+            return Inquiry(self, expert, 0.0).run()
+
+    def _ask_later(self) -> None:
+        """Ask again once it has run twice as long."""
+        with self._lock:
+            if not self._ended.is_set():
+                self._node.tree.clock.ring_in(self._ran_s(), self._ring)
+
+    def _is_wait_on(self, answer: Answer) -> bool:
+        return answer.kind is AnswerKind.GOTO and answer.state == self._record.label
+
+    def _take_out(self, answer: Answer) -> None:
+        """Preempt the state; once it has ended, the machine goes as answered."""
+        with self._lock:
+            if self._ended.is_set():
+                return
+            self._answer = answer
+            smach.logwarn('{}: is preempted, as {} answered {} {}'.format(
+                self._place(), answer.by or 'the expert', answer.kind.name.lower(),
+                answer.named()).rstrip())
+            try:
+                self._state.request_preempt()
+            except Exception as err:  # it is the user's
+                smach.logerr('request_preempt of {!r} failed: {!r}'.format(self._state, err))
+        if not self._ended.wait(self._record.settings.grace_period_s):
+            self.warn('does not heed its preempt and still runs; the machine waits for its end, '
+                      'and then goes as answered')
+
+    # -- its question
+
+    def stopped(self) -> bool:
+        """Whether the state has ended, or a preempt or a shutdown ends the visit."""
+        return (self._ended.is_set() or self._machine.preempt_requested() or smach.is_shutdown()
+                or self._node.is_left_behind())
+
+    def _why_stopped(self) -> str:
+        if self._machine.preempt_requested():
+            return 'preempted'
+        return 'left behind' if self._node.is_left_behind() else 'shutdown'
+
+    def make_question(self, deadline_s: float) -> Question:
+        """Return a new question about the state; `deadline_s`: seconds left, 0 without end."""
+        ran = ran_in_words(self._ran_s(), self._record.longest_s)
+        question = make_question(
+            self._node, self._record, self._failure(),
+            Account(False, 'it still runs after ' + ran, (), (), 'it runs on'), deadline_s)
+        with self._lock:
+            self._open_id = question.question_id
+        # no interface can do the work of a state that runs, and no function of a user's is called
+        # beside it
+        choices = tuple(choice._replace(blocked='', repeats=())
+                        if choice.state == self._record.label else choice
+                        for choice in question.choices)  # its own name means to wait on
+        return question._replace(choices=choices, interfaces=(), preconditions=None)
+
+    def _failure(self) -> Failure:
+        return Failure(self._record.label, FailureKind.STILL_RUNNING, '', self._sentence(), None)
+
+    def _sentence(self) -> str:
+        return still_running_sentence(self._record.label, self._ran_s(), self._record.longest_s)
+
+    def say_that_it_waits(self, question: Question) -> None:
+        """Log that somebody is asked, while the state runs on."""
+        smach.logwarn('{}: {} The expert is asked (question {})'.format(
+            self._place(), self._sentence(), question.question_id))
+
+    def states_now(self) -> Mapping[str, str]:
+        """Return the states by label, and why each cannot be entered now, '' where it can."""
+        node, own = self._node, self._record.label
+        return {label: '' if label == own else why_closed(node, label) for label in node.labels()}
+
+    def _close(self, why: str) -> None:
+        """Tell that the question, if one is open, was taken back."""
+        question_id = self._take_open()
+        if question_id:
+            self.emit(EventKind.QUERY_CANCELLED, query_id=question_id, text=why)
+
+    def _expire(self, why: str) -> None:
+        question_id = self._take_open()
+        if question_id:
+            self.emit(EventKind.QUERY_EXPIRED, query_id=question_id, text=why + '; it runs on')
+
+    def _take_open(self) -> str:
+        with self._lock:
+            question_id, self._open_id = self._open_id, ''
+        return question_id
+
+    def emit(self, kind: EventKind, **fields: Any) -> None:
+        """Tell the observers of a step that is about the state."""
+        self._node.emit(kind, state=self._record.label, **fields)
+
+    def warn(self, text: str) -> None:
+        """Log what the operator should know of this visit, and tell the observers."""
+        self._node.warn(text, self._record.label)
+
+    def _place(self) -> str:
+        return '{}/{}'.format(self._node.path, self._record.label)
