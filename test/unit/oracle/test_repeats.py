@@ -52,13 +52,15 @@ def test_prose_steps_back_no_further_than_a_guarded_state_allows():
     assert ('step_back', 'LIFT') in watched.decisions()
 
 
-def test_a_step_back_to_the_guarded_state_becomes_a_question():
-    machine, expert = guarded(pouring('aborted', 'aborted'), goto('PLACE'))
+@pytest.mark.parametrize('on_retry', ['confirm', 'never'])
+def test_a_step_back_to_the_guarded_state_becomes_a_question(on_retry):
+    machine, expert = guarded(pouring('aborted', 'aborted'), goto('PLACE'), on_retry=on_retry)
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'PLACE'), ('ask', '')]
     assert sentences(machine)[1] == ('PLACE keeps failing (2 of its last 2); going back to POUR '
                                      'would repeat POUR: asking an expert, 300 s')
     assert expert.questions[0].reason.endswith('going back to POUR would repeat POUR')
+    assert deciders(machine) == [Decider.POLICY, Decider.ON_RETRY]
 
 
 def test_a_step_back_across_a_guarded_state_becomes_a_question():

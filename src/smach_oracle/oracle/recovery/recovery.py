@@ -120,8 +120,8 @@ class Recovery:
 
     def _what_prevents(self, target: str) -> Tuple[Decider, str]:
         """Spend a recovery on going to a state; or return what prevents it, and why."""
-        for decider, why_not in ((Decider.POLICY, self._why_not),
-                                 (Decider.ON_RETRY, self._why_repeats)):
+        for decider, why_not in ((Decider.ON_RETRY, self._why_repeats),
+                                 (Decider.POLICY, self._why_not)):
             reason = why_not(target)
             if reason:
                 return decider, reason
