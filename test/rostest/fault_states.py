@@ -130,6 +130,31 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         self.assertEqual(task.wait(10.0), 0)  # the thread that hangs does not keep the process
 
+    def test_a_state_that_is_never_repeated_is_refused_with_the_reason(self) -> None:
+        task = self.start(STATES, 'aborts', states={'PICK': {'on_retry': 'never'}})
+        task.go_on()
+        question = self.expert.question(state='PICK')
+        self.assertIsNotNone(question, task.output())
+        self.assertIn('it is not repeated by itself', question.query.reason)
+        self.assertEqual([bool(choice.blocked) for choice in question.query.choices], [True, False])
+        reply = self.expert.answer(self.request(question, kind=ExpertDecision.GOTO, state='PICK'))
+        self.assertFalse(reply.ok)
+        self.assertIn('must not be repeated', reply.message)
+        self.answer(question, kind=ExpertDecision.SUPERSEDE, outcome='succeeded')
+        self.assertTrue(task.says('OUTCOME succeeded'), task.output())
+        self.assertEqual(task.output().count('VISIT 1'), 2)  # of PICK and of PLACE
+        self.assertNotIn('VISIT 2', task.output())
+
+    def test_an_expert_confirms_that_a_state_is_repeated(self) -> None:
+        task = self.start(STATES, 'aborts', states={'PICK': {'on_retry': 'confirm'}})
+        task.go_on()
+        question = self.expert.question(state='PICK')
+        self.assertIsNotNone(question, task.output())
+        self.assertEqual([choice.repeats for choice in question.query.choices], [['PICK'], []])
+        self.answer(question, kind=ExpertDecision.GOTO, state='PICK')
+        self.assertTrue(task.says('OUTCOME succeeded'), task.output())
+        self.assertIn('VISIT 2', task.output())
+
     def test_an_answer_that_names_an_unknown_state_is_refused_and_the_question_stays(self) -> None:
         task = self.start(STATES, 'aborts', max_recoveries=0)
         task.go_on()

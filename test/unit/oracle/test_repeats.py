@@ -52,13 +52,15 @@ def test_prose_steps_back_no_further_than_a_guarded_state_allows():
     assert ('step_back', 'LIFT') in watched.decisions()
 
 
-def test_a_step_back_to_the_guarded_state_becomes_a_question():
-    machine, expert = guarded(pouring('aborted', 'aborted'), goto('PLACE'))
+@pytest.mark.parametrize('on_retry', ['confirm', 'never'])
+def test_a_step_back_to_the_guarded_state_becomes_a_question(on_retry):
+    machine, expert = guarded(pouring('aborted', 'aborted'), goto('PLACE'), on_retry=on_retry)
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'PLACE'), ('ask', '')]
     assert sentences(machine)[1] == ('PLACE keeps failing (2 of its last 2); going back to POUR '
                                      'would repeat POUR: asking an expert, 300 s')
     assert expert.questions[0].reason.endswith('going back to POUR would repeat POUR')
+    assert deciders(machine) == [Decider.POLICY, Decider.ON_RETRY]
 
 
 def test_a_step_back_across_a_guarded_state_becomes_a_question():
@@ -165,7 +167,25 @@ def test_a_question_says_what_would_come_again_behind_each_choice():
     machine, expert = guarded(states, give_up(), max_recoveries=0)
     machine.run()
     assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
-        'DETECT': ('POUR',), 'POUR': ('POUR',), 'LIFT': (), 'PLACE': (), 'LATER': ('POUR',)}
+        'DETECT': ('POUR',), 'POUR': ('POUR',), 'LIFT': (), 'PLACE': (), 'LATER': ()}
+
+
+def test_behind_a_state_never_visited_it_says_where_the_authors_transitions_lead():
+    states = chain(ARM=chain(POUR=Scripted()), DETECT=Scripted('aborted'), LATER=Scripted(),
+                   LAST=Scripted(outcomes=('ok', 'again', 'aborted')))
+    states._transitions['LAST']['again'] = 'ARM'
+    machine, expert = guarded(states, give_up(), max_recoveries=0)
+    machine.run()
+    assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
+        'ARM': ('ARM/POUR',), 'DETECT': (), 'LATER': ('ARM/POUR',), 'LAST': ('ARM/POUR',)}
+
+
+def test_a_fallback_does_not_lead_into_the_unknown():
+    states = chain(POUR=Scripted(), PLACE=Scripted('aborted'), LATER=Scripted())
+    machine, _ = guarded(states, max_recoveries=0, on_no_answer='goto:LATER')
+    assert machine.run() == 'aborted'
+    assert ('this trial has not been in LATER, which may repeat POUR; stopping'
+            in machine.of(EventKind.WARNING)[-1].text)
 
 
 def test_a_state_that_was_not_done_is_no_repeat():

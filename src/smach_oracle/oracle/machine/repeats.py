@@ -3,7 +3,7 @@
 A repeat is a state that was executed in this trial and that the oracle leads the machine to again,
 at once or by the author's transitions from where it has jumped to. The author's own loops are none.
 """
-from typing import Iterator, NamedTuple, Tuple
+from typing import Iterator, NamedTuple, Set, Tuple
 
 from ..records.state_record import StateRecord
 from ..records.visit_marks import VisitMark
@@ -48,6 +48,38 @@ def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
     it has not been there in this trial, nobody knows what lies behind it, and they are all.
     """
     return tuple(done.name for done in _done_since(node, target))
+
+
+def has_visited(node: TreeNode, label: str) -> bool:
+    """Whether the machine has come to a state in this trial."""
+    return bool(node.records.marks.of(label).reached)
+
+
+def seen_behind(node: TreeNode, target: str) -> Tuple[str, ...]:
+    """Return what an expert is told of a state: what would come again if the machine went there.
+
+    Behind a state where it has not been in this trial, these are the guarded states to which the
+    author's transitions lead from there.
+    """
+    repeated = repeated_by_going_to(node, target)
+    if not repeated or has_visited(node, target):
+        return repeated
+    reached = _reached_from(node, target)
+    return tuple(name for name in repeated
+                 if any(_is_at_or_below(name, label) for label in reached))
+
+
+def _reached_from(node: TreeNode, target: str) -> Set[str]:
+    """Return the states to which the author's transitions lead from a state, with that itself."""
+    reached: Set[str] = set()
+    waiting = {target}
+    while waiting:
+        label = waiting.pop()
+        reached.add(label)
+        following = (node.machine._transitions.get(label) or {}).values()
+        waiting.update(each for each in following if each is not None and each not in reached
+                       and each in node.machine._states and not node.is_oracle(each))
+    return reached
 
 
 def leave_for(node: TreeNode, target: str) -> None:
@@ -111,8 +143,12 @@ def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:
 def _done_within(node: TreeNode, label: str) -> Iterator[_Done]:
     for each in nodes_of(node.machine):
         for done in _done_in(node, each):
-            if done.name == label or done.name.startswith(label + '/'):
+            if _is_at_or_below(done.name, label):
                 yield done
+
+
+def _is_at_or_below(name: str, label: str) -> bool:
+    return name == label or name.startswith(label + '/')
 
 
 def _done_in(node: TreeNode, each: TreeNode) -> Iterator[_Done]:

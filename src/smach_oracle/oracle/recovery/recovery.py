@@ -15,7 +15,7 @@ from ..decision.sentence import (
     going_would_repeat,
 )
 from ..machine.limited_run import standing_still
-from ..machine.repeats import repeated_by_going_to, why_closed
+from ..machine.repeats import has_visited, repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
@@ -121,8 +121,8 @@ class Recovery:
 
     def _what_prevents(self, target: str) -> Tuple[Decider, str]:
         """Spend a recovery on going to a state; or return what prevents it, and why."""
-        for decider, why_not in ((Decider.POLICY, self._why_not),
-                                 (Decider.ON_RETRY, self._why_repeats)):
+        for decider, why_not in ((Decider.ON_RETRY, self._why_repeats),
+                                 (Decider.POLICY, self._why_not)):
             reason = why_not(target)
             if reason:
                 return decider, reason
@@ -132,7 +132,12 @@ class Recovery:
     def _why_repeats(self, target: str) -> str:
         """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
         repeated = repeated_by_going_to(self._node, target)
-        return going_would_repeat(self._record.label, target, repeated) if repeated else ''
+        if not repeated:
+            return ''
+        if not has_visited(self._node, target):
+            return 'this trial has not been in {}, which may repeat {}'.format(
+                target, ', '.join(repeated))
+        return going_would_repeat(self._record.label, target, repeated)
 
     def _why_not(self, target: str) -> str:
         """Return why the machine cannot go on to a state by itself now, '' where it can."""
