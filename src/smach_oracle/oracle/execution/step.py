@@ -155,7 +155,8 @@ class Step:
             stop_left_behind(node)
             return None
         if self._author_recovers(failure):
-            node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
+            if not why:
+                node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
         return HeldVisit(node, record, failure, why).run(context, False)
