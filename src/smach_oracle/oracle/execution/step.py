@@ -25,9 +25,9 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
-from .held_failure import HeldVisit, why_held
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
+from .unwell_failure import UnwellVisit, why_unwell_after
 
 
 def before_step(node: TreeNode) -> bool:
@@ -171,9 +171,9 @@ class Step:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._preempted_ending(judged), judged)
         if node.tree.recover and node.tree.health.is_set:
-            why = why_held(node)
+            why = why_unwell_after(node)
             if why is not None:
-                return self._held(judged, why)
+                return self._failed_unwell(judged, why)
         return self._failed(judged)
 
     def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
@@ -185,17 +185,18 @@ class Step:
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
         return OracleVisit(node, record, failure).run(context, False)
 
-    def _held(self, failure: Failure, why: str) -> Optional[str]:
-        """Go on after a failure while the robot was not well; `why`: see `why_held`."""
+    def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
+        """Go on after a failure while the robot was not well; `why`: see `why_unwell_after`."""
         node, record = self._node, self._record
         if node.is_left_behind():
             stop_left_behind(node)
             return None
         if self._author_recovers(failure):
-            node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
+            if not why:
+                node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
-        return HeldVisit(node, record, failure, why).run(context, False)
+        return UnwellVisit(node, record, failure, why).run(context, False)
 
     def _failed(self, failure: Failure) -> Optional[str]:
         node, record = self._node, self._record

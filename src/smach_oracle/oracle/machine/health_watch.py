@@ -42,7 +42,7 @@ class _UnwellPhase:
         self.why = why
         self.since_s = time.monotonic()
         self.waiting = 0
-        self.held: Set[str] = set()  # paths of the states that wait, or have waited
+        self.states: Set[str] = set()  # paths of the states that wait, or have waited
         self.well_since_s: Optional[float] = None
         self.over = False
 
@@ -149,7 +149,7 @@ class HealthWatch:
             if phase is None:
                 phase = self._phase = _UnwellPhase(teller, state, why)
             phase.waiting += 1
-            phase.held.add(place)
+            phase.states.add(place)
             if is_first:
                 smach.logwarn('{} {} while the robot is not well ({}): waiting; no failure is '
                               'counted'.format(place, what, why))
@@ -189,7 +189,7 @@ class HealthWatch:
                 'the wait for the robot to be well was ended after {:.1f} s').format(waited_s)
         smach.loginfo('{}/{}: {}'.format(phase.teller.path, phase.state, text))
         phase.teller.emit(EventKind.HEALTH_WAIT_END, state=phase.state, outcome=outcome, text=text,
-                          data={'waited_s': round(waited_s, 3), 'held': sorted(phase.held)})
+                          data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)})
 
     def __getstate__(self) -> Dict[str, Any]:
         """Neither who is asked nor a wait travels with a pickled machine."""

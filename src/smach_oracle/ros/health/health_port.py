@@ -3,14 +3,13 @@ import threading
 from functools import partial
 from typing import List, NamedTuple, Optional, Sequence
 
-import genpy
 import rospy
 
 from smach_oracle.oracle.settings.health import HealthCondition, HealthKind
 
 from ..main_thread import outside_main_thread
 from .field_rules import why_unwell_by_message, why_unwell_by_status
-from .health_topics import HealthTopics, Latest, decoded
+from .health_topics import HealthTopics, Latest, UnreadableMessage, decoded
 
 SILENT_AFTER_S = 5.0  # of listening: then a warning names what was never heard of
 
@@ -57,7 +56,7 @@ class TopicHealth:
             return why_unwell_by_status(condition, heard.latest.heard())
         try:
             return why_unwell_by_message(condition, decoded(heard.latest.heard()))
-        except genpy.MessageError as err:
+        except UnreadableMessage as err:
             return 'its messages cannot be read ({})'.format(err)
 
     def _warn_of_silence(self) -> None:

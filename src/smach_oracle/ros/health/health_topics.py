@@ -110,20 +110,31 @@ class HealthTopics:
 _classes: Dict[Tuple[str, str], Any] = {}  # of types that are not installed, by name and md5
 
 
+class UnreadableMessage(Exception):
+    """A message of a type that is not installed here cannot be read."""
+
+
 def decoded(message: Any) -> Any:
     """A received message with its fields.
 
-    :raises genpy.MessageError: where its type is not installed here, and cannot be read either.
+    :raises UnreadableMessage: where its type is not installed here, and its definition does not
+        help.
     """
     if not isinstance(message, rospy.AnyMsg):
         return message
-    header = message._connection_header
+    try:
+        return _class_of(message._connection_header)().deserialize(message._buff)
+    except Exception as err:  # genpy raises what the definition and the bytes drive it to
+        raise UnreadableMessage('{}: {}'.format(type(err).__name__, err)) from err
+
+
+def _class_of(header: Dict[str, str]) -> Any:
+    """The class of a type by the definition that its publisher sends."""
     key = (header['type'], header['md5sum'])
     if key not in _classes:
-        definition = header.get('message_definition', '')
-        made = genpy.dynamic.generate_dynamic(header['type'], definition)
+        made = genpy.dynamic.generate_dynamic(header['type'], header['message_definition'])
         _classes[key] = made[header['type']]
-    return _classes[key]().deserialize(message._buff)
+    return _classes[key]
 
 
 def level_of(level: Any) -> int:

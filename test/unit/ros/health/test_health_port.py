@@ -1,5 +1,6 @@
 """The port that listens: what was never heard of, and what was heard too long ago."""
 import pytest
+import rospy
 from std_msgs.msg import Bool
 
 from smach_oracle.oracle.settings.health import checked_health
@@ -79,3 +80,30 @@ def test_all_that_is_wrong_is_named(warnings, now):
     now[0] += 7.0
     assert port.why_unwell() == 'motors: not heard of for 7 s'
     assert not warnings
+
+
+def undecoded(definition, data):
+    """A message of a type that is not installed here."""
+    message = rospy.AnyMsg()
+    message._buff = data
+    message._connection_header = {'type': 'away_msgs/Battery', 'md5sum': str(hash(definition)),
+                                  'message_definition': definition}
+    return message
+
+
+def test_a_type_that_is_not_installed_is_read_by_its_definition(warnings):
+    topics = FakeTopics()
+    port = port_of(topics, {'topic': '/battery', 'field': 'cells.1', 'at_least': 5})
+    topics.message('/battery').put(undecoded('uint8[] cells\n', b'\2\0\0\0\x09\x04'))
+    assert port.why_unwell() == 'battery: 4, at least 5'
+    topics.message('/battery').put(undecoded('uint8[] cells\n', b'\2\0\0\0\x09\x05'))
+    assert port.why_unwell() == ''
+
+
+@pytest.mark.parametrize('definition, data', [
+    ('nonsense', b''), ('', b'\1'), ('uint8[] cells\n', b'\2'), ('other_msgs/Cell cell\n', b'')])
+def test_a_message_that_cannot_be_read_is_not_well(definition, data, warnings):
+    topics = FakeTopics()
+    topics.message('/battery').put(undecoded(definition, data))
+    why = port_of(topics, {'topic': '/battery', 'field': 'cells.1'}).why_unwell()
+    assert why.startswith('battery: ') and ('cannot be read' in why or 'has no field' in why)

@@ -14,7 +14,7 @@ import { redraw } from '../page/redraw.js';
 /** @type {Set<EventKind>} */
 const SHOWN = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end',
   'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure',
-  'trial_end', 'query_opened']);
+  'trial_end', 'query_opened', 'health_wait_start', 'health_wait_end']);
 const MOST_SHOWN = 8;
 const SILENCE_MS = 6000;
 const AGAIN = 'It asks again; the question is in the list.';

@@ -10,15 +10,16 @@ import smach
 
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
+from ..machine.workers import recall_preempts
 from ..records.state_record import StateRecord
 from ..recovery.failure import Failure
-from ..recovery.held_recovery import HeldRecovery
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
+from ..recovery.unwell_recovery import UnwellRecovery
 from .oracle_visit import OracleVisit
 
 
-def why_held(node: TreeNode) -> Optional[str]:
+def why_unwell_after(node: TreeNode) -> Optional[str]:
     """Return why the robot was not well when a state has just failed, None where it was.
 
     It looks for the settle time. Where a preempt or a shutdown comes meanwhile, it returns '':
@@ -38,7 +39,7 @@ def why_held(node: TreeNode) -> Optional[str]:
     return '' if stopped() else why or None
 
 
-class HeldVisit(OracleVisit):
+class UnwellVisit(OracleVisit):
     """The way of a failure that is not counted into the meta state, and back to its state."""
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure, why: str) -> None:
@@ -47,10 +48,10 @@ class HeldVisit(OracleVisit):
         self._why = why
         state = node.machine._states[record.label]
         if not why and state.preempt_requested():
-            state.recall_preempt()  # it came after the state's end: the meta state services it
+            recall_preempts(state)  # it came after the state's end: the meta state services it
 
     def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
-        return HeldRecovery(self._node, self._record, self._failure, context, self._why)
+        return UnwellRecovery(self._node, self._record, self._failure, context, self._why)
 
     def _tell_failure(self) -> None:
         # what the wait says in the log is one sentence for all who wait

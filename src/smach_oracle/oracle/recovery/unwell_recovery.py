@@ -9,7 +9,7 @@ from .recovery import Recovery
 from .verdict import Verdict
 
 
-class HeldRecovery(Recovery):
+class UnwellRecovery(Recovery):
     """Waits until the robot is well again."""
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
