@@ -21,6 +21,8 @@ STEP_S = 0.05
 SCAN_STEPS = 2  # a scan and odometry every so many steps
 IMAGE_STEPS = 4
 SETTLES_S = 0.5  # after the robot was set down at its start
+REPORTS_COME_S = 0.5  # wall time: what was reported last may come after the call of the service
+LAST_WORDS_S = 5.0  # for the last trial's line
 DRAWN = 'drawn'  # the causes of a trial, where none are named
 REPORT = re.compile(r'panel (\d+): (\d+(?:\.\d+)?) bar')
 
@@ -49,13 +51,15 @@ class InspectionWorldNode:
         self._service = rospy.Service('new_trial', Trigger, self._new_trial)
 
     def run(self) -> None:
-        """Let time pass until the node ends, which is the end of the last trial, too."""
+        """Let time pass until the node ends, which is the end of the last trial, too.
+
+        Not for the main thread: a signal is handled there, and takes locks that publishing takes.
+        """
         due_s = time.monotonic()
         while not rospy.is_shutdown():
             self._step()
             due_s = max(due_s + STEP_S / self._speed, time.monotonic() - STEP_S)
             time.sleep(max(0.0, due_s - time.monotonic()))
-        # not in a shutdown hook: it runs in this thread, which may hold the lock by then
         with self._lock:
             self._write_truth()
 
@@ -84,6 +88,7 @@ class InspectionWorldNode:
 
     def _new_trial(self, _: TriggerRequest) -> TriggerResponse:
         """Set the robot down at its start, in the world of the next seed."""
+        time.sleep(REPORTS_COME_S)
         with self._lock:
             self._write_truth()
             self._seed += self._in_trial
@@ -117,5 +122,8 @@ def main() -> Optional[int]:
     except ParameterError as err:
         rospy.logfatal('inspection_world: %s', err)
         return 2
-    node.run()
+    passing = threading.Thread(target=node.run, name='time', daemon=True)
+    passing.start()
+    rospy.spin()
+    passing.join(LAST_WORDS_S)
     return 0

@@ -21,7 +21,7 @@ class WetPatch(NamedTuple):
     x: float
     y: float
     radius: float  # m
-    drift: float  # rad of heading that are gained per m of way
+    drift: float  # rad of heading that are gained per m of way, once the robot slides
 
 
 class Twist(NamedTuple):
