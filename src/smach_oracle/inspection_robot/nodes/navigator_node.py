@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from ..robot.localisation import LocalisationError, Localiser
 from ..robot.route import RouteError, RoutePlanner
-from ..robot.steering import Command, Steering
+from ..robot.steering import Steering, WheelCommand
 from ..site import START, Pose
 from .newest import NewestMessage
 from .parameters import ParameterError, number_in, parameters_of
@@ -89,10 +89,18 @@ class Navigator:
     def _drive(self, goal: MoveBaseGoal) -> None:
         """Carry out a goal of the action."""
         try:
+            self._carry_out(goal)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # else the topics were closed meanwhile
+                raise
+
+    def _carry_out(self, goal: MoveBaseGoal) -> None:
+        """Drive, stop, and tell how it went."""
+        try:
             arrived = self._drive_to(goal.target_pose)
         except (DriveError, RouteError, ValueError) as err:
-            rospy.logwarn('move_base: %s', err)
             self._stop()
+            rospy.logwarn('move_base: %s', err)
             self._server.set_aborted(MoveBaseResult(), str(err))
             return
         self._stop()
@@ -139,7 +147,7 @@ class Navigator:
     def _is_powered(self) -> bool:
         return self._motors.message is None or bool(self._motors.message.data)
 
-    def _send(self, command: Command, pose: Pose, stamp: rospy.Time) -> None:
+    def _send(self, command: WheelCommand, pose: Pose, stamp: rospy.Time) -> None:
         self._command.publish(Twist(Vector3(command.v, 0.0, 0.0), Vector3(0.0, 0.0, command.w)))
         with self._lock:
             self._frames.sendTransform(transform(MAP, ODOM, self._odom_in_map, stamp))

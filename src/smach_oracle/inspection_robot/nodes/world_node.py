@@ -55,13 +55,21 @@ class InspectionWorldNode:
 
         Not for the main thread: a signal is handled there, and takes locks that publishing takes.
         """
+        try:
+            self._pass()
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # else a topic was closed while it published
+                raise
+        finally:
+            with self._lock:
+                self._write_truth()
+
+    def _pass(self) -> None:
         due_s = time.monotonic()
         while not rospy.is_shutdown():
             self._step()
             due_s = max(due_s + STEP_S / self._speed, time.monotonic() - STEP_S)
             time.sleep(max(0.0, due_s - time.monotonic()))
-        with self._lock:
-            self._write_truth()
 
     def _step(self) -> None:
         with self._lock:

@@ -55,7 +55,7 @@ def _length(corners: np.ndarray, one: int, other: int) -> float:
 def _largest_panel(image: np.ndarray) -> Optional[np.ndarray]:
     """(4, 2) px: the corners of a dark frame around something bright, from the upper left one."""
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    dark = (cv2.GaussianBlur(grey, (3, 3), 0) < 100).astype(np.uint8)
+    dark = np.less(cv2.GaussianBlur(grey, (3, 3), 0), 100).astype(np.uint8)
     found, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
     panels: List[np.ndarray] = []
     for contour in found:

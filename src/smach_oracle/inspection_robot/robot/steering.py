@@ -17,7 +17,7 @@ HALF_WIDTH = ROBOT_RADIUS + 0.08  # m of the strip that must be free
 SLOWS_BY = 1.2  # m/s per m that are left
 
 
-class Command(NamedTuple):
+class WheelCommand(NamedTuple):
     """What the wheels shall do."""
 
     v: float = 0.0  # m/s
@@ -34,7 +34,7 @@ class Steering:
         self._yaw = yaw
         self._turning = False  # it has come to the goal: from here on it only turns
 
-    def next(self, pose: Pose, ranges: np.ndarray, angles: np.ndarray) -> Command:
+    def next(self, pose: Pose, ranges: np.ndarray, angles: np.ndarray) -> WheelCommand:
         """The command at a pose (in the map), with a scan: (n,) m along (n,) rad."""
         while len(self._legs) > 1 and _distance(pose, self._legs[0]) < AT_POINT:
             del self._legs[0]
@@ -42,15 +42,15 @@ class Steering:
         if self._turning or (len(self._legs) == 1 and left < AT_GOAL):
             self._turning = True
             off = wrapped(self._yaw - pose[2])
-            return Command(arrived=True) if abs(off) < FACING else Command(w=_turn(off))
+            return WheelCommand(arrived=True) if abs(off) < FACING else WheelCommand(w=_turn(off))
         aim = self._legs[0]
         off = wrapped(math.atan2(aim[1] - pose[1], aim[0] - pose[0]) - pose[2])
         if abs(off) > TURN_FIRST:
-            return Command(w=_turn(off))
+            return WheelCommand(w=_turn(off))
         if is_blocked(ranges, angles, min(LOOKS_AHEAD, left + ROBOT_RADIUS)):
-            return Command(blocked=True)
+            return WheelCommand(blocked=True)
         rest = left if len(self._legs) == 1 else left + 0.5
-        return Command(v=min(SPEED, max(0.08, SLOWS_BY * rest)), w=_turn(off))
+        return WheelCommand(v=min(SPEED, max(0.08, SLOWS_BY * rest)), w=_turn(off))
 
 
 def is_blocked(ranges: np.ndarray, angles: np.ndarray, ahead: float) -> bool:

@@ -1,4 +1,4 @@
-"""The robot's base: wheels that follow commands, a floor that may be wet, and what odometry says."""
+"""The robot's base: wheels that follow commands, a floor that may be wet, and odometry."""
 import math
 from typing import NamedTuple, Optional, Sequence, Tuple
 

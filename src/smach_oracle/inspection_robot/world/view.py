@@ -101,8 +101,8 @@ def _hang(image: np.ndarray, pose: Pose, panel: GaugePanel, front: np.ndarray,
     soft = cv2.GaussianBlur(front, (0, 0), 0.4 * shrink) if shrink > 1.2 else front
     warp = cv2.getPerspectiveTransform(texture, corners)
     seen = cv2.warpPerspective(soft, warp, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
-    there = cv2.warpPerspective(np.full((side, side), 255, np.uint8), warp, (WIDTH, HEIGHT)) > 127
-    there &= (walls > min(left[0], right[0]) - 0.3)[None, :]
+    whole = cv2.warpPerspective(np.full((side, side), 255, np.uint8), warp, (WIDTH, HEIGHT))
+    there = np.greater(whole, 127) & (walls > min(left[0], right[0]) - 0.3)[None, :]
     image[there] = seen[there]
 
 
@@ -135,4 +135,4 @@ def _blurred(image: np.ndarray, twist: Twist, distance: float) -> np.ndarray:
     turned = FOCAL * abs(twist.w) * EXPOSURE_S
     driven = 0.25 * WIDTH * abs(twist.v) * EXPOSURE_S / max(distance, 0.5)
     length = int(round(turned + driven))
-    return image if length < 2 else cv2.blur(image, (length, 1))
+    return image if length < 2 else np.asarray(cv2.blur(image, (length, 1)))
