@@ -119,7 +119,13 @@ class ExpertQueryServer:
             self._publish_list()
         threading.Thread(target=self._watch_time, name='expert query watch', daemon=True).start()
         # the topics are left to rospy: a question that is taken back now is published on them
-        rospy.on_shutdown(self._end_watch)
+        rospy.on_shutdown(self._go_down)
+
+    def _go_down(self) -> None:
+        self._end_watch()
+        timer = self._action.status_timer
+        if timer is not None:  # it would publish on a closed topic
+            timer.shutdown()
 
     def _end_watch(self) -> None:
         self._stopped = True

@@ -30,6 +30,16 @@ class FakeTopic:
         self.closed = True
 
 
+class FakeTimer:
+    """Publishes the status now and then."""
+
+    def __init__(self):
+        self.running = True
+
+    def shutdown(self):
+        self.running = False
+
+
 class FakeActionServer:
     """Its topics are closed when it is stopped."""
 
@@ -37,6 +47,7 @@ class FakeActionServer:
         self.lock = threading.RLock()
         self.on_goal, self.on_cancel = goal_callback, cancel_callback
         self.status_pub = FakeTopic()
+        self.status_timer = FakeTimer()
 
     def start(self):
         pass
@@ -93,6 +104,14 @@ def test_a_question_that_is_taken_back_in_a_shutdown_is_published_on_open_topics
         hook()
     action.on_cancel(handle)
     assert action.status_pub.sent[-1] == 'cancelled'
+
+
+def test_a_server_that_goes_down_does_not_publish_its_status_on_closed_topics(hooks):
+    hosted = ExpertQueryServer()
+    assert hosted._action.status_timer.running
+    for hook in hooks:
+        hook()
+    assert not hosted._action.status_timer.running
 
 
 class LostLink:
