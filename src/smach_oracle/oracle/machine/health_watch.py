@@ -15,6 +15,7 @@ from ..settings.health import (
 from .health_ports import HealthFunctionPort, HealthPort
 
 LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
+FAILED = 'failed'  # what has happened to a state that waits
 
 # makes a port for topics and diagnostics
 ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
@@ -151,8 +152,8 @@ class HealthWatch:
             phase.waiting += 1
             phase.states.add(place)
             if is_first:
-                smach.logwarn('{} {} while the robot is not well ({}): waiting; no failure is '
-                              'counted'.format(place, what, why))
+                smach.logwarn('{} {} while the robot is not well ({}): waiting{}'.format(
+                    place, what, why, '; no failure is counted' if what == FAILED else ''))
                 teller.emit(EventKind.HEALTH_WAIT_START, state=state, text=why)
             else:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))

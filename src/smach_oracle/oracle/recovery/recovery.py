@@ -132,7 +132,7 @@ class Recovery:
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
         self.emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
-        while why_not and self._has_waited_after('precondition {} was not met'.format(spec.name)):
+        while why_not and self._has_waited_after('did not get its precondition ' + spec.name):
             why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
         self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
@@ -234,7 +234,7 @@ class Recovery:
         """Go to a state, once the robot is well."""
         health = self._node.tree.health
         why = health.why_unwell(self.stopped) if health.is_set else ''
-        if why and not self._wait_until_well('is to be left for ' + target, why):
+        if why and not self._wait_until_well('is left for ' + target, why):
             return self._preempted()
         return Verdict(VerdictKind.JUMP, state=target, by=by, text=text,
                        written=frozenset(self._watch.written()))
