@@ -111,16 +111,16 @@ class HealthWatch:
         """Return why the robot was not well at what has just happened, '' where it was.
 
         What stops a robot may be heard of after what it has stopped: it is looked again until the
-        settle time is over. `stopped()` ends that.
+        settle time is over, and once after that. `stopped()` ends that.
         """
         until_s = time.monotonic() + self._settle_s
         while True:
+            is_last = time.monotonic() >= until_s
             phase = self._phase
             why = phase.why if phase is not None else self.why_unwell(stopped)
-            left_s = until_s - time.monotonic()
-            if why or stopped() or left_s <= 0:
+            if why or is_last or stopped():
                 return why
-            pause(min(LOOK_PERIOD_S, left_s))
+            pause(max(0.0, min(LOOK_PERIOD_S, until_s - time.monotonic())))
 
     def wait_until_well(self, teller: Teller, state: str, what: str, why: str, stopped: Stopped,
                         pause: Pause) -> bool:
