@@ -263,7 +263,7 @@ def test_a_preempt_in_the_wait_before_a_jump_ends_the_machine(health):
     assert machine.visits() == ['A']
 
 
-def test_the_policys_own_jump_waits(health):
+def test_the_policys_own_jump_waits(health, log):
     machine = watched(Scripted('aborted'), health=health, settings=SETTINGS)
 
     def decided(event):
@@ -273,6 +273,8 @@ def test_the_policys_own_jump_waits(health):
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
     assert machine.rate('A').recoveries == 1
+    assert [text for level, text in log if 'not well' in text] == [
+        'SM_ROOT/A is left for A while the robot is not well (FakeHealth: run-stop): waiting']
 
 
 def test_an_open_question_stays_open(health):
@@ -294,7 +296,7 @@ def test_an_open_question_stays_open(health):
     assert not notices(machine)
 
 
-def test_a_precondition_that_was_not_met_while_unwell_is_not_judged(health):
+def test_a_precondition_that_was_not_met_while_unwell_is_not_judged(health, log):
     calls = []
 
     def check(userdata):
@@ -309,6 +311,9 @@ def test_a_precondition_that_was_not_met_while_unwell_is_not_judged(health):
     assert healthy_again(machine, health, run) == 'done'
     ends = machine.of(EventKind.PRECONDITION_END)
     assert [event.outcome for event in ends] == ['met'] and len(calls) == 2
+    assert [text for level, text in log if 'not well' in text] == [
+        'SM_ROOT/A did not get its precondition check while the robot is not well '
+        '(FakeHealth: motors: off): waiting']
 
 
 def test_an_authors_own_recovery_goes_on_and_is_not_counted(health):

@@ -15,6 +15,7 @@ from ..settings.health import (
 from .health_ports import HealthFunctionPort, HealthPort
 
 LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
+FAILED = 'failed'  # what has happened to a state that waits
 
 # makes a port for topics and diagnostics
 ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
@@ -110,16 +111,16 @@ class HealthWatch:
         """Return why the robot was not well at what has just happened, '' where it was.
 
         What stops a robot may be heard of after what it has stopped: it is looked again until the
-        settle time is over. `stopped()` ends that.
+        settle time is over, and once after that. `stopped()` ends that.
         """
         until_s = time.monotonic() + self._settle_s
         while True:
+            is_last = time.monotonic() >= until_s
             phase = self._phase
             why = phase.why if phase is not None else self.why_unwell(stopped)
-            left_s = until_s - time.monotonic()
-            if why or stopped() or left_s <= 0:
+            if why or is_last or stopped():
                 return why
-            pause(min(LOOK_PERIOD_S, left_s))
+            pause(max(0.0, min(LOOK_PERIOD_S, until_s - time.monotonic())))
 
     def wait_until_well(self, teller: Teller, state: str, what: str, why: str, stopped: Stopped,
                         pause: Pause) -> bool:
@@ -151,8 +152,8 @@ class HealthWatch:
             phase.waiting += 1
             phase.states.add(place)
             if is_first:
-                smach.logwarn('{} {} while the robot is not well ({}): waiting; no failure is '
-                              'counted'.format(place, what, why))
+                smach.logwarn('{} {} while the robot is not well ({}): waiting{}'.format(
+                    place, what, why, '; no failure is counted' if what == FAILED else ''))
                 teller.emit(EventKind.HEALTH_WAIT_START, state=state, text=why)
             else:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))

@@ -198,7 +198,7 @@ class Recovery:
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
         self.emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
-        while why_not and self._has_waited_after('precondition {} was not met'.format(spec.name)):
+        while why_not and self._has_waited_after('did not get its precondition ' + spec.name):
             why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
         self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
@@ -303,7 +303,7 @@ class Recovery:
         if verdict.kind is not VerdictKind.JUMP or not health.is_set:
             return verdict
         why = health.why_unwell(self.stopped)
-        if why and not self._wait_until_well('is to be left for ' + verdict.state, why):
+        if why and not self._wait_until_well('is left for ' + verdict.state, why):
             return self._preempted()
         return verdict
 

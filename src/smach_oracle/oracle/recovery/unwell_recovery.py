@@ -1,5 +1,6 @@
 """One failure while the robot was not well: nothing is decided, it is waited for health."""
 from ..decision.policy import FailureContext
+from ..machine.health_watch import FAILED
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
@@ -20,7 +21,7 @@ class UnwellRecovery(Recovery):
 
     def run(self) -> Verdict:
         """Wait, and enter the failed state again."""
-        if not self._why_unwell or not self._wait_until_well('failed', self._why_unwell):
+        if not self._why_unwell or not self._wait_until_well(FAILED, self._why_unwell):
             return self._preempted()
         return self._enter_again()
 
