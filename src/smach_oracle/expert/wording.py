@@ -30,7 +30,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
         OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is no outcome of it'.format(
             outcome or 'nothing'),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
-        OracleEvent.NOT_A_FAILURE: 'was not executed',
+        ExpertQueryGoal.HELD_BACK: 'was not executed',
     }.get(goal.failure_kind, 'failed')
 
 

@@ -189,7 +189,7 @@ class Step:
 
         An overrun, and a state that was held back, end it as preempted, all else as it would.
         """
-        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.NOT_A_FAILURE)
+        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
                 and PREEMPTED in self._machine.get_registered_outcomes()):
             return ContainerEnding(outcome=PREEMPTED)
         return self._natural_ending(failure)

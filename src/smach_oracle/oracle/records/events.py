@@ -52,6 +52,7 @@ class FailureKind(IntEnum):
     EXCEPTION = 3
     UNREGISTERED_OUTCOME = 4
     TIME_LIMIT = 5
+    HELD_BACK = 6  # it was not executed; of questions alone (ExpertQuery.action)
 
 
 class Event(NamedTuple):

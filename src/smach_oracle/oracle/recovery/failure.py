@@ -37,7 +37,7 @@ class Failure(NamedTuple):
     @property
     def is_held_back(self) -> bool:
         """Whether it is none: the state was not executed, since it is not to be repeated."""
-        return self.kind is FailureKind.NOT_A_FAILURE
+        return self.kind is FailureKind.HELD_BACK
 
 
 class ContainerEnding(NamedTuple):

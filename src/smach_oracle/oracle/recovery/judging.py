@@ -43,7 +43,7 @@ def judge(node: TreeNode, record: StateRecord, outcome: Any,
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
     if isinstance(outcome, HeldBack):
-        return Failure(label, FailureKind.NOT_A_FAILURE, '', outcome.text, None)
+        return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
     if outcome not in state.get_registered_outcomes():
         text = unregistered_text(label, state, outcome)
         return Failure(label, FailureKind.UNREGISTERED_OUTCOME,

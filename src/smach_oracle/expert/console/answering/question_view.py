@@ -2,7 +2,7 @@
 import math
 from typing import Any, Callable, Dict, List
 
-from smach_oracle.msg import ExpertQueryGoal, OpenQuery, OracleEvent, UserdataItem
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery, UserdataItem
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
 from ...followed_server import ListedQuestion
@@ -28,7 +28,7 @@ def question_view(listed: ListedQuestion, epoch_s: float,
     return {
         'key': listed.key, 'server': listed.server, 'id': goal.query_id, 'trial': goal.trial_id,
         'robot': goal.robot, 'path': goal.container_path, 'state': goal.failed_state,
-        'failed': goal.failure_kind != OracleEvent.NOT_A_FAILURE,
+        'failed': goal.failure_kind != ExpertQueryGoal.HELD_BACK,
         'what': failure_words(goal), 'outcome': goal.outcome, 'text': _end(goal.text),
         'class': goal.failure_class, 'rate': number(goal.rate), 'continuous': goal.continuous,
         'recoveries': goal.recoveries, 'reason': goal.reason, 'tried': list(goal.tried),

@@ -49,7 +49,7 @@ def test_a_question_is_told_whole():
 
 def test_a_question_says_what_would_come_again_and_that_nothing_failed():
     choices = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT')),)
-    held_back = view(failure_kind=FailureKind.NOT_A_FAILURE, choices=choices)
+    held_back = view(failure_kind=FailureKind.HELD_BACK, choices=choices)
     assert held_back['choices'][0]['repeats'] == ['POUR', 'ARM/CUT']
     assert (held_back['failed'], held_back['what']) == (False, 'was not executed')
     assert view()['failed'] and view()['choices'][0]['repeats'] == []
