@@ -15,7 +15,7 @@ from waiting import wait_for
 
 from smach_oracle.analysis.trials import load_trials
 from smach_oracle.expert.terminal.options import choose, options
-from smach_oracle.msg import OracleEvent, PointHeadAction
+from smach_oracle.msg import ExpertQueryGoal, OracleEvent, PointHeadAction
 from smach_oracle.srv import AnswerQueryRequest
 
 PRELUDE = '''
@@ -109,7 +109,7 @@ class StillRunningTest(unittest.TestCase):
     def question(self, task: Process, state: str = 'LOOK', other_than: str = '') -> Any:
         question = self.expert.question(state=state, other_than=other_than)
         self.assertIsNotNone(question, task.output())
-        self.assertEqual(question.query.failure_kind, OracleEvent.STILL_RUNNING)
+        self.assertEqual(question.query.failure_kind, ExpertQueryGoal.STILL_RUNNING)
         self.assertRegex(question.query.text, state + r' still runs after .* s; its longest so far '
                          r'was .* s\. It has no time limit, so it is not abandoned\.')
         return question

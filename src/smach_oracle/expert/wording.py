@@ -21,20 +21,20 @@ def clean(text: str, lines: bool = False) -> str:
 
 def still_runs(goal: ExpertQueryGoal) -> bool:
     """Whether a question is about a state that still runs; GOTO that state is to wait on."""
-    return bool(goal.failure_kind == OracleEvent.STILL_RUNNING)
+    return bool(goal.failure_kind == ExpertQueryGoal.STILL_RUNNING)
 
 
 def standing_words(goal: ExpertQueryGoal) -> str:
     """How the state of a question stands, to follow its name."""
-    return {OracleEvent.STILL_RUNNING: 'still runs',
-            OracleEvent.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
+    return {ExpertQueryGoal.STILL_RUNNING: 'still runs',
+            ExpertQueryGoal.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
 
 
 def failure_words(goal: ExpertQueryGoal) -> str:
     """How the state of a question failed, or that it still runs."""
     outcome = clean(goal.outcome)
     return {
-        OracleEvent.STILL_RUNNING: 'still runs',
+        ExpertQueryGoal.STILL_RUNNING: 'still runs',
         OracleEvent.FAILING_OUTCOME: 'ended with the failing outcome {}'.format(outcome),
         OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(
             outcome, clean(goal.container_path)),
@@ -42,7 +42,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
         OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is no outcome of it'.format(
             outcome or 'nothing'),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
-        OracleEvent.HELD_BACK: 'was not executed',
+        ExpertQueryGoal.HELD_BACK: 'was not executed',
     }.get(goal.failure_kind, 'failed')
 
 

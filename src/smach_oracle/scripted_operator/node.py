@@ -9,7 +9,7 @@ import rospy
 
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.front_end import FrontEnd
-from smach_oracle.msg import ExpertDecision, OpenQuery, OracleEvent, UserdataItem
+from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, OpenQuery, UserdataItem
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.master_watch import start_master_watch
@@ -79,7 +79,7 @@ class ScriptedOperator:
         while not rospy.is_shutdown():
             version = self._front_end.wait_for_change(version, _PAUSE_S)
             for listed in self._front_end.questions():
-                still_runs = listed.goal.failure_kind == OracleEvent.STILL_RUNNING
+                still_runs = listed.goal.failure_kind == ExpertQueryGoal.STILL_RUNNING
                 if (listed.status == OpenQuery.PENDING and not still_runs
                         and listed.key not in self._done):
                     self._done = self._done[-99:] + [listed.key]

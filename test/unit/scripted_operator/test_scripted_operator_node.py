@@ -8,7 +8,7 @@ import pytest
 import rospy
 from geometry_msgs.msg import Point, PoseStamped
 
-from smach_oracle.msg import OpenQuery, OracleEvent
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery
 from smach_oracle.scripted_operator.ground_truth import GroundTruthError
 from smach_oracle.scripted_operator.manual_task import ManualTask, carry_out, point_in_base
 from smach_oracle.scripted_operator.node import ScriptedOperator
@@ -69,7 +69,7 @@ def test_a_question_is_tried_again_while_the_world_does_not_answer_but_not_for_e
 
 
 def test_a_state_that_still_runs_is_left_alone():
-    questions, world = Questions(10, OracleEvent.STILL_RUNNING), World(0)
+    questions, world = Questions(10, ExpertQueryGoal.STILL_RUNNING), World(0)
     with pytest.raises(KeyboardInterrupt):
         ScriptedOperator(SimpleNamespace(seed=1), questions, world, None).run()
     assert (world.looks, questions.claims) == (0, 0)

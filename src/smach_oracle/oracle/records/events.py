@@ -54,9 +54,9 @@ class FailureKind(IntEnum):
     EXCEPTION = 3
     UNREGISTERED_OUTCOME = 4
     TIME_LIMIT = 5
-    # none, but causes to ask an expert about a state
-    STILL_RUNNING = 6
-    HELD_BACK = 7  # the state was not executed, since it is not to be repeated
+    # not failures, but causes to ask an expert: of questions alone (ExpertQuery.action)
+    HELD_BACK = 6  # it was not executed, since it is not to be repeated
+    STILL_RUNNING = 7
 
 
 class Event(NamedTuple):

@@ -16,10 +16,10 @@ import rospy
 from smach_oracle.msg import (
     ExpertQueryAction,
     ExpertQueryFeedback,
+    ExpertQueryGoal,
     ExpertQueryResult,
     OpenQueries,
     OpenQuery,
-    OracleEvent,
 )
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.srv import (
@@ -144,7 +144,7 @@ class ExpertQueryServer:
             _end(handle, settled)
             return
         if not goal.interface:
-            still_runs = goal.failure_kind == OracleEvent.STILL_RUNNING
+            still_runs = goal.failure_kind == ExpertQueryGoal.STILL_RUNNING
             rospy.loginfo('Question %s of %s: %s in %s %s', goal.query_id, goal.robot,
                           goal.failed_state, goal.container_path,
                           'still runs' if still_runs else 'failed')
