@@ -31,6 +31,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
+from .goal_tracking import track_goals_from_the_start
 from .interfaces.starting import OUTPUT_TOPIC
 from .introspection.introspection_server import IntrospectionServer
 from .main_thread import keep_log_from_master
@@ -129,6 +130,7 @@ class Attachments:
             return
         self._node_started = True
         keep_log_from_master()
+        track_goals_from_the_start()
         rospy.on_shutdown(self._on_shutdown)
         start_master_watch()
         self._events = EventPublisher()
