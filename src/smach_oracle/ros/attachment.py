@@ -32,6 +32,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
+from .goal_tracking import track_goals_from_the_start
 from .health.health_port import listen_to_health
 from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
@@ -134,6 +135,7 @@ class Attachments:
             return
         self._node_started = True
         keep_log_from_master()
+        track_goals_from_the_start()
         rospy.on_shutdown(self._on_shutdown)
         start_master_watch()
         self._events = EventPublisher()

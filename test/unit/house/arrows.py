@@ -46,7 +46,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
-         'machine_names'},
+         'machine_names', 'goal_tracking'},
         {'sendable_text', 'strict_json'}
     ],
     'expert': [
