@@ -141,6 +141,17 @@ class OracleRunTest(unittest.TestCase):
         task.go_on()
         self.assertEqual(task.wait(), 0)
 
+    def test_a_check_moves_nothing_and_leaves_no_trace_with_the_master(self) -> None:
+        rospy.set_param('/task/oracle', {'max_recoveries': 2})
+        self.addCleanup(rospy.delete_param, '/task/oracle')
+        before = rosgraph.Master('/test').getSystemState()
+        task = self.run_task('--check')
+        self.assertTrue(wait_for(lambda: not task.running() or self.assertEqual(
+            rosgraph.Master('/test').getSystemState(), before)), task.output())
+        self.assertEqual(task.wait(), 0, task.output())
+        self.assertIn('max_recoveries 2', task.output())
+        self.assertIn('no error in the settings for 1 machine', task.output())
+
     def test_settings_come_from_the_file_and_over_it_from_the_parameter_server(self) -> None:
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
             config.write('memory: 4\ndeadline_s: 0\nmax_recoveries: 5\n')

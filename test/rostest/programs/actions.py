@@ -21,7 +21,7 @@ def serve(goal):
         machine.request_preempt()
         pause = rospy.Rate(100)
         while not server.is_preempt_requested() and not rospy.is_shutdown():
-            pause.sleep()
+            pause.sleep()  # until the cancel has arrived
         server.set_preempted()
     elif how.endswith('fails') and (len(goals) == 1 or how.startswith('always')):
         say('MOVE does not succeed')

@@ -27,4 +27,4 @@ def tick(event):
 
 rospy.Timer(rospy.Duration(0.05), tick, oneshot=True)
 while not done.is_set() and not rospy.is_shutdown():
-    rospy.sleep(0.05)
+    rospy.sleep(0.05)  # as scripts poll, beside their timers

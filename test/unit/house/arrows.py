@@ -10,7 +10,8 @@ MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
-            'oracle.errors', 'oracle.number_checks', 'oracle.records', 'oracle.settings',
+            'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
+            'oracle.settings',
             'oracle.OracleContainer', 'oracle.oracle_of'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
@@ -38,8 +39,8 @@ Layer = Union[str, Set[str]]
 # below it alone: names in one set do not know each other.
 LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
-        'container', 'question', 'execution', 'recovery', 'machine', 'asking', 'records',
-        'settings', 'decision', 'number_checks', 'background', 'errors'
+        'prospects', 'container', 'question', 'execution', 'recovery', 'machine', 'asking',
+        'records', 'settings', 'decision', 'number_checks', 'background', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health'},

@@ -34,7 +34,7 @@ class Interception:
 
     def install(self) -> None:
         """From now on; cannot be taken back."""
-        for cls in _family(smach.StateMachine):
+        for cls in family(smach.StateMachine):
             self._patch(cls)
         self._patch_future_subclasses()
 
@@ -82,11 +82,11 @@ class Interception:
         setattr(smach.StateMachine, '__init_subclass__', classmethod(__init_subclass__))
 
 
-def _family(cls: type) -> Iterator[type]:
+def family(cls: type) -> Iterator[type]:
     """A class and all that is derived from it so far."""
     yield cls
     for child in cls.__subclasses__():
-        yield from _family(child)
+        yield from family(child)
 
 
 def machines_inside(container: smach.Container) -> Iterator[smach.StateMachine]:

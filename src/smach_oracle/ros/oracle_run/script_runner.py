@@ -93,6 +93,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
     parser.add_argument('--without-oracle', action='store_true',
                         help='recover nothing: events and bags only, everything ends as without us')
+    parser.add_argument('--check', action='store_true',
+                        help='execute no machine: check the settings against the machines of the '
+                        'script, and list what the oracle may do in each state')
     parser.add_argument('--record', metavar='FOLDER', help='one bag per trial in this folder')
     parser.add_argument('--record-topic', metavar='TOPIC', action='append', default=[],
                         help='record this topic as well (repeatable)')
@@ -108,7 +111,8 @@ class Invocation(NamedTuple):
     overrides: Mapping[str, Any]
     recover: bool
     options: attachment.RecordingOptions
-    name: str
+    name: str = ''
+    only_check: bool = False
 
 
 def parse(args: Sequence[str]) -> Invocation:
@@ -133,7 +137,8 @@ def parse(args: Sequence[str]) -> Invocation:
         overrides['nested'] = False
     record = os.path.abspath(path_of(given.record)) if given.record else ''
     return Invocation(script, line.script_args, given.config, overrides, not given.without_oracle,
-                      attachment.RecordingOptions(record, tuple(given.record_topic)), given.name)
+                      attachment.RecordingOptions(record, tuple(given.record_topic)), given.name,
+                      given.check)
 
 
 def _why_not_readable(script: str) -> str:
@@ -158,7 +163,7 @@ def check(invocation: Invocation) -> None:
         settings = Settings.from_dict(loaded, partial(_check_name, invocation.script))
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
-    if invocation.options.record:
+    if invocation.options.record and not invocation.only_check:
         from ..recorder import prepare_folder
         prepare_folder(invocation.options.record)
 
@@ -212,9 +217,13 @@ class MachineWrapper:
         :raises SystemExit: where the settings do not fit the machine, which is told.
         """
         with self._refusal.of_errors():
-            self._wrap(machine)
+            self.wrap(machine)
 
-    def _wrap(self, machine: smach.StateMachine) -> None:
+    def wrap(self, machine: smach.StateMachine) -> None:
+        """Swap the machine's class.
+
+        :raises SettingsError: where the settings do not fit the machine.
+        """
         from ..container import OracleContainer
         loaded = load(self._invocation)
         with _located(loaded):
@@ -284,12 +293,16 @@ def tell(err: Exception) -> None:
 
 def main(args: Optional[Sequence[str]] = None) -> None:
     """Entry point."""
-    invocation = parse(sys.argv[1:] if args is None else args)
+    words = sys.argv[1:] if args is None else list(args)
+    invocation = parse(words)
     try:
         check(invocation)
     except (SettingsError, OSError) as err:
         tell(err)
         sys.exit(USAGE_ERROR)
+    if invocation.only_check:
+        from .check_process import start
+        start(words)
     from .interception import Interception
     attachment.configure(invocation.options)
     machine_names().given, machine_names().script = invocation.name, named_after(invocation.script)

@@ -1,0 +1,116 @@
+"""What an oracle may do in each state of a wrapped machine, told before anything runs."""
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, cast
+
+import smach
+
+from .decision.failure_rate import FailureClass
+from .decision.policy import Action, Policy, Preconditions, Situation
+from .machine.nesting import nodes_of
+from .machine.tree_node import TreeNode, WrappedMachine
+from .records.events import FailureKind
+from .recovery.failure import Route, author_recovers, failure_kind, route_of
+from .settings.failing_outcomes import PREEMPTED, FailingNames
+from .settings.interfaces import InterfaceOffer
+from .settings.settings import Settings, StateSettings
+
+Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
+
+
+class OutcomeProspect(NamedTuple):
+    """One outcome of a state: where it leads, and whether the oracle takes it up."""
+
+    outcome: str
+    route: Route
+    is_failure: bool
+    author_recovers: bool  # from this failure; the author's own transition is kept
+
+
+class StateProspect(NamedTuple):
+    """One state; `actions`: what the policy may do on its failure, by class of its rate."""
+
+    label: str
+    state: smach.State
+    settings: StateSettings
+    outcomes: Tuple[OutcomeProspect, ...]
+    actions: Actions
+    offers: Tuple[InterfaceOffer, ...]
+
+
+class ContainerProspect(NamedTuple):
+    """One wrapped container; `initial` is '' where it has no state."""
+
+    path: str
+    machine: smach.StateMachine
+    initial: str
+    outcomes: Tuple[str, ...]
+    settings: Settings
+    is_top: bool
+    recovers: bool
+    states: Tuple[StateProspect, ...]
+
+
+def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
+    """Return what the oracle may do in a wrapped machine, and in those nested in it."""
+    return [_container(node) for node in nodes_of(cast(WrappedMachine, machine))]
+
+
+def good_outcome(container: smach.Container, settings: Settings) -> Optional[str]:
+    """Return an outcome of a container that is no failure, the first by name; None if none is.
+
+    `succeeded` comes before all others, a preempt after them.
+    """
+    failing = FailingNames(settings.failing_outcomes)
+    names = sorted((name for name in container.get_registered_outcomes() if name not in failing),
+                   key=lambda name: (name != 'succeeded', name == PREEMPTED, str(name)))
+    return names[0] if names else None
+
+
+def _container(node: TreeNode) -> ContainerProspect:
+    machine: Any = node.machine
+    initial = machine._initial_state_label or next(iter(node.labels()), '')
+    return ContainerProspect(
+        node.path, machine, initial, tuple(sorted(machine.get_registered_outcomes(), key=str)),
+        node.settings, node.parent is None, node.tree.recover,
+        tuple(_state(node, label) for label in node.labels()))
+
+
+def _state(node: TreeNode, label: str) -> StateProspect:
+    state, settings = node.machine._states[label], node.settings_of(label)
+    return StateProspect(
+        label, state, settings,
+        tuple(_outcome(node, label, outcome, settings)
+              for outcome in sorted(state.get_registered_outcomes(), key=str)),
+        tuple(_actions(node.in_force.policy, settings)),
+        node.settings.offers_for(node.relative_path, label))
+
+
+def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
+    route = route_of(node.machine, label, outcome)
+    kind = failure_kind(outcome, route, settings.failure_outcomes, node.in_force.failing)
+    return OutcomeProspect(
+        outcome, route, kind is not FailureKind.NOT_A_FAILURE,
+        author_recovers(outcome, route, kind, settings.failure_outcomes,
+                        settings.author_recoveries))
+
+
+def _actions(policy: Policy, settings: StateSettings
+             ) -> Iterator[Tuple[FailureClass, Tuple[Action, ...]]]:
+    """Yield each class of the failure rate with what the policy may do in it, mildest first."""
+    for failure_class in (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH):
+        possible: Dict[Action, None] = {}
+        for situation in _situations(policy, failure_class, bool(settings.preconditions)):
+            possible[policy.decide(situation)] = None
+        if not settings.max_recoveries:
+            possible = {Action.ASK: None}
+        yield failure_class, tuple(action for action in Action if action in possible)
+
+
+def _situations(policy: Policy, failure_class: FailureClass, conditioned: bool
+                ) -> Iterator[Situation]:
+    standing: Tuple[Preconditions, ...] = (Preconditions.NONE,)
+    if conditioned:
+        runs = policy.runs_preconditions(failure_class)
+        standing = (Preconditions.MET, Preconditions.NOT_MET) if runs else (Preconditions.NOT_MET,)
+    for preconditions in standing:
+        for continuous in (False, True):
+            yield Situation(failure_class, preconditions, continuous)

@@ -1,0 +1,174 @@
+"""What `oracle_run --check` says of a machine, as text for people, 100 columns wide."""
+import textwrap
+from collections import Counter
+from dataclasses import fields
+from typing import Any, Iterator, List, Sequence, Tuple
+
+import smach
+from smach_oracle.oracle.decision.failure_rate import FailureClass
+from smach_oracle.oracle.decision.policy import Action
+from smach_oracle.oracle.prospects import (
+    ContainerProspect,
+    OutcomeProspect,
+    StateProspect,
+)
+from smach_oracle.oracle.settings.settings import Settings, StateSettings
+
+WIDTH = 100
+_IN_WORDS = {Action.REVISIT: 'retry', Action.STEP_BACK: 'step back', Action.ASK: 'ask'}
+# told by lines of their own
+_TOLD = ('preconditions', 'time_limit_s')
+_PARTS = ('defaults', 'states', 'interfaces')
+
+
+def lines_of(container: ContainerProspect) -> List[str]:
+    """The text about one container and its states."""
+    usual = _usual_actions(container)
+    lines = _heading(container)
+    if container.recovers:
+        lines += _entry('on a failure', usual, 2)
+    for state in container.states:
+        lines += [''] + list(_state(container, state, usual))
+    return lines
+
+
+def wrapped(text: str, indent: int, hanging: int = 0) -> List[str]:
+    """Break a paragraph into lines.
+
+    `indent`: columns before it; `hanging`: more before all lines but the first.
+    """
+    return textwrap.wrap(text, WIDTH, initial_indent=' ' * indent,
+                         subsequent_indent=' ' * (indent + hanging),
+                         break_on_hyphens=False) or ['']
+
+
+def _heading(container: ContainerProspect) -> List[str]:
+    settings = container.settings
+    title = '{} begins at {}; ends in {}'.format(
+        container.path, container.initial or '(no state)', ', '.join(map(str, container.outcomes)))
+    lines = wrapped(title, 0, 4)
+    if not container.recovers:
+        return lines + wrapped('The oracle recovers nothing here: it observes.', 2)
+    if not container.is_top and settings.escalate:
+        lines += wrapped('To ask means: the oracle of the machine around it takes over.', 2)
+        return lines
+    lines += _entry('policy', '{}; a step back leads to an earlier state, to {} where none has '
+                    'succeeded'.format(settings.policy, container.initial), 2)
+    lines += _entry('asking', _asking(settings), 2)
+    lines += _entry('set', ', '.join(_changed(settings, Settings(), _PARTS) +
+                                     _changed(settings.defaults, StateSettings(), ())), 2)
+    return lines
+
+
+def _asking(settings: Settings) -> str:
+    fallback = ' '.join(settings.on_no_answer).strip()
+    if not settings.deadline_s:
+        return 'an expert, without end'
+    return 'an expert; without an answer in {:g} s, or without an expert: {}'.format(
+        settings.deadline_s, fallback)
+
+
+def _state(container: ContainerProspect, state: StateProspect, usual: str) -> Iterator[str]:
+    yield from wrapped('{} ({})'.format(state.label, _kind(state.state)), 2, 4)
+    yield from _outcome_lines(container, state)
+    if not container.recovers:
+        return
+    settings, actions = state.settings, _actions(state)
+    yield from _entry('on a failure', actions if actions != usual else '', 4)
+    yield from _entry('preconditions', ', '.join(spec.name for spec in settings.preconditions), 4)
+    if settings.time_limit_s is not None:
+        yield from _entry('time limit', '{:g} s'.format(settings.time_limit_s), 4)
+    yield from _entry('interfaces', ', '.join(offer.name for offer in state.offers), 4)
+    yield from _entry('set', ', '.join(
+        _changed(settings, container.settings.defaults, _TOLD)), 4)
+
+
+def _kind(state: smach.State) -> str:
+    name = type(state).__name__
+    if not isinstance(state, smach.Container) or isinstance(state, smach.StateMachine):
+        return name
+    try:
+        inside = ', '.join(str(label) for label in state.get_children())
+    except (AttributeError, TypeError):  # an Iterator that has no contained state yet
+        inside = ''
+    return '{} of {}'.format(name, inside or 'nothing')
+
+
+def _outcome_lines(container: ContainerProspect, state: StateProspect) -> Iterator[str]:
+    rows = [(str(each.outcome), _target(each), _meaning(container, each))
+            for each in state.outcomes]
+    for line in _aligned(rows):
+        yield from wrapped(line, 4, 4)
+
+
+def _target(outcome: OutcomeProspect) -> str:
+    route = outcome.route
+    if not route.target:
+        return 'leads nowhere'
+    return 'to {}'.format(route.target) if route.is_state else 'ends in {}'.format(route.target)
+
+
+def _meaning(container: ContainerProspect, outcome: OutcomeProspect) -> str:
+    if not outcome.is_failure:
+        return ''
+    if not container.recovers:
+        return 'failure'
+    return 'failure, the author\'s own way is kept' if outcome.author_recovers else (
+        'failure, the oracle takes it up')
+
+
+def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:
+    if not rows:
+        return []
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    # a long name must not push all others out of sight
+    return ['  '.join(cell.ljust(min(width, 32)) for cell, width in zip(row, widths)).rstrip()
+            for row in rows]
+
+
+def _usual_actions(container: ContainerProspect) -> str:
+    """What the policy may do on the failure of most of the states."""
+    counts = Counter(_actions(state) for state in container.states)
+    return counts.most_common(1)[0][0] if counts else ''
+
+
+def _actions(state: StateProspect) -> str:
+    """What the policy may do, by failure rate."""
+    settings = state.settings
+    if not settings.max_recoveries:
+        return 'ask'
+    limits = {FailureClass.LOW: 'rate below {:g}'.format(settings.moderate_from),
+              FailureClass.MODERATE: '{:g} to {:g}'.format(settings.moderate_from,
+                                                           settings.high_from),
+              FailureClass.HIGH: 'from {:g}'.format(settings.high_from)}
+    told = '; '.join('{}: {}'.format(limits[failure_class], _either(actions))
+                     for failure_class, actions in state.actions)
+    return '{}; after {} recoveries: ask'.format(told, settings.max_recoveries)
+
+
+def _either(actions: Sequence[Action]) -> str:
+    return ' or '.join(_IN_WORDS[action] for action in actions)
+
+
+def _changed(settings: Any, others: Any, left_out: Sequence[str]) -> List[str]:
+    """The fields in which settings differ from others, as "memory 5"."""
+    return ['{} {}'.format(each.name, _value(getattr(settings, each.name)))
+            for each in fields(settings) if each.name not in left_out
+            and getattr(settings, each.name) != getattr(others, each.name)]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return '{:g}'.format(value)
+    if isinstance(value, (tuple, list)):
+        return '[{}]'.format(', '.join(_value(each) for each in value))
+    return str(value)
+
+
+def _entry(name: str, text: str, indent: int) -> List[str]:
+    """A line with a name before it; none where there is nothing to say."""
+    if not text:
+        return []
+    return wrapped('{:<14}{}'.format(name, text), indent, 14)

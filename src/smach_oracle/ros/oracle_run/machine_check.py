@@ -1,0 +1,128 @@
+"""Every machine that a checked script executes: it is checked, and not executed."""
+import functools
+import threading
+from typing import Any, Callable, Iterator, List, Type
+
+import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.prospects import good_outcome, prospects_of
+from smach_oracle.oracle.settings.settings import Settings
+
+from .check_report import lines_of, wrapped
+from .interception import MARK, family, machines_inside
+
+# new machines of one structure after which a script is taken for one that builds them for ever
+MAX_ALIKE = 10
+
+
+class MachineCheck:
+    """Stands in for `execute` of every container, in any thread.
+
+    :param wrap: puts a machine under an oracle as a real run does; a SettingsError is passed on.
+    :param settings: those in force, for containers that are no state machines.
+    :param tell: takes lines of text for people.
+    """
+
+    def __init__(self, wrap: Callable[[smach.StateMachine], None],
+                 settings: Callable[[], Settings], tell: Callable[[List[str]], None]) -> None:
+        self._wrap = wrap
+        self._settings = settings
+        self._tell = tell
+        self._lock = threading.RLock()
+        self._seen: List[smach.Container] = []  # the objects themselves, so that no id comes again
+        self._names: List[str] = []
+        self.machines = 0  # of different structure
+        self.warnings = 0
+
+    def __call__(self, container: smach.Container) -> Any:
+        """Check a container that is about to be executed; return an outcome that is no failure.
+
+        :raises StopIteration: where the script begins again.
+        :raises SettingsError: where the settings do not fit.
+        """
+        with self._lock:
+            if any(container is each for each in self._seen):
+                raise StopIteration('it executes a machine for the second time')
+            self._seen.append(container)
+            for machine in list(_top_machines(container)):
+                self._check(machine)
+            outcome = good_outcome(container, self._settings())
+            self._tell(wrapped('It is not executed; the script goes on with {}.'.format(
+                'no outcome: all of them are failures' if outcome is None
+                else 'the outcome {}'.format(outcome)), 0) + [''])
+            return outcome
+
+    def _check(self, machine: smach.StateMachine) -> None:
+        with _heard_warnings() as warnings:
+            if not isinstance(machine, OracleContainer):
+                self._wrap(machine)
+        name = oracle_of(machine).path  # shared by machines of the same structure
+        self._names.append(name)
+        if self._names.count(name) > MAX_ALIKE:
+            raise StopIteration('it builds machines of one structure again and again')
+        if self._names.count(name) > 1:
+            self._tell(wrapped('{}: another machine of the same structure.'.format(name), 0))
+            return
+        self.machines += 1
+        for container in prospects_of(machine):
+            self._tell(lines_of(container) + [''])
+        self.warnings += len(warnings)
+        for warning in warnings:
+            self._tell(wrapped('Warning: ' + warning, 0, 4))
+
+
+class _heard_warnings:
+    """Within it SMACH's warnings go into a list, in place of the log."""
+
+    def __enter__(self) -> List[str]:
+        self._before: Any = smach.logwarn
+        self._heard: List[str] = []
+        setattr(smach, 'logwarn', self._hear)
+        return self._heard
+
+    def _hear(self, text: str, *args: Any) -> None:
+        self._heard.append(text % args if args else text)
+
+    def __exit__(self, *error: object) -> None:
+        setattr(smach, 'logwarn', self._before)
+
+
+def _top_machines(container: smach.Container) -> Iterator[smach.StateMachine]:
+    """The outermost machines in a container, itself among them."""
+    if isinstance(container, smach.StateMachine):
+        yield container
+        return
+    nested: List[smach.StateMachine] = []
+    for machine in machines_inside(container):  # each after those around it
+        if not any(machine is each for each in nested):
+            nested += machines_inside(machine)
+            yield machine
+
+
+def intercept(instead: Callable[[smach.Container], Any]) -> None:
+    """Call this in place of `execute` of every container, present and future; for good."""
+    for cls in family(smach.Container):
+        _patch(cls, instead)
+    inherited = smach.Container.__dict__.get('__init_subclass__')
+
+    def __init_subclass__(cls: Type[smach.Container], **kwargs: Any) -> None:
+        if inherited is not None:
+            inherited.__get__(None, cls)(**kwargs)
+        else:
+            super(smach.Container, cls).__init_subclass__(**kwargs)
+        _patch(cls, instead)
+
+    setattr(smach.Container, '__init_subclass__', classmethod(__init_subclass__))
+
+
+def _patch(cls: Type[smach.Container], instead: Callable[[smach.Container], Any]) -> None:
+    original = cls.execute  # its own, or one that a mix-in brings
+    if hasattr(original, MARK):
+        return
+
+    @functools.wraps(original)
+    def execute(container: smach.Container, *args: Any, **kwargs: Any) -> Any:
+        return instead(container)
+
+    setattr(execute, MARK, True)
+    setattr(cls, 'execute', execute)

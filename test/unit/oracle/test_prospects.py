@@ -1,0 +1,79 @@
+"""What the oracle may do in each state, told before anything runs."""
+import smach
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.decision.failure_rate import FailureClass
+from smach_oracle.oracle.decision.policy import Action
+from smach_oracle.oracle.prospects import good_outcome, prospects_of
+from smach_oracle.oracle.settings.settings import Settings
+
+OUTCOMES = ['succeeded', 'aborted', 'preempted']
+
+
+class Never(smach.State):
+    """Is not to be executed."""
+
+    def __init__(self):
+        smach.State.__init__(self, OUTCOMES)
+
+    def execute(self, userdata):
+        raise AssertionError('it runs')
+
+
+def machine():
+    """HOME leads to PICK, PICK to an inner machine; HELP is the author's own recovery of PICK."""
+    inner, top = smach.StateMachine(OUTCOMES), smach.StateMachine(OUTCOMES)
+    with inner:
+        smach.StateMachine.add('PUT', Never())
+    with top:
+        smach.StateMachine.add('HOME', Never(), {'succeeded': 'PICK'})
+        smach.StateMachine.add('PICK', Never(), {'succeeded': 'PLACE', 'aborted': 'HELP'})
+        smach.StateMachine.add('HELP', Never(), {'succeeded': 'HOME'})
+        smach.StateMachine.add('PLACE', inner)
+    return top
+
+
+def told(settings):
+    """The prospects of the machine by state label."""
+    containers = prospects_of(OracleContainer.wrap(machine(), settings=settings, name='TOP'))
+    assert [each.path for each in containers] == ['TOP', 'TOP/PLACE']
+    assert [(each.initial, each.is_top) for each in containers] == [('HOME', True), ('PUT', False)]
+    return {state.label: state for each in containers for state in each.states}
+
+
+def outcome(state, name):
+    return next(each for each in state.outcomes if each.outcome == name)
+
+
+def test_outcomes_lead_where_the_author_drew_them():
+    states = told({})
+    assert set(states) == {'HOME', 'PICK', 'HELP', 'PLACE', 'PUT'}
+    assert outcome(states['HOME'], 'succeeded')[1:] == (('PICK', True), False, False)
+    assert outcome(states['HOME'], 'aborted')[1:] == (('aborted', False), True, False)
+    assert outcome(states['PICK'], 'aborted')[1:] == (('HELP', True), True, True)
+    assert not outcome(states['PUT'], 'preempted').is_failure
+
+
+def test_an_authors_recovery_that_the_settings_override_is_the_oracles():
+    states = told({'states': {'PICK': {'author_recoveries': 'override'}}})
+    assert outcome(states['PICK'], 'aborted')[2:] == (True, False)
+
+
+def test_the_actions_are_those_of_the_policy():
+    low, moderate, high = FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH
+    states = told({'states': {'HELP': {'max_recoveries': 0}, 'PICK': {'preconditions': ['HOME']}}})
+    assert states['HOME'].actions == states['PICK'].actions == (
+        (low, (Action.REVISIT, Action.STEP_BACK)), (moderate, (Action.REVISIT, Action.ASK)),
+        (high, (Action.ASK,)))
+    assert {actions for _, actions in states['HELP'].actions} == {(Action.ASK,)}
+    listing = told({'policy': 'algorithm1', 'states': {'PICK': {'preconditions': ['HOME']}}})
+    assert dict(listing['HOME'].actions)[low] == (Action.STEP_BACK,)
+    assert dict(listing['PICK'].actions)[low] == (Action.REVISIT, Action.STEP_BACK)
+
+
+def test_a_good_outcome_is_no_failure_and_a_preempt_only_where_there_is_no_other():
+    def good(*outcomes):
+        return good_outcome(smach.StateMachine(list(outcomes)), Settings())
+    assert good('aborted', 'done', 'succeeded') == 'succeeded'
+    assert good('aborted', 'preempted', 'some_failed', 'through') == 'through'
+    assert good('aborted', 'preempted') == 'preempted'
+    assert good('aborted', 'failed') is None

@@ -1,0 +1,198 @@
+"""`oracle_run --check` executes no machine, reaches no master but its own, and reports."""
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+
+RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
+NOBODY = 'http://localhost:1'
+PRELUDE = '''
+import sys, threading, rospy, smach, smach_ros
+print('SCRIPT SAYS THIS', flush=True)
+class Runs(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
+    def execute(self, userdata):
+        print('STATE RUNS', flush=True)
+        return 'succeeded'
+def machine(*labels):
+    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    with sm:
+        for label, after in zip(labels, labels[1:] + ('succeeded',)):
+            smach.StateMachine.add(label, Runs(), {'succeeded': after})
+    return sm
+'''
+GOOD = '''
+max_recoveries: 3
+states:
+  PICK:
+    preconditions: [HOME]
+    time_limit_s: 20
+    memory: 4
+  HOME:
+    max_recoveries: 0
+interfaces:
+  by_hand: {action: by_hand, states: [PICK]}
+'''
+
+
+class SpyMaster:
+    """A master that has parameters, and notes whatever else it is asked."""
+
+    def __init__(self, parameters):
+        self.parameters = parameters
+        self.calls = []
+        self.server = SimpleXMLRPCServer(('localhost', 0), logRequests=False)
+        self.server.register_instance(self)
+        self.uri = 'http://localhost:{}'.format(self.server.server_address[1])
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def _dispatch(self, method, arguments):
+        self.calls.append((method,) + tuple(arguments[1:]))
+        return 1, '', self.parameters
+
+    def close(self):
+        self.server.shutdown()
+        self.server.server_close()
+
+
+@pytest.fixture
+def spy():
+    master = SpyMaster({'speed': 7, 'use_sim_time': True, 'task': {'oracle': {'prior': 0.2}}})
+    yield master
+    master.close()
+
+
+@pytest.fixture
+def check(tmp_path):
+    """Check a script with settings; returns exit code, report and stderr."""
+    def run(text, settings='', master=NOBODY, options=()):
+        (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent(text))
+        (tmp_path / 'oracle.yaml').write_text(settings)
+        done = subprocess.run(
+            [sys.executable, '-c', RUNNER, '--check', '--config', 'oracle.yaml'] + list(options)
+            + ['task.py'], cwd=str(tmp_path), timeout=120, stdin=subprocess.DEVNULL,
+            env=dict(os.environ, ROS_MASTER_URI=master, ROS_HOSTNAME='localhost'),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+        assert 'STATE RUNS' not in done.stdout + done.stderr
+        assert all(len(line) <= 100 for line in done.stdout.splitlines())
+        return done.returncode, done.stdout, done.stderr
+    return run
+
+
+def test_the_report_says_what_the_oracle_may_do_in_each_state(check):
+    code, report, errors = check('''
+        sm = machine('HOME', 'PICK')
+        with sm:
+            smach.StateMachine.add('HELP', Runs(), {'aborted': 'HOME'})
+        print('OUTCOME', sm.execute())
+    ''', GOOD)
+    assert code == 0, errors
+    lines = [' '.join(line.split()) for line in report.splitlines()]
+    for line in (
+            'TASK begins at HOME; ends in aborted, preempted, succeeded',
+            'set max_recoveries 3',
+            'HOME (Runs)', 'succeeded to PICK',
+            'aborted ends in aborted failure, the oracle takes it up',
+            'preconditions HOME', 'time limit 20 s', 'interfaces by_hand', 'set memory 4',
+            'aborted to HOME failure, the author\'s own way is kept',
+            'set max_recoveries 0', 'on a failure ask',
+            'It is not executed; the script goes on with the outcome succeeded.',
+            'All is well: no error in the settings for 1 machine.'):
+        assert line in lines, report
+    assert 'rate below 0.4: retry or step back; 0.4 to 0.75: retry or ask; from 0.75: ask' in (
+        ' '.join(lines))
+    assert 'OUTCOME succeeded' in errors and 'SAYS' not in report
+
+
+def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(check):
+    code, report, _ = check('''
+        first, second = machine('A', 'B'), machine('C')
+        while True:
+            assert first.execute() == second.execute() == 'succeeded'
+    ''')
+    assert code == 0
+    assert 'TASK begins at A' in report and 'TASK_2 begins at C' in report
+    assert 'executes a machine for the second time' in report and 'for 2 machines' in report
+
+
+@pytest.mark.parametrize('settings, why', [
+    ('memory: many', "memory: 'many' is not allowed"),
+    ('states: {PICK: {preconditions: [HOEM]}}', "'HOEM' is not allowed"),
+    ('states: {PICK: {preconditions: ["python:__main__:ready"]}}', "has no 'ready'"),
+    ('oracle_label: PICK', 'oracle_label'),
+    ('on_no_answer: {jump: HOME}', 'on_no_answer'),
+])
+def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why):
+    code, _, errors = check('machine("HOME", "PICK").execute()', settings)
+    assert code == 2
+    assert why in errors.splitlines()[-1] and errors.splitlines()[-1].startswith('oracle_run: ')
+
+
+def test_a_name_that_is_no_outcome_or_state_is_told(check):
+    code, report, _ = check('machine("HOME", "PICK").execute()', 'states: {PIKC: {memory: 4}}')
+    assert code == 0
+    assert "Warning: states.PIKC: 'PIKC' is not allowed" in report and '1 warning: no' in report
+
+
+def test_the_real_master_is_asked_for_its_parameters_alone(check, spy):
+    code, report, errors = check('''
+        from std_srvs.srv import Trigger
+        import actionlib
+        from actionlib.msg import TestAction, TestGoal
+        rospy.init_node('task')
+        rospy.wait_for_service('grip')
+        rospy.ServiceProxy('grip', Trigger)()
+        client = actionlib.SimpleActionClient('move', TestAction)
+        assert client.wait_for_server() and client.send_goal_and_wait(TestGoal(3)) == 3
+        from std_msgs.msg import String
+        rospy.Publisher('go', String, queue_size=1).publish('now')
+        assert rospy.wait_for_message('scan', String).data == ''
+        rospy.set_param('speed', rospy.get_param('speed') + 1)
+        rospy.sleep(0.1)
+        print('SPEED', rospy.get_param('speed'))
+        machine('HOME').execute()
+        rospy.spin()
+    ''', master=spy.uri)
+    assert code == 0, errors
+    assert spy.calls == [('getParam', '/')]
+    assert 'SPEED 8' in errors
+    for note in ('waits for service grip', 'calls service /grip', 'waits for action server move',
+                 'sends a goal to move', 'waits for a message on scan'):
+        assert '- ' + note in report, report
+    assert 'prior 0.2' in report
+
+
+@pytest.mark.parametrize('text, code, told', [
+    ('machine("HOME")', 1, 'executed no machine'),
+    ('raise ValueError("no robot")', 1, 'ended in the error above'),
+    ('machine("HOME").execute()\nraise ValueError("no robot")', 0, 'no mistake of its own'),
+    ('machine("HOME").execute()\nsys.exit(3)', 0, 'SystemExit(3)'),
+])
+def test_the_exit_code_says_whether_a_machine_was_reached(check, text, code, told):
+    found, report, errors = check(text)
+    assert (found, told in ' '.join(report.split())) == (code, True), report + errors
+    assert ('ValueError: no robot' in errors) is ('ValueError' in text)
+
+
+def test_what_contains_machines_or_serves_them_is_not_executed_either(check):
+    code, report, errors = check('''
+        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted')
+        with both:
+            smach.Concurrence.add('LEFT', Runs())
+            smach.Concurrence.add('ARM', machine('REACH'))
+        thread = threading.Thread(target=both.execute)
+        thread.start()
+        thread.join()
+        from actionlib.msg import TestAction
+        rospy.init_node('task')
+        smach_ros.ActionServerWrapper('fetch', TestAction, machine('GRASP', 'LIFT'),
+                                      ['succeeded'], ['aborted'], ['preempted']).run_server()
+        rospy.spin()
+    ''')
+    assert code == 0, errors
+    assert 'begins at REACH' in report and 'begins at GRASP' in report and '2 machines' in report
