@@ -10,8 +10,8 @@ UNIT_TESTS = ['oracle', 'ros', 'smach']
 ROSTESTS = [
     'console_browser', 'expert_interface', 'expert_own_script', 'expert_paused', 'fault_*',
     'interface_on_demand', 'oracle_*', 'pr2_pick_and_place', 'record_topics',
-    'smach_ros_action_state', 'smach_ros_introspection', 'smach_ros_states', 'smach_ros_wrapper',
-    'task_recoveries'
+    'second_robot', 'smach_ros_action_state', 'smach_ros_introspection', 'smach_ros_states',
+    'smach_ros_wrapper', 'task_recoveries'
 ]
 
 

@@ -82,7 +82,7 @@ def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
 def test_launch_files_and_settings_are_installed(installed):
     files = in_installed(installed, 'roslaunch --files smach_oracle pick_and_place.launch')
     assert str(installed / 'installed') in files
-    for name in ('pick_and_place.py', 'pick_and_place.yaml'):
+    for name in ('pick_and_place.py', 'pick_and_place.yaml', 'inspection.py', 'inspection.yaml'):
         assert (installed / 'installed/share/smach_oracle/src/smach_oracle/tasks' / name).exists()
 
 

@@ -24,6 +24,7 @@ ARROWS: Dict[str, Set[str]] = {
     'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                    'analysis', 'packages'},
     'tasks': set(),
+    'inspection_robot': set(),  # a robot as any ROS user writes it
     '__init__': {'oracle.OracleContainer', 'ros.container'},
     'commands': {'packages'},  # it starts modules of the rooms by their names
     'packages': set(),
@@ -62,11 +63,13 @@ LAYERS: Dict[str, List[Layer]] = {
         {'model', 'robot', 'kitchen'}
     ],
     'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
+    'inspection_robot': [{'nodes', 'checks'}, {'world', 'robot'}, {'rays', 'site'}],
 }
 # what runs where no ROS is installed
 ROS_FREE = [
     'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
-    'pr2/skills', 'simulation/physics', 'simulation/scenes', 'commands', 'packages'
+    'pr2/skills', 'simulation/physics', 'simulation/scenes', 'inspection_robot/world',
+    'inspection_robot/robot', 'commands', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks'}
 OF_ROS = re.compile(

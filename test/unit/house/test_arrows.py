@@ -65,6 +65,14 @@ def test_the_executive_keeps_its_inside_to_itself(room):
     assert not told((where, name) for where, name in ours(room) if below(name, INSIDE))
 
 
+@pytest.mark.parametrize('node', ['navigator_node', 'inspector_node', 'newest', 'transforms'])
+def test_the_second_robots_nodes_do_not_see_what_is_true(node):
+    place = 'inspection_robot/nodes/' + node
+    assert list(found(place))
+    assert not told((where, name) for where, name in ours(place)
+                    if below(name, ['inspection_robot.world']))
+
+
 @pytest.mark.parametrize('folder', ROS_FREE)
 def test_what_is_free_of_ros_imports_none(folder):
     # SMACH itself needs no ROS
@@ -107,7 +115,8 @@ def test_no_package_has_too_many_modules():
 
 
 @pytest.mark.parametrize('room',
-                         ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'interfaces', 'pr2'])
+                         ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'interfaces', 'pr2',
+                          'inspection_robot/robot'])
 def test_neither_executive_nor_task_nor_subsystem_asks_for_the_truth_or_its_causes(room):
     for path in python_files('src/smach_oracle/' + room):
         found = re.findall(

@@ -7,10 +7,10 @@ from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
 
 from smach_oracle.ros.oracle_run.script_runner import parse
-from smach_oracle.tasks import drink_retrieval, pick_and_place
+from smach_oracle.tasks import drink_retrieval, inspection, pick_and_place
 
 
-@pytest.mark.parametrize('task', [pick_and_place, drink_retrieval])
+@pytest.mark.parametrize('task', [pick_and_place, drink_retrieval, inspection])
 def test_without_a_world_a_task_names_the_launch_file_that_has_one(task, monkeypatch):
     def never_comes(name, limit_s):
         raise rospy.ROSException('timeout exceeded while waiting for service')

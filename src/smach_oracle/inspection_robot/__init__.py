@@ -1,0 +1,1 @@
+"""A wheeled robot without arms that reads gauges, and its world. It knows no other room."""

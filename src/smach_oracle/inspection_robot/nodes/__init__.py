@@ -1,0 +1,1 @@
+"""The ROS nodes: the world, the navigator, the inspector."""

@@ -1,0 +1,137 @@
+"""The hall and the robot's hardware as a ROS node: base, laser scanner, camera, battery, clock."""
+import json
+import re
+import threading
+import time
+from pathlib import Path
+from typing import Optional
+
+import rospy
+from geometry_msgs.msg import Twist
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from ..world.causes import CHANCE, draw
+from ..world.inspection_world import InspectionWorld
+from .hardware_topics import HardwareTopics
+from .parameters import ParameterError, number_in, parameters_of, words_in
+
+STEP_S = 0.05
+SCAN_STEPS = 2  # a scan and odometry every so many steps
+IMAGE_STEPS = 4
+SETTLES_S = 0.5  # after the robot was set down at its start
+REPORTS_COME_S = 0.5  # wall time: what was reported last may come after the call of the service
+LAST_WORDS_S = 5.0  # for the last trial's line
+DRAWN = 'drawn'  # the causes of a trial, where none are named
+REPORT = re.compile(r'panel (\d+): (\d+(?:\.\d+)?) bar')
+
+
+class InspectionWorldNode:
+    """Serves one world after the other; `run` lets their time pass."""
+
+    def __init__(self) -> None:
+        """:raises ParameterError: for a parameter that cannot be used."""
+        self._speed = number_in('speed', 1.0, 0.1, 20.0)
+        self._seed = int(number_in('seed', 1, 0, 2**31))
+        causes = words_in('causes', DRAWN)
+        self._only = None if causes == [DRAWN] else [each for each in causes if each != 'none']
+        if not set(self._only or ()) <= set(CHANCE):
+            raise ParameterError('{}: allowed are {}, none, or some of {}'.format(
+                rospy.resolve_name('~causes'), DRAWN, ', '.join(CHANCE)))
+        self._truth_file = str(rospy.get_param('~truth_file', 'none'))
+        self._lock = threading.Lock()
+        self._world = InspectionWorld(draw(self._seed, self._only))
+        self._in_trial = False
+        self._steps = 0
+        self._clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
+        self._topics = HardwareTopics()
+        rospy.Subscriber('cmd_vel', Twist, self._drive, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber('inspection/report', String, self._hear, queue_size=10)
+        self._service = rospy.Service('new_trial', Trigger, self._new_trial)
+
+    def run(self) -> None:
+        """Let time pass until the node ends, which is the end of the last trial, too.
+
+        Not for the main thread: a signal is handled there, and takes locks that publishing takes.
+        """
+        try:
+            self._pass()
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # else a topic was closed while it published
+                raise
+        finally:
+            with self._lock:
+                self._write_truth()
+
+    def _pass(self) -> None:
+        due_s = time.monotonic()
+        while not rospy.is_shutdown():
+            self._step()
+            due_s = max(due_s + STEP_S / self._speed, time.monotonic() - STEP_S)
+            time.sleep(max(0.0, due_s - time.monotonic()))
+
+    def _step(self) -> None:
+        with self._lock:
+            self._world.step(STEP_S)
+            self._steps += 1
+            world, steps = self._world, self._steps
+            now = rospy.Time.from_sec(steps * STEP_S)
+            scan = world.scan() if steps % SCAN_STEPS == 0 else None
+        self._clock.publish(Clock(now))
+        if scan is not None:
+            self._topics.publish_state(world, scan, now)
+        if steps % IMAGE_STEPS == 0:
+            self._topics.publish_image(world, now)
+
+    def _drive(self, message: Twist) -> None:
+        with self._lock:
+            self._world.base.command(message.linear.x, message.angular.z)
+
+    def _hear(self, message: String) -> None:
+        told = REPORT.fullmatch(message.data)
+        if told is not None:
+            with self._lock:
+                self._world.reported[int(told.group(1))] = float(told.group(2))
+
+    def _new_trial(self, _: TriggerRequest) -> TriggerResponse:
+        """Set the robot down at its start, in the world of the next seed."""
+        time.sleep(REPORTS_COME_S)
+        with self._lock:
+            self._write_truth()
+            self._seed += self._in_trial
+            self._world = world = InspectionWorld(draw(self._seed, self._only))
+            self._in_trial = True
+        self._topics.publish_start()
+        while world.time_s < SETTLES_S and not rospy.is_shutdown():
+            time.sleep(STEP_S / self._speed)
+        return TriggerResponse(True, 'seed {}'.format(world.scene.seed))
+
+    def _write_truth(self) -> None:
+        """Append a line on how the trial truly went."""
+        if not self._in_trial or self._truth_file in ('', 'none'):
+            return
+        world = self._world
+        lacking = world.shortcomings()
+        line = json.dumps({'seed': world.scene.seed, 'task': 'inspection', 'success': not lacking,
+                           'why': '; '.join(lacking), 'causes': list(world.scene.causes),
+                           'sim_s': round(world.time_s, 2)})
+        with Path(self._truth_file).expanduser().open('a', encoding='utf-8') as stream:
+            stream.write(line + '\n')
+
+
+def main() -> Optional[int]:
+    """Entry point of the node."""
+    parameters_of('Node: the hall of the inspection robot, its base, its sensors, and the clock. '
+                  'Parameters: ~speed, ~seed, ~causes, ~truth_file; see doc/second_robot.md.')
+    rospy.init_node('inspection_world')
+    try:
+        node = InspectionWorldNode()
+    except ParameterError as err:
+        rospy.logfatal('inspection_world: %s', err)
+        return 2
+    passing = threading.Thread(target=node.run, name='time', daemon=True)
+    passing.start()
+    rospy.spin()
+    passing.join(LAST_WORDS_S)
+    return 0

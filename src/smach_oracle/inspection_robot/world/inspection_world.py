@@ -1,0 +1,84 @@
+"""One trial's world, and how time passes in it."""
+from typing import Dict, List, Optional
+
+import numpy as np
+
+from ..rays import Circle, ranges
+from ..site import PANELS, START, WALLS, Pose
+from .base import WheeledBase, noisy_ranges
+from .causes import TrialScene
+from .gauge import painted
+from .people import Walker
+from .view import Sunlight, view
+
+BEAMS = np.radians(np.arange(-135.0, 135.1, 3.0))  # rad, of the laser scanner, to the left
+SCANNER_RANGE = 12.0  # m
+FULL_V, SAGGED_V = 25.2, 20.5  # volts of the battery
+CLOSE_ENOUGH = 0.4  # bar between a reading that was reported and the true one
+
+
+class InspectionWorld:
+    """The hall of a seed, with its robot. Pure: no clock but what `step` is told."""
+
+    def __init__(self, scene: TrialScene) -> None:
+        self.scene = scene
+        self.time_s = 0.0
+        self.base = WheeledBase(START, scene.wet)
+        self.reported: Dict[int, float] = {}  # bar, by the number of the panel
+        self._people = [Walker(errand) for errand in scene.errands]
+        self._fronts = {panel.number: painted(panel.number, scene.readings[panel.number])
+                        for panel in PANELS}
+        self._rng = np.random.default_rng(scene.seed + 1)
+
+    @property
+    def people(self) -> List[Circle]:
+        """x, y and radius of each person (m)."""
+        return [walker.circle for walker in self._people]
+
+    @property
+    def battery_is_low(self) -> bool:
+        """Whether the battery's voltage has broken down."""
+        sag = self.scene.sag
+        return sag is not None and sag.begins_s <= self.time_s < sag.ends_s
+
+    @property
+    def voltage(self) -> float:
+        """Of the battery (V)."""
+        return SAGGED_V if self.battery_is_low else FULL_V
+
+    def step(self, dt_s: float) -> None:
+        """Let time pass (s)."""
+        self.time_s += dt_s
+        for walker in self._people:
+            walker.step(dt_s, self.base.pose)
+        self.base.powered = not self.battery_is_low
+        self.base.step(dt_s, self.people)
+
+    def scan(self) -> np.ndarray:
+        """(n,) m along each of BEAMS, as the laser scanner tells it."""
+        pose: Pose = self.base.pose
+        exact = ranges(pose, BEAMS + pose[2], WALLS, self.people)
+        return np.minimum(noisy_ranges(exact, self._rng), SCANNER_RANGE)
+
+    def image(self) -> np.ndarray:
+        """(h, w, 3) uint8 RGB: what the camera sees."""
+        base = self.base
+        return view(base.pose, base.twist, self._fronts, self.people, self._sunlight(), self._rng)
+
+    def _sunlight(self) -> Optional[Sunlight]:
+        glare = self.scene.glare
+        if glare is None or not glare.begins_s <= self.time_s < glare.ends_s:
+            return None
+        return Sunlight(glare.panel, glare.angle)
+
+    def shortcomings(self) -> List[str]:
+        """What the goal lacks: every panel must have been reported, and reported right."""
+        told = []
+        for panel in PANELS:
+            reading, true = self.reported.get(panel.number), self.scene.readings[panel.number]
+            if reading is None:
+                told.append('panel {} was not reported'.format(panel.number))
+            elif abs(reading - true) > CLOSE_ENOUGH:
+                told.append('panel {} was reported as {:.2f} and shows {:.2f} bar'.format(
+                    panel.number, reading, true))
+        return told
