@@ -123,7 +123,7 @@ class OracleHealthTest(unittest.TestCase):
         self.motors.on = True
         self.assertEqual(task.wait(), 0, task.output())
         self.assertIn('OUTCOME succeeded', task.output())
-        self.assertIn('TASK/DRIVE failed while the robot is not well ({}): waiting; no failure is '
+        self.assertIn('task/DRIVE failed while the robot is not well ({}): waiting; no failure is '
                       'counted'.format(why), task.output())
         self.assertEqual(self.motors.goals, 2)
         events, = recorded_events(self.folder)

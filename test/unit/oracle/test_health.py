@@ -373,32 +373,3 @@ def test_a_state_that_runs_while_the_robot_is_unwell_is_not_disturbed(health):
     gate.go.set()
     assert run.result() == 'done'
     assert health.asked == 0
-
-
-@pytest.mark.parametrize('answer, visited', [
-    (goto('B'), ['A', 'B', 'B', 'C']), (supersede('ok'), ['A', 'B', 'C'])])
-def test_a_state_that_is_not_repeated_by_itself_is_asked_about_once_all_is_well(
-        health, answer, visited):
-    expert = FakeExpert(answer)
-    machine = watched(Scripted(), Scripted(fails_unwell(health)), Scripted(), health=health,
-                      expert=expert, settings={'health_settle_s': SETTLE_S,
-                                               'states': {'B': {'on_retry': 'confirm'}}})
-    run = in_thread(machine.run)
-    assert healthy_again(machine, health, run) == 'done'
-    assert machine.visits() == visited
-    question, = expert.questions
-    assert question.failed_state == 'B'
-    assert 'failed while the robot was not well, and is not repeated by itself' in question.reason
-    assert not machine.of(EventKind.FAILURE)
-    assert machine.rate('B').failures == 0
-
-
-def test_a_state_that_must_not_be_repeated_is_not_when_all_is_well_again(health):
-    expert = FakeExpert(goto('B'), supersede('ok'))
-    machine = watched(Scripted(), Scripted(fails_unwell(health)), Scripted(), health=health,
-                      expert=expert, settings={'health_settle_s': SETTLE_S,
-                                               'states': {'B': {'on_retry': 'never'}}})
-    run = in_thread(machine.run)
-    assert healthy_again(machine, health, run) == 'done'
-    assert machine.visits() == ['A', 'B', 'C']
-    assert len(expert.questions) == 2, 'the answer that names it is refused'

@@ -1,7 +1,7 @@
 """Whether the robot is well, asked for a whole tree of machines; the one notice that it is not."""
 import threading
 import time
-from typing import Any, Callable, Dict, List, Optional, Protocol, Sequence, Set, Tuple
+from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
 
 import smach
 
@@ -192,9 +192,6 @@ class HealthWatch:
         phase.teller.emit(EventKind.HEALTH_WAIT_END, state=phase.state, outcome=outcome, text=text,
                           data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)})
 
-    def __getstate__(self) -> Dict[str, Any]:
-        """Neither who is asked nor a wait travels with a pickled machine."""
-        return {}
-
-    def __setstate__(self, state: Dict[str, Any]) -> None:
-        self.__init__()  # type: ignore[misc]
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """Neither who is asked nor a wait travels with a copied or pickled machine."""
+        return HealthWatch, ()

@@ -76,9 +76,10 @@ def _read_parameters(uri: str) -> Dict[str, Any]:
     socket.setdefaulttimeout(READ_TIMEOUT_S)
     try:
         with xmlrpc.client.ServerProxy(uri) as real:
-            code, message, value = real.getParam(CALLER, '/')  # type: ignore[misc]
+            answer: Any = real.getParam(CALLER, '/')
     finally:
         socket.setdefaulttimeout(before)
+    code, message, value = answer
     if code != 1 or not isinstance(value, dict):
         raise ValueError(message)
     return value
