@@ -130,8 +130,8 @@ class OracleHealthTest(unittest.TestCase):
         self.assertEqual([event.seq for event in events], list(range(len(events))))
         start, end = [event for event in events if event.kind in (
             OracleEvent.HEALTH_WAIT_START, OracleEvent.HEALTH_WAIT_END)]
-        self.assertEqual((start.path, start.state, start.text), ('TASK', 'DRIVE', why))
-        self.assertEqual((end.outcome, '"states": ["TASK/DRIVE"]' in end.data), ('well', True))
+        self.assertEqual((start.path, start.state, start.text), ('task', 'DRIVE', why))
+        self.assertEqual((end.outcome, '"states": ["task/DRIVE"]' in end.data), ('well', True))
         trial, = load_trials([self.folder]).trials
         self.assertEqual((trial.failures, trial.recoveries, trial.questions, trial.ending),
                          (0, 0, 0, TrialEnding.SUCCESS))
