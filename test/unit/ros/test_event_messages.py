@@ -7,7 +7,7 @@ from typing import NamedTuple
 import genpy
 import pytest
 
-from smach_oracle.msg import OracleEvent
+from smach_oracle.msg import ExpertQueryGoal, OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.ros.event_messages import rates_to_msg, to_msg
 
@@ -56,7 +56,8 @@ def test_every_field_of_an_event_arrives():
 
 def test_the_kinds_of_the_executive_and_of_the_message_are_the_same():
     for kind in list(EventKind) + list(FailureKind):
-        assert getattr(OracleEvent, kind.name) == kind
+        message = OracleEvent if hasattr(OracleEvent, kind.name) else ExpertQueryGoal
+        assert getattr(message, kind.name) == kind
 
 
 def test_an_event_without_a_rate_or_data_says_so():
