@@ -100,6 +100,17 @@ def test_nobody_to_ask_is_the_end_and_a_fallback_repeats_nothing():
     assert 'fallback: stop with aborted' in machine.of(EventKind.QUERY_EXPIRED)[0].text
 
 
+def test_a_fallback_may_lead_to_a_place_from_which_nothing_is_repeated():
+    machine = smach.StateMachine(outcomes=OUTCOMES)
+    with machine:
+        smach.StateMachine.add('POUR', Scripted(), {'ok': 'PLACE'})
+        smach.StateMachine.add('PLACE', Scripted('aborted'), {'ok': 'done'})
+        smach.StateMachine.add('PARK', Scripted(), {'ok': 'done'})
+    watched, _ = guarded(machine, max_recoveries=0, on_no_answer='goto:PARK')
+    assert watched.run() == 'done'
+    assert watched.visits() == ['POUR', 'PLACE', 'PARK']
+
+
 def test_a_fallback_that_repeats_nothing_is_taken():
     machine, _ = guarded(pouring('aborted'), max_recoveries=0, on_no_answer='goto:PLACE')
     assert machine.run() == 'done'
@@ -180,11 +191,15 @@ def test_behind_a_state_never_visited_it_says_where_the_authors_transitions_lead
         'ARM': ('ARM/POUR',), 'DETECT': (), 'LATER': ('ARM/POUR',), 'LAST': ('ARM/POUR',)}
 
 
-def test_a_fallback_does_not_lead_into_the_unknown():
-    states = chain(POUR=Scripted(), PLACE=Scripted('aborted'), LATER=Scripted())
+def test_a_fallback_does_not_lead_to_where_the_way_leads_back():
+    states = smach.StateMachine(outcomes=OUTCOMES)
+    with states:
+        smach.StateMachine.add('POUR', Scripted(), {'ok': 'PLACE'})
+        smach.StateMachine.add('PLACE', Scripted('aborted'), {'ok': 'done'})
+        smach.StateMachine.add('LATER', Scripted(), {'ok': 'POUR'})
     machine, _ = guarded(states, max_recoveries=0, on_no_answer='goto:LATER')
     assert machine.run() == 'aborted'
-    assert ('this trial has not been in LATER, which may repeat POUR; stopping'
+    assert ('this trial has not been in LATER, and going there may repeat POUR; stopping'
             in machine.of(EventKind.WARNING)[-1].text)
 
 

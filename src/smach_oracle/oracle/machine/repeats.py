@@ -41,27 +41,18 @@ def note_visit(node: TreeNode, record: StateRecord) -> str:
     return ''
 
 
-def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
-    """Return the guarded states that would be repeated if the oracle went to a state.
-
-    They are those that were executed since the machine came to `target` last, itself among them. If
-    it has not been there in this trial, nobody knows what lies behind it, and they are all.
-    """
-    return tuple(done.name for done in _done_since(node, target))
-
-
 def has_visited(node: TreeNode, label: str) -> bool:
     """Whether the machine has come to a state in this trial."""
     return bool(node.records.marks.of(label).reached)
 
 
-def seen_behind(node: TreeNode, target: str) -> Tuple[str, ...]:
-    """Return what an expert is told of a state: what would come again if the machine went there.
+def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
+    """Return the guarded states that may be repeated if the machine goes to a state.
 
-    Behind a state where it has not been in this trial, these are the guarded states to which the
-    author's transitions lead from there.
+    They are those that were executed since it came to `target` last, itself among them. If it has
+    not been there in this trial, they are those to which the author's transitions lead from there.
     """
-    repeated = repeated_by_going_to(node, target)
+    repeated = tuple(done.name for done in _done_since(node, target))
     if not repeated or has_visited(node, target):
         return repeated
     reached = _reached_from(node, target)

@@ -5,7 +5,7 @@ import smach
 
 from ..asking.question import OutcomeChoice, Question, StateChoice
 from ..machine.protocols import Machine
-from ..machine.repeats import seen_behind, why_closed
+from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.state_record import StateRecord
@@ -52,7 +52,7 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             label, 1.0 - record.rate, int(record.failure_class), record.visits,
             missing_keys(node.machine, label, keys_after_jump(node, label, written)),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed(node, label), seen_behind(node, label))
+            why_closed(node, label), repeated_by_going_to(node, label))
 
 
 def _supersede_outcomes(machine: Machine, label: str,

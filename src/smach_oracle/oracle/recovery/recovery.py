@@ -135,7 +135,7 @@ class Recovery:
         if not repeated:
             return ''
         if not has_visited(self._node, target):
-            return 'this trial has not been in {}, which may repeat {}'.format(
+            return 'this trial has not been in {}, and going there may repeat {}'.format(
                 target, ', '.join(repeated))
         return going_would_repeat(self._record.label, target, repeated)
 

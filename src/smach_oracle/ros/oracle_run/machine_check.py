@@ -1,13 +1,14 @@
 """Every machine that a checked script executes: it is checked, and not executed."""
 import functools
 import threading
-from typing import Any, Callable, Iterator, List, Type
+from typing import Any, Callable, Iterator, List, Type, cast
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.prospects import good_outcome, prospects_of
 from smach_oracle.oracle.settings.settings import Settings
 
+from ..machine_names import machine_names
 from .check_report import lines_of, wrapped
 from .interception import MARK, family, machines_inside
 
@@ -56,7 +57,8 @@ class MachineCheck:
         with _heard_warnings() as warnings:
             if not isinstance(machine, OracleContainer):
                 self._wrap(machine)
-        name = oracle_of(machine).path  # shared by machines of the same structure
+        with machine_names().running(cast(OracleContainer, machine)):
+            name = oracle_of(machine).path  # shared by machines of the same structure
         self._names.append(name)
         if self._names.count(name) > MAX_ALIKE:
             raise StopIteration('it builds machines of one structure again and again')

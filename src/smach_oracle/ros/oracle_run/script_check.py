@@ -16,7 +16,15 @@ from . import check_stubs
 from .check_report import wrapped
 from .machine_check import MachineCheck, intercept
 from .refusal import USAGE_ERROR, Refusal
-from .script_runner import MachineWrapper, load, parse, read_settings, run_script, tell
+from .script_runner import (
+    MachineWrapper,
+    give_names,
+    load,
+    parse,
+    read_settings,
+    run_script,
+    tell,
+)
 
 LIMIT_S = 30.0  # for the script to reach a machine, or a further one
 # a script that has executed its machines, and waits: for one in another thread
@@ -30,6 +38,7 @@ def check_script(args: Sequence[str], notes: Sequence[str]) -> NoReturn:
     :param notes: what is to be told first.
     """
     invocation = parse(args)
+    give_names(invocation)
     watch = _ScriptWatch(_report_stream())
     watch.tell(wrapped('Checking {}: no machine is executed, and no robot is reached.'.format(
         invocation.script), 0))

@@ -246,6 +246,11 @@ class MachineWrapper:
             smach.logwarn('A machine of the script: {}'.format(problem))
 
 
+def give_names(invocation: Invocation) -> None:
+    """Name the machines of this process as the command line says."""
+    machine_names().given, machine_names().script = invocation.name, named_after(invocation.script)
+
+
 def named_after(script: str) -> str:
     """Return a machine's name for a script: PICK_AND_PLACE for pick_and_place.py."""
     return os.path.splitext(os.path.basename(script))[0].upper().replace(' ', '_')
@@ -305,7 +310,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
         start(words)
     from .interception import Interception
     attachment.configure(invocation.options)
-    machine_names().given, machine_names().script = invocation.name, named_after(invocation.script)
+    give_names(invocation)
     guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)
