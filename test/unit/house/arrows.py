@@ -24,6 +24,9 @@ ARROWS: Dict[str, Set[str]] = {
     'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                    'analysis', 'packages'},
     'tasks': set(),
+    # the public face of the executive; ros is imported where a test asks for it
+    'testing': {'oracle.OracleContainer', 'oracle.asking', 'oracle.background', 'oracle.errors',
+                'oracle.oracle_of', 'oracle.records', 'oracle.settings', 'oracle.unwrap', 'ros'},
     '__init__': {'oracle.OracleContainer', 'ros.container'},
     'commands': {'packages'},  # it starts modules of the rooms by their names
     'packages': set(),
@@ -61,6 +64,10 @@ LAYERS: Dict[str, List[Layer]] = {
         'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
         {'model', 'robot', 'kitchen'}
     ],
+    'testing': [
+        {'script_run', 'soak'}, {'bench', 'soak_report'}, 'observed_trial',
+        {'injection', 'node_side', 'trial_text', 'script'}, {'faults', 'places'}, 'errors'
+    ],
     'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
 }
 # what runs where no ROS is installed
@@ -68,7 +75,7 @@ ROS_FREE = [
     'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
     'pr2/skills', 'simulation/physics', 'simulation/scenes', 'commands', 'packages'
 ]
-WITH_SMACH = {'oracle', 'ros', 'tasks'}
+WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(
     r'ros(?!bags)\w*|smach(?:_ros|_msgs)?|actionlib|genpy|tf|tf2_\w+|message_filters|'
     r'\w+_(?:msgs|srvs)')
