@@ -11,6 +11,7 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of, unwrap
 from smach_oracle.oracle.asking.question import Answer, Expert, Progress, Question
 from smach_oracle.oracle.background import BackgroundCall
+from smach_oracle.oracle.errors import TrialError
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
@@ -61,12 +62,16 @@ class Bench:
         :param ros: attach the machine to its ROS node: events, introspection, `~expert_query`.
         :raises FaultError: for a fault that fits no state.
         :raises SettingsError: naming key, value and what is allowed.
+        :raises TrialError: for a machine that is wrapped inside another one.
         """
         self.machine = machine
         self.faults = tuple(faults)
         self._limit_s = limit_s
         self._node = _node_side(machine) if ros else None
         self._was_wrapped = isinstance(machine, OracleContainer)
+        if self._was_wrapped and not oracle_of(machine).is_top:
+            raise TrialError('{} is wrapped inside another machine; put the top one on the '
+                             'bench'.format(oracle_of(machine).path))
         self._settings_before: Optional[Settings] = None  # where others are in force now
         self._put_under(settings, preconditions)
         oracle = oracle_of(machine)
@@ -129,8 +134,11 @@ class Bench:
         :raises FaultError: for a fault that fits no state.
         :raises ScriptError: where a question did not go with the script of the expert.
         :raises TrialLimitError: where the trial did not end in time; it was preempted then.
+        :raises TrialError: where the machine still runs.
         """
         __tracebackhide__ = True
+        if self.machine.is_running():
+            raise TrialError('the machine runs already, perhaps since a trial that did not end')
         notes = _TrialNotes(self.machine, self._failing)
         injection = self._injection(self.faults if faults is None else tuple(faults), notes)
         for key, value in (userdata or {}).items():

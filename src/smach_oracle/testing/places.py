@@ -30,8 +30,8 @@ class StatePlace(NamedTuple):
             container._current_label == self.label)
 
 
-def places_of(machine: smach.StateMachine) -> List[StatePlace]:
-    """Return the states of a machine and of all containers in it, the outer ones first."""
+def places_of(machine: smach.Container) -> List[StatePlace]:
+    """Return the states of a container and of all containers in it, the outer ones first."""
     return list(_places_in(machine, '', (machine,)))
 
 

@@ -5,13 +5,16 @@ OUTCOMES = ('succeeded', 'aborted', 'preempted')
 
 
 class Works(smach.State):
-    """Succeeds, and counts how often it did its work."""
+    """Succeeds, unless it is preempted, and counts how often it did its work."""
 
     def __init__(self, outcomes=OUTCOMES, **keys):
         smach.State.__init__(self, outcomes=list(outcomes), **keys)
         self.runs = 0
 
     def execute(self, userdata):
+        if self.preempt_requested():
+            self.service_preempt()
+            return 'preempted'
         self.runs += 1
         return 'succeeded'
 

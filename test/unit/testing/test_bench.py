@@ -14,6 +14,7 @@ from bench_machines import (
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.asking.question import Expert
+from smach_oracle.oracle.errors import TrialError
 from smach_oracle.testing import (
     Bench,
     FaultError,
@@ -25,6 +26,7 @@ from smach_oracle.testing import (
     hang,
     overrun,
 )
+from smach_oracle.testing import bench as bench_module
 
 
 @pytest.mark.parametrize('build', BUILDERS)
@@ -80,6 +82,42 @@ def test_each_trial_counts_its_visits_and_may_have_faults_of_its_own():
             bench.run().assert_failed('PICK', times=1)
         bench.run([crash('PLACE', visit=1)]).assert_failed('PLACE')
         bench.run([]).assert_no_failures()
+
+
+def test_a_machine_inside_a_wrapped_one_is_refused():
+    machine = OracleContainer.wrap(nested_machine())
+    with pytest.raises(TrialError, match='SM_ROOT/KITCHEN is wrapped inside another machine'):
+        Bench(machine['KITCHEN'])
+
+
+class HangsForGood(Works):
+    """A state of the user's that ignores a preempt, until the test lets it go."""
+
+    def __init__(self):
+        Works.__init__(self)
+        self.go = threading.Event()
+
+    def execute(self, userdata):
+        assert self.go.wait(60)
+        return 'succeeded'
+
+
+def test_a_state_of_ones_own_that_hangs_for_good_does_not_hang_the_test(monkeypatch):
+    monkeypatch.setattr(bench_module, '_GRACE_S', 0.1)
+    pick = HangsForGood()
+    machine = fetch_machine(pick=pick)
+    bench = Bench(machine, limit_s=0.2)
+    with pytest.raises(TrialLimitError, match='PICK    is entered'):
+        bench.run()
+    with pytest.raises(TrialError, match='the machine runs already'):
+        bench.run()
+    pick.go.set()
+    for thread in threading.enumerate():
+        if thread.name == 'smach_oracle test bench':
+            thread.join(20)
+    bench.run().assert_ended_with('succeeded')
+    bench.close()
+    assert type(machine) is smach.StateMachine
 
 
 def test_userdata_is_put_in_before():

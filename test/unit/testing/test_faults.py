@@ -5,6 +5,7 @@ import pytest
 from bench_machines import (
     BUILDERS,
     Works,
+    concurrence_machine,
     fetch_machine,
     iterator_machine,
     nested_machine,
@@ -48,14 +49,12 @@ def test_an_exception_leaves_every_kind_of_container_as_one_of_a_state_does(buil
     with faults(machine, [crash('PICK', error=ZeroDivisionError('planted'))]):
         with pytest.raises(smach.InvalidUserCodeError):
             machine.execute()
-    assert machine.execute() == 'succeeded'
+    assert 'execute' not in vars(state_of(machine, 'PICK'))
 
 
-@pytest.mark.parametrize('build', BUILDERS)
-def test_a_state_that_hangs_waits_for_its_preempt(build):
-    machine = build()
+def hang_until_preempted(machine, label):
     entered = threading.Event()
-    with faults(machine, [hang('PICK')]) as injection:
+    with faults(machine, [hang(label)]) as injection:
         injection._report = lambda place, visit, what, text: what == 'fault' and entered.set()
         call = threading.Thread(target=machine.execute)
         call.start()
@@ -63,7 +62,34 @@ def test_a_state_that_hangs_waits_for_its_preempt(build):
         machine.request_preempt()
         call.join(20)
         assert not call.is_alive()
+
+
+@pytest.mark.parametrize('build', BUILDERS)
+def test_a_state_that_hangs_waits_for_its_preempt(build):
+    machine = build()
+    hang_until_preempted(machine, 'PICK')
     assert state_of(machine, 'PICK').runs == 0
+    assert machine.execute() == 'succeeded'
+
+
+@pytest.mark.parametrize('build, label', [
+    (nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')])
+def test_a_container_that_hung_finds_no_old_preempt(build, label):
+    machine = build()
+    hang_until_preempted(machine, label)
+    assert machine.execute() == 'succeeded'
+
+
+@pytest.mark.parametrize('build, label', [
+    (nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')])
+@pytest.mark.parametrize('fault', [fail, crash, hang])
+def test_a_container_fails_as_a_state_does_and_works_the_next_time(build, label, fault):
+    machine = OracleContainer.wrap(build(), settings={
+        'states': {label: {'time_limit_s': 0.1 if fault is hang else 60}}})
+    with faults(machine, [fault(label, visit=1)]) as injection:
+        assert machine.execute() == 'succeeded'
+    assert injection.armed[0].happened == 1
+    assert state_of(machine, 'PICK').runs == (3 if build is iterator_machine else 1)
 
 
 def test_a_fault_happens_at_its_visit_alone():
