@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Machines on the bench in a node: what a robot's tools see of them, and that it goes away."""
 import sys
+import tempfile
 import unittest
 
 import rosgraph
 import rospy
+from oracle_support import oracle_run, script
 from std_srvs.srv import Trigger, TriggerResponse
 from waiting import wait_for
 
@@ -14,8 +16,31 @@ from smach_msgs.msg import SmachContainerStructure
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.testing import Bench, expert, fail, goto, overrun, soak
+from smach_oracle.testing.recorded import recorded_trials
 
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
+
+FAILS_ONCE = '''
+import rospy, smach
+
+class Works(smach.State):
+    runs = 0
+
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded', 'aborted'])
+
+    def execute(self, userdata):
+        Works.runs += 1
+        return 'aborted' if Works.runs == 1 else 'succeeded'
+
+rospy.init_node('task')
+machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+with machine:
+    smach.StateMachine.add('PICK', Works(), {'succeeded': 'PLACE'})
+    smach.StateMachine.add('PLACE', Works())
+for trial in range(2):
+    print(machine.execute())
+'''
 
 
 def build_machine() -> smach.StateMachine:
@@ -80,6 +105,24 @@ class BenchTest(unittest.TestCase):
         with Bench(build_machine(), [overrun('CALL', 600, visit=1)],
                    settings={'states': {'CALL': {'time_limit_s': 0.2}}}) as bench:
             bench.run().assert_recovered('CALL')
+
+    def test_the_trials_of_a_script_under_oracle_run_are_read_from_their_bags(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            task = oracle_run(self, '--record', folder, script(self, FAILS_ONCE))
+            self.assertEqual(task.wait(60), 0, task.output())
+            first, second = recorded_trials(folder)
+        first.assert_recovered('PICK').assert_failed('PICK', times=1).assert_not_asked()
+        second.assert_no_failures().assert_visited(['PICK', 'PLACE'], exactly=True)
+        with self.assertRaisesRegex(AssertionError, 'PICK failed .*: trying it again'):
+            first.assert_no_failures()
+
+    def test_what_ended_a_recorded_trial_is_known(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            task = oracle_run(self, '--without-oracle', '--record', folder,
+                              script(self, FAILS_ONCE.replace("'aborted' if", '1 / 0 if')))
+            self.assertNotEqual(task.wait(60), 0)
+            trial, = recorded_trials(folder)
+        self.assertIn('ZeroDivisionError', str(trial.assert_raised(RuntimeError)))
 
     def test_a_soak_runs_in_a_node(self) -> None:
         soak(build_machine(), trials=20).assert_all_recovered()

@@ -65,7 +65,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'model', 'robot', 'kitchen'}
     ],
     'testing': [
-        {'script_run', 'soak'}, {'bench', 'soak_report'}, 'observed_trial',
+        {'script_run', 'soak'}, {'bench', 'recorded', 'soak_report'}, 'observed_trial',
         {'injection', 'node_side', 'trial_text', 'script'}, {'faults', 'places'}, 'errors'
     ],
     'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
