@@ -31,7 +31,7 @@ def test_an_exception_is_recovered_from():
 
 def test_an_arm_that_hangs_is_stopped_at_its_time_limit():
     with Bench(build_machine(), [hang('PICK', visit=1)],
-               settings={'states': {'PICK': {'time_limit_s': 0.2}}}) as bench:
+               settings={'states': {'PICK': {'time_limit_s': 1.0}}}) as bench:
         bench.run().assert_recovered('PICK')
 
 

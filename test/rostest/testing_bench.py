@@ -103,7 +103,7 @@ class BenchTest(unittest.TestCase):
 
     def test_a_service_that_takes_too_long_overruns(self) -> None:
         with Bench(build_machine(), [overrun('CALL', 600, visit=1)],
-                   settings={'states': {'CALL': {'time_limit_s': 0.2}}}) as bench:
+                   settings={'states': {'CALL': {'time_limit_s': 2.0}}}) as bench:
             bench.run().assert_recovered('CALL')
 
     def test_the_trials_of_a_script_under_oracle_run_are_read_from_their_bags(self) -> None:

@@ -85,7 +85,7 @@ def test_a_container_that_hung_finds_no_old_preempt(build, label):
 @pytest.mark.parametrize('fault', [fail, crash, hang])
 def test_a_container_fails_as_a_state_does_and_works_the_next_time(build, label, fault):
     machine = OracleContainer.wrap(build(), settings={
-        'states': {label: {'time_limit_s': 0.1 if fault is hang else 60}}})
+        'states': {label: {'time_limit_s': 1.0 if fault is hang else 60}}})
     with faults(machine, [fault(label, visit=1)]) as injection:
         assert machine.execute() == 'succeeded'
     assert injection.armed[0].happened == 1

@@ -122,16 +122,16 @@ def test_sometimes_is_neither_never_nor_always():
 
 
 def test_hangs_and_overruns_go_with_time_limits():
-    report = soak(fetch_machine, trials=6, states=['PICK'], most_in_row=1, overrun_s=600,
+    report = soak(fetch_machine, trials=4, states=['PICK'], most_in_row=1, overrun_s=600,
                   kinds=[FaultKind.HANG, FaultKind.OVERRUN],
-                  settings={'states': {'PICK': {'time_limit_s': 0.02}}})
+                  settings={'states': {'PICK': {'time_limit_s': 0.7}}})
     assert report.assert_all_recovered()
     assert {row.kind for row in report.rows} == {'hang', 'overrun'}
 
 
 def test_a_trial_that_does_not_end_counts_as_not_recovered():
-    report = soak(fetch_machine, trials=2, states=['PICK'], kinds=['hang'], limit_s=0.1)
-    assert 'the trial did not end within 0.1 s' in str(report)
+    report = soak(fetch_machine, trials=1, states=['PICK'], kinds=['hang'], limit_s=1.5)
+    assert 'the trial did not end within 1.5 s' in str(report)
     assert [row.kind for row in report.never_recovered] == ['hang']
 
 
