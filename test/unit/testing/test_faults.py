@@ -106,6 +106,14 @@ def test_several_visits_may_fail():
     assert injection.armed[0].happened == 3
 
 
+def test_of_several_faults_at_one_visit_the_first_happens():
+    machine = fetch_machine()
+    both = [fail('PICK', visit=2, outcome='aborted'), fail('PICK', outcome='preempted')]
+    with faults(machine, both) as injection:
+        assert [machine.execute(), machine.execute()] == ['preempted', 'aborted']
+    assert [armed.happened for armed in injection.armed] == [1, 1]
+
+
 def test_an_overrun_comes_before_the_work():
     machine = fetch_machine()
     with faults(machine, [overrun('PICK', 0.05)]):
