@@ -74,14 +74,6 @@ def test_a_state_that_hangs_waits_for_its_preempt(build):
 
 @pytest.mark.parametrize('build, label', [
     (nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')])
-def test_a_container_that_hung_finds_no_old_preempt(build, label):
-    machine = build()
-    hang_until_preempted(machine, label)
-    assert machine.execute() == 'succeeded'
-
-
-@pytest.mark.parametrize('build, label', [
-    (nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')])
 @pytest.mark.parametrize('fault', [fail, crash, hang])
 def test_a_container_fails_as_a_state_does_and_works_the_next_time(build, label, fault):
     machine = OracleContainer.wrap(build(), settings={
