@@ -15,7 +15,7 @@ from report import Outcome, read_junit, tail_of
 from upstream import ROSTESTS, UNIT_TESTS, environment
 
 PACKAGE = 'smach_oracle'
-PYTHON_SOURCES = ['src', 'scripts', 'test', 'benchmarks', 'cmake', 'setup.py']
+PYTHON_SOURCES = ['src', 'scripts', 'test', 'benchmarks', 'examples', 'cmake', 'setup.py']
 VERMIN = 'from vermin import main; main()'
 # a rostest ends by itself before, at its time-limit: only so does it tell which case hung
 MAX_ROSTEST_S = 600.0

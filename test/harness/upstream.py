@@ -3,15 +3,16 @@ import os
 from pathlib import Path
 from typing import Dict
 
-# on both engines: the executive, what SMACH does, and what attaches a machine to its node
-UNIT_TESTS = ['oracle', 'ros', 'smach']
+# on both engines: the executive, what SMACH does, what attaches a machine to its node, and the kit
+# with which users test theirs
+UNIT_TESTS = ['oracle', 'ros', 'smach', 'testing']
 # rostests of wrapped machines, and of what smach_ros does; not smach_ros_action_faults, which tests
 # what upstream has not: it looks into the links that states of ours share
 ROSTESTS = [
     'console_browser', 'expert_interface', 'expert_own_script', 'expert_paused', 'fault_*',
     'interface_on_demand', 'oracle_*', 'pr2_pick_and_place', 'record_topics',
     'second_robot', 'smach_ros_action_state', 'smach_ros_introspection', 'smach_ros_states',
-    'smach_ros_wrapper', 'still_running', 'task_recoveries'
+    'smach_ros_wrapper', 'still_running', 'task_recoveries', 'testing_bench'
 ]
 
 

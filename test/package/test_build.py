@@ -79,6 +79,16 @@ def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
     assert 'ended in succeeded' in in_installed(installed, command)
 
 
+def test_the_test_kit_and_its_examples_are_installed(installed):
+    examples = installed / 'installed/share/smach_oracle/examples'
+    assert (examples / 'fetch_task_rostest.py').stat().st_mode & 0o111
+    passed = in_installed(installed, 'python3 -m pytest -q -p no:cacheprovider {}'.format(examples))
+    assert '6 passed' in passed
+    where = in_installed(installed, 'python3 -c "import smach_oracle.testing as kit; '
+                                    'print(kit.__file__)"')
+    assert str(installed / 'installed') in where
+
+
 def test_launch_files_and_settings_are_installed(installed):
     files = in_installed(installed, 'roslaunch --files smach_oracle pick_and_place.launch')
     assert str(installed / 'installed') in files

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .asking.question import Answer, AnswerKind, Expert, Question
     from .container import OracleContainer
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
+    from .execution.unwrapping import unwrap
     from .machine.oracle import oracle_of
     from .settings.settings import Settings
 
@@ -19,10 +20,11 @@ _LAZY = {
     'OracleContainer': 'container', 'oracle_of': 'machine.oracle', 'Settings': 'settings.settings',
     'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
     'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
-    'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question'
+    'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question',
+    'unwrap': 'execution.unwrapping'
 }
 __all__ = ['Answer', 'AnswerKind', 'Expert', 'ExponentialFailureRate', 'FailureClass',
-           'FailureRate', 'OracleContainer', 'Question', 'Settings', 'oracle_of']
+           'FailureRate', 'OracleContainer', 'Question', 'Settings', 'oracle_of', 'unwrap']
 
 
 def __getattr__(name: str) -> object:

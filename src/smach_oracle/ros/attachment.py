@@ -74,6 +74,7 @@ class Attachments:
         self._on_ros: MutableSet[OracleContainer] = weakref.WeakSet()
         # our servers, by path; each holds its machine
         self._introspection: Dict[str, IntrospectionServer] = {}
+        self._shown: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by the same paths
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
@@ -115,6 +116,21 @@ class Attachments:
                 self._on_ros.add(machine)
             # last: topics that are there already are recorded from the first trial on
             self._record(machine, plan)
+
+    def detach(self, machine: OracleContainer) -> None:
+        """Let go of a top-level machine that has ended and is about to come out of its oracle.
+
+        Where it is wrapped again, its first execute attaches it anew.
+        """
+        with self._lock:
+            self._on_ros.discard(machine)
+            if self._rates is not None:
+                self._rates.forget(machine)
+            path = oracle_of(machine).path
+            shown = self._shown.get(path)
+            if shown is not None and shown() is machine:
+                del self._shown[path]
+                self._introspection.pop(path).stop()
 
     def preempt(self) -> None:
         """Ask every machine that runs to stop; its question, if any, is taken back with it."""
@@ -164,6 +180,7 @@ class Attachments:
         if earlier is not None:
             earlier.stop()
         self._introspection[path] = start_introspection(machine)
+        self._shown[path] = weakref.ref(machine)
 
     def _shared_expert(self) -> ExpertQueryClient:
         if self._expert is None:

@@ -127,6 +127,11 @@ class RatesPublisher:
             if not rospy.is_shutdown() and not self._closed:
                 self._publisher.publish(message)
 
+    def forget(self, machine: WatchedMachine) -> None:
+        """Publish nothing of a machine any more that has ended and comes out of its oracle."""
+        with self._publishing, self._wake:
+            self._pending.pop(id(machine), None)
+
     def close(self) -> None:
         """Stop the thread and take the topic back."""
         with self._wake:
@@ -139,10 +144,11 @@ class RatesPublisher:
     def _run(self) -> None:
         while self._wait():
             time.sleep(self._period_s)
-            with self._wake:
-                due, self._pending = self._pending, {}
-            for reference in due.values():
-                self._publish_quietly(reference())
+            with self._publishing:
+                with self._wake:
+                    due, self._pending = self._pending, {}
+                for reference in due.values():
+                    self._publish_quietly(reference())
 
     def _wait(self) -> bool:
         """Until something is to be published; False once closed."""

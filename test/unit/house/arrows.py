@@ -25,6 +25,9 @@ ARROWS: Dict[str, Set[str]] = {
                    'analysis', 'packages'},
     'tasks': set(),
     'inspection_robot': set(),  # a robot as any ROS user writes it
+    # the public face of the executive; ros is imported where a test asks for it
+    'testing': {'oracle.OracleContainer', 'oracle.asking', 'oracle.background', 'oracle.errors',
+                'oracle.oracle_of', 'oracle.records', 'oracle.settings', 'oracle.unwrap', 'ros'},
     '__init__': {'oracle.OracleContainer', 'ros.container'},
     'commands': {'packages'},  # it starts modules of the rooms by their names
     'packages': set(),
@@ -63,6 +66,10 @@ LAYERS: Dict[str, List[Layer]] = {
         'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
         {'model', 'robot', 'kitchen'}
     ],
+    'testing': [
+        {'script_run', 'soak'}, {'bench', 'recorded', 'soak_report'}, 'observed_trial',
+        {'injection', 'node_side', 'trial_text', 'script'}, {'faults', 'places'}, 'errors'
+    ],
     'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
     'inspection_robot': [{'nodes', 'checks'}, {'world', 'robot'}, {'rays', 'site'}],
 }
@@ -72,7 +79,7 @@ ROS_FREE = [
     'pr2/skills', 'simulation/physics', 'simulation/scenes', 'inspection_robot/world',
     'inspection_robot/robot', 'commands', 'packages'
 ]
-WITH_SMACH = {'oracle', 'ros', 'tasks'}
+WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(
     r'ros(?!bags)\w*|smach(?:_ros|_msgs)?|actionlib|genpy|tf|tf2_\w+|message_filters|'
     r'\w+_(?:msgs|srvs)')

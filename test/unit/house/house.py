@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Iterator, List, Tuple
 
 ROOT = Path(__file__).resolve().parents[3]
-SOURCES = ('src', 'scripts', 'test', 'benchmarks', 'cmake')
+SOURCES = ('src', 'scripts', 'test', 'benchmarks', 'examples', 'cmake')
 
 
 def is_python(path: Path) -> bool:

@@ -3,7 +3,7 @@ import threading
 
 import pytest
 import rospy
-from waiting import wait_for
+from waiting import stays, wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -72,3 +72,14 @@ def test_a_wrapped_machine_is_published_when_its_trial_ends(publisher):
     publisher.watch(OracleContainer.wrap(machine))
     assert machine.execute() == 'succeeded'
     assert publisher._publisher.told[-1] == 1
+
+
+def test_a_machine_is_forgotten_when_nobody_looks_at_it_any_more(publisher):
+    machine = Machine()
+    publisher.request(machine)
+    assert machine.looked.wait(20.0)  # the thread of the rates is at it
+    publisher.request(machine)
+    publisher.forget(machine)  # waits for that look, and for another one perhaps
+    told = len(publisher._publisher.told)
+    assert told and publisher._pending == {}
+    assert stays(lambda: len(publisher._publisher.told) == told, 0.1)

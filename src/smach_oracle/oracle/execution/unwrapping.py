@@ -1,0 +1,57 @@
+"""Takes a machine out of its oracle again: the opposite of wrapping."""
+from typing import Any, cast
+
+import smach
+
+from ..errors import TrialError
+from ..machine.nesting import machines_below, nodes_of
+from ..machine.tree import Tree
+from ..machine.tree_node import TreeNode, WrappedMachine
+from .wrapped_classes import two_classes
+
+
+def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
+    """Give a machine, and what was wrapped with it, back as before `OracleContainer.wrap`.
+
+    It stays the same object. What was learned of it is lost. A nested machine that was wrapped on
+    its own stays wrapped.
+
+    :raises TrialError: for a machine that was not wrapped, that runs, or that was wrapped together
+        with a machine around it.
+    """
+    node = getattr(machine, '_oracle', None)
+    if not isinstance(node, TreeNode) or two_classes(type(machine)) is None:
+        raise TrialError('{!r} was not wrapped: there is nothing to undo'.format(machine))
+    if machine.is_running():
+        raise TrialError('{} runs; it can be unwrapped when it has ended'.format(node.path))
+    if node.inherits:
+        raise TrialError('{} was wrapped with {}; unwrap that'.format(node.path, node.top().path))
+    _strip(cast(WrappedMachine, machine))
+    return machine
+
+
+def _strip(machine: WrappedMachine) -> None:
+    container_class = machine._oracle.tree.container_class
+    for _, child in list(machines_below(machine)):
+        if not isinstance(child, container_class):
+            continue
+        wrapped = cast(WrappedMachine, child)
+        if wrapped._oracle.inherits:
+            _strip(wrapped)
+        else:
+            _stand_alone(wrapped)
+    machine._remove_oracle()
+    stripped: Any = machine
+    made_of = two_classes(type(machine))
+    if made_of is not None:
+        stripped.__class__ = made_of[1]
+        del stripped.__dict__['_oracle']
+
+
+def _stand_alone(machine: WrappedMachine) -> None:
+    """Make a machine the top of a tree of its own, as before the machine around it was wrapped."""
+    node = machine._oracle
+    tree = Tree(node.tree.container_class, node.tree.recover, node.tree.expert)
+    for each in nodes_of(machine):
+        each.join(tree)
+    node.parent, node.below = None, ()

@@ -1,0 +1,64 @@
+"""Trials that ran elsewhere, such as under `oracle_run`, from their bags. It needs rosbag."""
+import json
+from pathlib import Path
+from typing import Dict, Iterable, List, Optional
+
+import rosbag
+
+from smach_oracle.msg import OracleEvent
+from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import TrialEnd, ended_by
+from smach_oracle.oracle.settings.failing_outcomes import DEFAULT_FAILING_OUTCOMES, FailingNames
+
+from .observed_trial import ObservedTrial, TrialEvidence
+
+_EVENTS = '/oracle/events'
+
+
+def recorded_trials(path: str, failing_outcomes: Iterable[str] = DEFAULT_FAILING_OUTCOMES
+                    ) -> List[ObservedTrial]:
+    """Return the trials of a bag, or of all bags in a folder, by the time of their beginning.
+
+    Bags that are still written are left out. An exception that ended a trial is a RuntimeError with
+    its text.
+
+    :param failing_outcomes: as in the settings of the oracle that ran them.
+    :raises OSError: where there is no such bag or folder.
+    :raises rosbag.ROSBagException: where a bag cannot be read.
+    """
+    place = Path(path)
+    bags = sorted(place.glob('*.bag')) if place.is_dir() else [place]
+    failing = FailingNames(failing_outcomes)
+    trials = [trial for bag in bags for trial in _trials_in(bag, failing)]
+    return sorted(trials, key=lambda trial: trial.events[0].wall_time)
+
+
+def _trials_in(path: Path, failing: FailingNames) -> List[ObservedTrial]:
+    events: List[Event] = []
+    with rosbag.Bag(str(path)) as bag:
+        topics = [topic for topic in bag.get_type_and_topic_info()[1] if topic.endswith(_EVENTS)]
+        if topics:
+            events = [_event_of(message) for _, message, _ in bag.read_messages(topics)]
+    by_trial: Dict[str, List[Event]] = {}
+    for event in events:
+        by_trial.setdefault(event.trial_id, []).append(event)
+    return [_trial_of(sorted(each, key=lambda event: event.seq), failing)
+            for each in by_trial.values()]
+
+
+def _trial_of(events: List[Event], failing: FailingNames) -> ObservedTrial:
+    end = events[-1] if events[-1].kind is EventKind.TRIAL_END else None
+    entered = any(event.kind is EventKind.STATE_START for event in events)
+    error: Optional[BaseException] = None
+    if end is not None and ended_by(end, entered) in (TrialEnd.ERROR, TrialEnd.STOPPED):
+        error = RuntimeError(end.text)
+    outcome = end.outcome if end is not None and end.outcome else None
+    return ObservedTrial(TrialEvidence(outcome, error, events, failing=failing))
+
+
+def _event_of(message: OracleEvent) -> Event:
+    return Event(EventKind(message.kind), message.trial_id, message.seq, message.wall_time,
+                 message.path, message.state, message.outcome, message.target,
+                 message.failure_kind, message.failure_class, message.rate, message.continuous,
+                 message.query_id, message.by, message.text,
+                 json.loads(message.data) if message.data else None)
