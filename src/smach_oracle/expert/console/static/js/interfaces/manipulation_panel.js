@@ -117,7 +117,8 @@ export class ManipulationPanel {
   /** @param {Move} move */
   pad(move) {
     const { key, sign } = BUTTONS[move];
-    const button = h('button', { class: 'pad', 'data-move': move, title: move },
+    const button = h('button', { class: 'pad', 'data-move': move, title: move,
+      'data-deliberate': 'hold ' + move },
       h('span', { class: 'sign' }, sign), h('span', { class: 'pad-name' }, move),
       h('kbd', {}, key));
     this.input.bind(button, move);
@@ -264,6 +265,8 @@ export class ManipulationPanel {
     const may = this.app.role === 'teleoperator';
     this.wheelButton.disabled = !may || !now || !connected;
     setText(this.wheelButton, this.mine ? 'Leave the wheel' : 'Take the wheel');
+    if (this.mine) delete this.wheelButton.dataset['deliberate']; // to leave it is always possible
+    else this.wheelButton.dataset['deliberate'] = 'take the wheel';
     const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
     const driver = now && now.driver ? now.driver + ' drives.' : nobody;
     const shown = this.mine ? 'You drive.' : driver;

@@ -103,6 +103,7 @@ export class QuestionDetail {
   end() {
     if (this.held && !this.settled) this.release();
     this.ended = true;
+    this.form.cancel();
     this.camera.stop();
     if (this.perceptionPanel) this.perceptionPanel.stop();
     if (this.interfacePanel) this.interfacePanel.stop();
@@ -152,9 +153,12 @@ export class QuestionDetail {
     this.show();
   }
 
+  /** Take back what is not sent yet; whether there was any such thing. */
+  cancel() { return !this.settled && this.form.cancel(); }
+
   /** @param {string} key */
   press(key) {
-    if (key === 't' && this.claimBar.offersTakeOver) this.claim('take_over');
+    if (key === 't') this.claimBar.press('take-over');
     else if (this.mine && !this.settled) this.form.press(key);
   }
 

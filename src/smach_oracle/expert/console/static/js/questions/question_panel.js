@@ -3,6 +3,7 @@
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
+import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -71,7 +72,8 @@ class QuestionPanel {
   row(question) {
     const { key, status, state, robot, path, rate } = question;
     return h('button', { key, class: 'question-row ' + status, 'data-key': key,
-      'aria-current': this.isChosen(key), onclick: () => this.choose(key) },
+      'data-deliberate': 'choose ' + key, 'aria-current': this.isChosen(key),
+      onclick: () => this.choose(key) },
     h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
       h('span', { class: 'spacer' }), this.statusChip(question)),
     h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
@@ -129,20 +131,21 @@ class QuestionPanel {
     }
     const waiting = this.badge();
     const title = waiting ? counted(waiting, 'question waits', 'questions wait') : 'All quiet';
-    const hint = waiting ? h('p', {}, 'Choose one, or press ', h('kbd', {}, 'n'),
-      ' for the oldest that nobody works on.') : h('p', {}, QUIET);
+    const choose = keysOn() ? ['Choose one, or press ', h('kbd', {}, 'n'),
+      ' for the oldest that nobody works on.'] : 'Choose one.';
+    const hint = h('p', {}, waiting ? choose : QUIET);
     replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, title), hint));
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     if (this.app.current !== 'questions' || modified(event) || typing(event.target)
-      || document.querySelector('dialog[open]')) return;
+      || document.querySelector('dialog[open]') || event.repeat || turnedOff(event)) return;
     if (event.key === 'n') {
       const next = this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
       if (next) this.choose(next.key);
     } else if (event.key === 'Escape') {
-      this.close();
+      if (!this.detail || !this.detail.cancel()) this.close();
     } else if (this.detail) {
       this.detail.press(event.key);
     }
