@@ -138,6 +138,18 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.browser.settled(pad)))
         return pad
 
+    def test_2_whoever_presses_stop_stops_it_though_the_key_is_held_on(self):
+        press = 'document.querySelector("[data-action=stop-hand]").click()'
+        self.assertTrue(self.browser.says('no emergency stop', '.manipulation'))
+
+        def take_it_again():
+            self.assert_moves_nothing(lambda: None)
+            self.key(False)
+            self.browser.click('.wheel')
+            self.assertTrue(self.browser.says('You drive.', '.driver'))
+        self.assert_stops(self.hold_key, partial(self.browser.run, press), take_it_again)
+        self.assertTrue(self.told('stop_hand')[-1].ok)
+
     def finger(self, pad=None):
         """Put it on a button of the page, or lift it."""
         box = self.browser.run('return arguments[0].getBoundingClientRect()', pad) if pad else None

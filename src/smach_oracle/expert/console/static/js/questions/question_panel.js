@@ -1,5 +1,6 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
+import { NO_EMERGENCY_STOP } from '../interfaces/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
@@ -27,7 +28,8 @@ class QuestionPanel {
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.servers), this.stage);
+      h('aside', { class: 'queue-side' }, this.queue, this.servers,
+        h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     window.addEventListener('keydown', (event) => this.key(event));
     this.showStage();
   }
