@@ -6,6 +6,7 @@ import os
 import sys
 import unittest
 
+import rosgraph
 import rospy
 import rostest
 
@@ -16,6 +17,7 @@ from waiting import stays, wait_for  # noqa: E402
 from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
+OWN_SERVER = '/a_server_of_its_own'
 GO_TO_PLACE = '.choice.goto[data-name=PLACE]'
 GIVE_UP = '.choice.give_up[data-name=""]'
 # what a second tap does as soon as there is something to tap: no wall clock has a part in it
@@ -52,6 +54,7 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         cls.audited, cls.events = [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
+        rospy.set_param('/alpha/own_introspection', True)
         cls.begin('console_robot.py', 'PICK', '0.05', '0', '9')
 
     def answers(self):
@@ -118,6 +121,20 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.press('n')
         browser.find('.detail')
         self.assertEqual(browser.errors(), [])
+
+    def test_9_a_machine_with_a_server_of_its_own_is_listed_once(self):
+        def known():
+            heard = dict(rosgraph.Master('/test').getSystemState()[1])
+            return '/expert_console' in heard.get(OWN_SERVER + '/smach/container_structure', [])
+        browser = self.browser
+        self.assertTrue(wait_for(known), 'the console follows it')
+        browser.click('#tab-machines')
+        browser.find('[id="/alpha/KITCHEN/FETCH"]')
+        # it tells its structure every 2 s
+        self.assertTrue(
+            stays(lambda: browser.run(
+                'return [...document.querySelectorAll(".picker .robot")]'
+                '.map((robot) => robot.textContent)') == ['/alpha'], 5.0))
 
 
 if __name__ == '__main__':
