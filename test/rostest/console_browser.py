@@ -101,7 +101,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     def test_2_a_page_comes_back_with_its_claim_after_the_server_was_restarted(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.find(QUESTION)
         browser.run('document.activeElement.blur()')
         browser.find('body').send_keys('n')
@@ -144,7 +144,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     def test_3_on_a_phone_two_taps_answer_and_what_happens_next_is_at_the_top(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
             'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True})
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})

@@ -14,7 +14,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
 from waiting import stays, wait_for  # noqa: E402
 
-from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
+from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent  # noqa: E402
+from smach_oracle.srv import ClaimQuery, ClaimQueryRequest  # noqa: E402
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
 OWN_SERVER = '/a_server_of_its_own'
@@ -43,6 +44,31 @@ box.style.height = "60px";
 document.querySelector(".answer-form").prepend(box);
 document.querySelector(selector).click();
 box.remove();'''
+# somebody takes a question over; the list that tells of it comes later than the reply
+TAKEN = '''
+const paths = ["questions/question_detail.js", "page/store.js"];
+return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
+  [{ QuestionDetail }, { Store }]) => {
+  const store = new Store();
+  const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
+    state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
+    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
+    asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
+    give_up: [], interfaces: [], userdata: [] };
+  const request = async () => ({ ok: true, message: "" });
+  const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
+    connection: { connected: true, request } };
+  const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
+  store.onChange((names) => detail.update(names));
+  const said = (holder) => {
+    store.receive({ now: 0, sections: { questions: [{ ...question, holder }] } });
+    return detail.claimBar.root.textContent;
+  };
+  said("bob");
+  await detail.claim("take_over");
+  said("bob");
+  return [said("ann"), said("carl")];
+});'''
 REFUSED = 'the page had just changed there'
 
 
@@ -55,7 +81,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
         rospy.set_param('/alpha/own_introspection', True)
-        cls.begin('console_robot.py', 'PICK', '0.05', '0', '9')
+        cls.listed = []
+        rospy.Subscriber('/alpha/expert_query/open', OpenQueries, cls.listed.append)
+        cls.begin('console_robot.py', 'PICK', '0.05', '6', '9')
 
     def answers(self):
         """The kinds of the answers that the console was told to send."""
@@ -108,10 +136,15 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(len(self.answers()), 1, 'sent once, undone twice')
         self.assertTrue(
             wait_for(lambda: OracleEvent.GIVE_UP in [event.kind for event in self.events]))
+        self.assertTrue(browser.says('The robot gives up, as you said', '.follow-up .gave-up'),
+                        'that is no success')
+        self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'),
+                        'after more than eight steps')
+        self.assertIn('earlier steps are left out', browser.text('.follow-up'))
 
     def test_3_single_letter_keys_can_be_turned_off(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.find(QUESTION)
         browser.click('#keys')
         self.press('n')
@@ -122,7 +155,38 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.find('.detail')
         self.assertEqual(browser.errors(), [])
 
-    def test_9_a_machine_with_a_server_of_its_own_is_listed_once(self):
+    def claim(self, action):
+        """As bob, from elsewhere."""
+        self.assertTrue(wait_for(lambda: self.listed[-1].queries))
+        call = rospy.ServiceProxy('/alpha/expert_query/claim', ClaimQuery)
+        question = self.listed[-1].queries[0].query.query_id
+        self.assertTrue(call(ClaimQueryRequest(action, question, 'bob', 30.0)).ok)
+
+    def test_4_what_follows_an_answer_leads_to_the_next_question(self):
+        browser = self.browser
+        self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
+        browser.click('.choice.goto[data-name=DETECT]')
+        self.assertTrue(browser.says('It asks again, about PICK.', '.follow-up'))
+        browser.click('[data-action=next-question]')
+        self.assertTrue(browser.says('It is yours.'))
+        browser.click('.choice.goto[data-name=PLACE]')
+        self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'))
+        browser.click('.follow-up [data-action=back]')
+
+    def test_5_what_somebody_else_works_on_is_told(self):
+        browser = self.browser
+        browser.find(QUESTION)
+        self.claim(ClaimQueryRequest.CLAIM)
+        self.assertTrue(browser.says('Somebody works on the open question.'))
+        self.assertNotIn('All quiet', browser.text())
+        self.claim(ClaimQueryRequest.RELEASE)
+        self.assertTrue(browser.says('1 question waits'))
+        mine, taken = browser.run(TAKEN)
+        self.assertEqual(mine, 'It is yours. Leave it to others')
+        self.assertIn('carl has taken this question over.', taken)
+        self.assertEqual(browser.errors(), [])
+
+    def test_6_a_machine_with_a_server_of_its_own_is_listed_once(self):
         def known():
             heard = dict(rosgraph.Master('/test').getSystemState()[1])
             return '/expert_console' in heard.get(OWN_SERVER + '/smach/container_structure', [])

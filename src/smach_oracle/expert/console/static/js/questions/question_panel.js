@@ -38,7 +38,10 @@ class QuestionPanel {
 
   badge() { return this.open.filter((each) => each.status === 'pending').length; }
 
-  shown() { this.update(['questions', 'servers']); }
+  shown() {
+    this.update(['questions', 'servers']);
+    if (this.detail) this.detail.shown();
+  }
 
   connected() { if (this.detail) this.detail.connected(); }
 
@@ -108,9 +111,10 @@ class QuestionPanel {
   /** @param {string} key */
   choose(key) {
     const question = this.open.find((each) => each.key === key);
-    if (!question || this.isChosen(key)) return;
+    if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
     this.close();
-    this.detail = new QuestionDetail(this.app, question, () => this.close());
+    this.detail = new QuestionDetail(this.app, question,
+      { leave: () => this.close(), choose: (next) => this.choose(next) });
     this.showStage();
     this.showQueue();
     this.detail.begin();
@@ -132,10 +136,13 @@ class QuestionPanel {
       return;
     }
     const waiting = this.badge();
-    const title = waiting ? counted(waiting, 'question waits', 'questions wait') : 'All quiet';
+    const title = waiting ? counted(waiting, 'question waits', 'questions wait')
+      : (this.open.length ? 'Nobody is waited for' : 'All quiet');
     const choose = keysOn() ? ['Choose one, or press ', h('kbd', {}, 'n'),
       ' for the oldest that nobody works on.'] : 'Choose one.';
-    const hint = h('p', {}, waiting ? choose : QUIET);
+    const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
+      : 'each of the ' + this.open.length + ' open questions.');
+    const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
     replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, title), hint));
   }
 
