@@ -136,6 +136,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('bob has taken this question over.'))
         browser.driver.switch_to.window(second)
         browser.find('.stage').click()
+        self.assertTrue(
+            wait_for(lambda: browser.settled(browser.find('.choice.goto[data-name=PLACE]'))))
         browser.find('body').send_keys('3')
         self.assertTrue(browser.says('The machine goes to PLACE.', '.follow-up'))
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
