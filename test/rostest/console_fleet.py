@@ -112,8 +112,9 @@ class Fleet(unittest.TestCase):
 
     def hold(self, selector):
         """Press the mouse on it."""
-        ActionChains(self.browser.driver,
-                     duration=0).click_and_hold(self.browser.find(selector)).perform()
+        element = self.browser.find(selector)
+        self.assertTrue(wait_for(lambda: self.browser.settled(element)))
+        ActionChains(self.browser.driver, duration=0).click_and_hold(element).perform()
 
     def let_go(self):
         ActionChains(self.browser.driver, duration=0).release().perform()
