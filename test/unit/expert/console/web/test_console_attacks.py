@@ -84,6 +84,15 @@ class TestOdd(console_case.ConsoleCase):
         ]
         assert codes == [200, 200, 429, 429]
 
+    def test_strangers_take_nothing_from_who_has_come_with_a_token(self):
+        cookie, _ = self.sign_in('viewer')
+        self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=1.0)
+        assert [self.ask('/session').code for _ in range(4)] == [200, 200, 429, 429]
+        assert [self.ask('/session', Cookie=cookie).code for _ in range(4)] == [200, 200, 429, 429]
+        self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=0.0)
+        assert self.ask('/session').code == 429
+        assert self.ask('/session', Cookie=cookie).code == 200, 'however many they are'
+
     def cookie_of(self, secret, clock=time.time, text=None):
         text = text or sessions.to_text(
             sessions.BrowserSession('known-to-the-attacker', time.time(), 'teleoperator'))
