@@ -75,10 +75,11 @@ class Browser:
         def clicked():
             try:
                 element = self._shown(selector)
-                if element is None or not element.is_enabled():
+                if element is None or not element.is_enabled() or not self.settled(element):
                     return False
+                before = self._refused()
                 element.click()
-                return True
+                return self._refused() == before
             except NOT_YET:
                 return False
         if not wait_for(clicked, limit_s):
@@ -86,14 +87,43 @@ class Browser:
                 selector,
                 self.text()[:2000]))
 
+    def settled(self, element):
+        """Whether a click on an element would be taken as meant: the page refuses one that comes
+        too soon after a change.
+        """
+        return self.run(
+            'const it = arguments[0].closest("[data-deliberate]");'
+            'if (!it || it.hasAttribute("data-settled")) return true;'
+            'it.scrollIntoView({ block: "center" }); return false', element)
+
+    def _refused(self):
+        return self.run('return document.body.dataset.refused')
+
     def tap(self, selector):
-        """With a finger, in the middle of what is there and shown."""
-        x, y = self.run('arguments[0].scrollIntoView({ block: "center" });'
-                        'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
-                        'return [x + width / 2, y + height / 2]', self.find(selector))
+        """With a finger, in the middle of what is there and shown, once the page takes it as
+        meant.
+        """
+        self.run('arguments[0].scrollIntoView({ block: "center" })', self.find(selector))
+        if not wait_for(lambda: self._tapped(selector)):
+            raise AssertionError('{!r} takes no tap; the page says:\n{}'.format(
+                selector,
+                self.text()[:2000]))
+
+    def _tapped(self, selector):
+        element, before = self.find(selector), self._refused()
+        if not self.settled(element):
+            return False
+        x, y = self.run(
+            'window.tapped = false;'
+            'window.addEventListener("click", () => { window.tapped = true },'
+            '{ capture: true, once: true });'
+            'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
+            'return [x + width / 2, y + height / 2]', element)
         for kind, points in (('touchStart', [{'x': x, 'y': y}]), ('touchEnd', [])):
             self.driver.execute_cdp_cmd('Input.dispatchTouchEvent',
                                         {'type': kind, 'touchPoints': points})
+        wait_for(lambda: self.run('return window.tapped') or self._refused() != before)
+        return self._refused() == before
 
     def says(self, text, selector='body', limit_s=40.0):
         """Whether an element comes to hold a text."""

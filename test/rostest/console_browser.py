@@ -101,7 +101,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     def test_2_a_page_comes_back_with_its_claim_after_the_server_was_restarted(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.find(QUESTION)
         browser.run('document.activeElement.blur()')
         browser.find('body').send_keys('n')
@@ -136,6 +136,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('bob has taken this question over.'))
         browser.driver.switch_to.window(second)
         browser.find('.stage').click()
+        self.assertTrue(
+            wait_for(lambda: browser.settled(browser.find('.choice.goto[data-name=PLACE]'))))
         browser.find('body').send_keys('3')
         self.assertTrue(browser.says('The machine goes to PLACE.', '.follow-up'))
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
@@ -144,7 +146,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     def test_3_on_a_phone_two_taps_answer_and_what_happens_next_is_at_the_top(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
             'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True})
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})

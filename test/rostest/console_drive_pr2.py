@@ -218,6 +218,7 @@ class Drive(unittest.TestCase):
                     'return new Set(d.data).size > 50'), 40.0), 'the camera\'s picture')
         begin = self.stands('right')
         pad = browser.find('.pad[data-move=left]')
+        self.assertTrue(wait_for(lambda: browser.settled(pad)))
         ActionChains(browser.driver, duration=0).click_and_hold(pad).perform()
         self.assertTrue(self.gone(begin, 'right'))
         ActionChains(browser.driver, duration=0).release().perform()

@@ -112,8 +112,9 @@ class Fleet(unittest.TestCase):
 
     def hold(self, selector):
         """Press the mouse on it."""
-        ActionChains(self.browser.driver,
-                     duration=0).click_and_hold(self.browser.find(selector)).perform()
+        element = self.browser.find(selector)
+        self.assertTrue(wait_for(lambda: self.browser.settled(element)))
+        ActionChains(self.browser.driver, duration=0).click_and_hold(element).perform()
 
     def let_go(self):
         ActionChains(self.browser.driver, duration=0).release().perform()
@@ -170,7 +171,7 @@ class Fleet(unittest.TestCase):
             self.assertTrue(
                 browser.says('The robot has your answer: go to PLAN_{}'.format(number),
                              '.follow-up'))
-            browser.click('.follow-up .primary')
+            browser.click('.follow-up [data-action=back]')
         self.assertTrue(wait_for(lambda: all(rospy.get_param('/robot_{}/ended'.format(each), False)
                                              for each in range(8))))
         self.assertEqual([self.went(number) for number in range(8)],
@@ -221,7 +222,7 @@ class Fleet(unittest.TestCase):
         browser.click('.choice.goto[data-name=PLAN_9]')
         self.assertTrue(browser.says('The robot has your answer: go to PLAN_9', '.follow-up'))
         self.assertTrue(wait_for(lambda: self.went(9) == [9]), 'meanwhile the other console works')
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         self.assertTrue(browser.says('waiting', ROW.format(8), LEASE_S + 20.0),
                         'the claim has run out')
         self.assertGreater(time.monotonic() - killed_s, 5.0)

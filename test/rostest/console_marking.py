@@ -125,7 +125,7 @@ class Marking(ConsolePage, unittest.TestCase):
 
     def test_2_giving_up_asks_again(self):
         browser = self.browser
-        browser.click('.follow-up .primary')
+        browser.click('.follow-up [data-action=back]')
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=perception]')
         browser.find('.perception.shown', 30.0)

@@ -8,6 +8,7 @@ import rospy
 
 import smach
 from smach_oracle import OracleContainer
+from smach_ros import IntrospectionServer
 
 MARKUP = 'no grasp found for <b>mug</b> & <script>window.hacked = 1</script>'
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
@@ -74,6 +75,8 @@ def main(argv):
                 }
             }
         })
+    if rospy.get_param('~own_introspection', False):
+        IntrospectionServer('/a_server_of_its_own', sm, '/SM_ROOT').start()
     for _ in range(trials):
         if rospy.is_shutdown():
             break

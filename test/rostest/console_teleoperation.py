@@ -113,7 +113,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
 
     def test_2_a_button_held_with_the_mouse_stops_when_the_page_loses_the_focus(self):
         before = self.height()
-        pad = self.browser.find('.pad[data-move=down]')
+        pad = self.settled_pad('down')
 
         def press():
             ActionChains(self.browser.driver, duration=0).click_and_hold(pad).perform()
@@ -132,6 +132,24 @@ class Teleoperation(ConsolePage, unittest.TestCase):
                 'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'),
             release)
 
+    def settled_pad(self, move):
+        """A button that the page takes as pressed on purpose: it has not just moved."""
+        pad = self.browser.find('.pad[data-move={}]'.format(move))
+        self.assertTrue(wait_for(lambda: self.browser.settled(pad)))
+        return pad
+
+    def test_2_whoever_presses_stop_stops_it_though_the_key_is_held_on(self):
+        press = 'document.querySelector("[data-action=stop-hand]").click()'
+        self.assertTrue(self.browser.says('no emergency stop', '.manipulation'))
+
+        def take_it_again():
+            self.assert_moves_nothing(lambda: None)
+            self.key(False)
+            self.browser.click('.wheel')
+            self.assertTrue(self.browser.says('You drive.', '.driver'))
+        self.assert_stops(self.hold_key, partial(self.browser.run, press), take_it_again)
+        self.assertTrue(self.told('stop_hand')[-1].ok)
+
     def finger(self, pad=None):
         """Put it on a button of the page, or lift it."""
         box = self.browser.run('return arguments[0].getBoundingClientRect()', pad) if pad else None
@@ -143,7 +161,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
     def test_3_a_finger_moves_the_hand_as_long_as_it_rests_on_a_button(self):
         asks = ('return arguments[0].dispatchEvent('
                 'new MouseEvent("contextmenu", {bubbles: true, cancelable: true}))')
-        pad = self.browser.find('.pad[data-move=up]')
+        pad = self.settled_pad('up')
 
         def touch():
             self.finger(pad)

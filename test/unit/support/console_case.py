@@ -51,6 +51,7 @@ class FakeTeleoperation:
     def __init__(self):
         self.drivers = set()
         self.relayed = []
+        self.stopped = []
 
     def drives(self, page):
         return page in self.drivers
@@ -64,6 +65,11 @@ class FakeTeleoperation:
     def carry_out(self, command, person, page):
         self.drivers.add(page)
         return CommandReply(True, '', {'wheel': page})
+
+    def stop(self, command, person, page):
+        self.stopped.append((command.name, person.role))
+        self.drivers.clear()
+        return CommandReply(True)
 
     def leave(self, page):
         self.drivers.discard(page)

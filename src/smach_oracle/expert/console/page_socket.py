@@ -13,7 +13,7 @@ import tornado.websocket
 from .answering.question_commands import QuestionCommands
 from .answering.teleoperation import Teleoperation
 from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse
-from .commands.driving import DRIVING_COMMANDS
+from .commands.driving import DRIVING_COMMANDS, STOPPING_COMMANDS, stops
 from .trials.trial_log import TrialLog
 from .web import sessions
 from .web.access import RateLimit, SocketRateLimits, may
@@ -56,7 +56,7 @@ class OpenPages:
         """
         for socket in list(self.open):
             if socket.session is not None and socket.session.id == session.id:
-                socket.close(SIGNED_OUT, 'signed out')
+                socket.end(SIGNED_OUT, 'signed out')
 
     def push(self) -> None:
         """Send every page what is new."""
@@ -81,7 +81,9 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._watched = ''
         self._watched_from = 0
         self._writing = False
-        self._at_work = 0
+        self._at_work = 0  # commands that wait for a robot, or for their turn
+        self._turn = asyncio.Lock()
+        self._tasks: Set['asyncio.Task[None]'] = set()
 
     def set_default_headers(self) -> None:
         """On every answer."""
@@ -131,7 +133,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if self._gone or self.session is None or self._access.settings.tokens is None:
             return
         if self._access.identity(self.session) is None:
-            self.close(TOO_OLD, 'sign in again')
+            self.end(TOO_OLD, 'sign in again')
             return
         pause_s = min(self.session.left_s, LONGEST_UNSEEN_S)
         asyncio.get_running_loop().call_later(pause_s, self._look_at_age)
@@ -149,17 +151,34 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return
         if not self._bucket(message).take():
             if not self._limits.unruly.take():
-                self.close(TOO_FAST, 'too many commands')
-            return
+                self.end(TOO_FAST, 'too many commands')
+                return
+            if not _only_stops(message):
+                return
         try:
             command = parse(message)
         except CommandError as err:
             self._note(None, CommandReply(False, str(err)))
             self._reply(err.number, CommandReply(False, str(err)))
             return
-        reply = await self._carry_out(command)
+        reply = self._at_once(command)
+        if reply is not None:
+            self._answer(command, reply)
+            return
+        # the next message is read meanwhile: a stop waits for no robot that hangs
+        self._at_work += 1
+        task = asyncio.get_running_loop().create_task(self._in_turn(command))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _answer(self, command: PageCommand, reply: CommandReply) -> None:
         if command.name != 'drive' or not reply.ok:
             self._reply(command.number, reply)
+
+    def end(self, code: int, why: str) -> None:
+        """Close it; what the page drives stops now, not when its browser has closed it, too."""
+        self._pages.teleoperation.leave(self._number)
+        self.close(code, why)
 
     @property
     def _gone(self) -> bool:
@@ -171,7 +190,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         return self._limits.driving if driving and self._pages.teleoperation.drives(
             self._number) else self._limits.commands
 
-    async def _carry_out(self, command: PageCommand) -> CommandReply:
+    def _at_once(self, command: PageCommand) -> Optional[CommandReply]:
+        """What needs no robot's word, and what is refused; None for the rest."""
         if command.name == 'hello':
             return self._hello(command)
         if self._person is None:
@@ -184,12 +204,22 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return self._note(command, CommandReply(True))
         if command.name == 'drive':
             return self._pages.teleoperation.drive(command, self._number)
+        if command.name in STOPPING_COMMANDS:  # whatever else is at work
+            return self._pages.teleoperation.stop(command, self._person, self._number)
         if self._at_work >= MOST_AT_WORK:
             return self._note(command, CommandReply(False, 'too many commands at a time'))
-        return await self._work(self._person, command)
+        return None
+
+    async def _in_turn(self, command: PageCommand) -> None:
+        """In the order in which the page has sent them: a release and a claim do not overtake."""
+        try:
+            async with self._turn:
+                if self._person is not None and not self._gone:
+                    self._answer(command, await self._work(self._person, command))
+        finally:
+            self._at_work -= 1
 
     async def _work(self, person: Person, command: PageCommand) -> CommandReply:
-        self._at_work += 1
         try:
             loop = asyncio.get_running_loop()
             carry_out = (self._pages.teleoperation.carry_out if command.name in DRIVING_COMMANDS
@@ -197,7 +227,6 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return await loop.run_in_executor(self._pages.workers, carry_out, command, person,
                                               self._number)
         finally:
-            self._at_work -= 1
             if self._gone:  # while the robot was asked
                 self._pages.question_commands.leave(self._number)
                 self._pages.teleoperation.leave(self._number)
@@ -273,3 +302,14 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             if done is not None:
                 done()
         asyncio.get_running_loop().create_task(send())
+
+
+def _only_stops(message: Union[str, bytes]) -> bool:
+    """Whether a message is a command that can only stop something."""
+    if len(message) > LONGEST_DRIVE:
+        return False
+    try:
+        command = parse(message)
+    except CommandError:
+        return False
+    return stops(command.name, command.arguments)

@@ -39,7 +39,8 @@ class DeadManSwitch:
             return '{} drives; one at a time'.format(holder)
         if operator == self._dropped and now_s < self._silent_until_s:
             self._silent_until_s = now_s + _LET_GO_S
-            return 'let go of the dead-man first: it was pressed before this goal began'
+            return ('let go of the dead-man first: it was pressed before this goal began, or '
+                    'somebody has stopped the hand')
         self._operator, self._until_s = operator, now_s + self._watchdog_s
         self._leased_until_s = now_s + self._lease_s
         return ''
@@ -62,7 +63,7 @@ class DeadManSwitch:
             self._dropped, self._silent_until_s = operator, now_s + _LET_GO_S
 
     def drop(self, now_s: float) -> None:
-        """What it was held for has ended."""
+        """What it was held for has ended, or somebody else stops it."""
         holder = self.holder(now_s)
         if holder:
             self.press_for_nothing(holder, now_s)

@@ -165,7 +165,7 @@ class TeleoperationServer:
         if command.arm not in self._arms:
             return 'unknown arm {!r}; allowed: {}'.format(command.arm,
                                                           ', '.join(sorted(self._arms)))
-        if not command.operator:
+        if not command.operator and command.dead_man:
             return 'a command needs the name of its operator'
         if not command.dead_man:
             return ''
@@ -186,6 +186,10 @@ class TeleoperationServer:
     def _let_go(self, arrived: ArrivedCommand) -> None:
         """The operator lets go, or is refused."""
         operator = arrived.command.operator
+        if not operator and not arrived.command.dead_man:  # somebody stops whoever drives
+            self._dead_man.drop(arrived.at_s)
+            self._stop_moving()
+            return
         if operator in (self._driver(), self._held.operator if self._held is not None else ''):
             self._stop_moving()
         if not arrived.command.dead_man:

@@ -82,3 +82,12 @@ def test_without_a_watchdog_it_is_a_lease_that_commands_renew():
     assert handle.press('ann', 100.0) == '' and 'ann drives' in handle.press('bob', 101.0)
     assert handle.press('bob', 103.1) == '' and handle.holder(103.1) == 'bob'
     assert handle.press('ann', 104.0) == 'bob drives; one at a time'
+
+
+def test_dropped_by_somebody_else_it_must_be_let_go_before_it_is_held_again():
+    handle = DeadManSwitch(0.1)
+    handle.press('ann', 1.0)
+    handle.drop(1.05)
+    assert 'somebody has stopped the hand' in handle.press('ann', 1.08)
+    handle.release('ann')
+    assert handle.press('ann', 1.1) == '' and handle.holder(1.11) == 'ann'

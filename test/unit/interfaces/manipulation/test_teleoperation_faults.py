@@ -111,3 +111,13 @@ def test_hand_and_grippers_stand_after_an_error_until_the_next_command(interface
     left.error = None
     again = drive(interface, 2)
     assert (again.seq, again.refused, again.operator, again.moving) == (2, '', 'ann', True)
+
+
+def test_a_release_without_a_name_stops_whoever_drives_until_it_is_let_go(interface):
+    assert drive(interface, 1).moving
+    interface.command(TeleopCommand(arm='left', seq=2))
+    assert wait_for(lambda: interface.states[-1].seq == 2)
+    assert (interface.states[-1].operator, interface.states[-1].moving) == ('', False)
+    assert 'somebody has stopped the hand' in drive(interface, 3).refused, 'held on'
+    interface.command(TeleopCommand(operator='ann', arm='left', seq=4))
+    assert drive(interface, 5).moving

@@ -1,5 +1,6 @@
 """The open questions of all robots as one section."""
 import time
+from collections import OrderedDict
 from typing import Any, Dict, List, Optional
 
 from ...followed_server import ListedQuestion
@@ -10,6 +11,7 @@ from .question_view import question_view
 
 # each list has ages of its own; smaller differences come from the link, not from the question
 _JITTER_S = 1.0
+MOST_REMEMBERED = 1000
 
 
 class QuestionSections:
@@ -20,6 +22,7 @@ class QuestionSections:
         self._log = log
         self._epoch_s = time.time() - time.monotonic()
         self._times: Dict[str, Dict[str, Optional[float]]] = {}
+        self._first_asked: 'OrderedDict[str, float]' = OrderedDict()  # by key, open or not
 
     def write_sections(self, sections: PageSections) -> None:
         """Bring the section up to date."""
@@ -45,4 +48,13 @@ class QuestionSections:
             now = view[name]
             if before is not None and now is not None and abs(before - now) < _JITTER_S:
                 view[name] = before
+        view['asked'] = self._since(listed.key, view['asked'])
         return view
+
+    def _since(self, key: str, asked: float) -> float:
+        """When it was asked first: while an interface runs for it, its server counts anew."""
+        since = self._first_asked[key] = min(asked, self._first_asked.get(key, asked))
+        self._first_asked.move_to_end(key)
+        while len(self._first_asked) > MOST_REMEMBERED:
+            self._first_asked.popitem(last=False)
+        return since

@@ -92,6 +92,10 @@ class TeleopClient:
         """Stop the arm now."""
         self.send(operator, STOP, False)
 
+    def stop_whoever_drives(self) -> None:
+        """Stop the arm now, also where another front end moves it."""
+        self.send('', STOP, False)
+
     def stop(self) -> None:
         """Take the topics down."""
         self._publisher.unregister()

@@ -33,7 +33,8 @@ TAKE_FIRST = 'Take the wheel first.'
 class Teleoperation:
     """All of them.
 
-    `drive` is called from the server's loop and waits for nothing; the rest from other threads.
+    `drive` and `stop` are called from the server's loop and wait for nothing; the rest from other
+    threads.
     """
 
     def __init__(self, sections: PageSections, front_end: FrontEnd, audit: Audit) -> None:
@@ -83,13 +84,25 @@ class Teleoperation:
                 client.release(_operator(session))
         return CommandReply(True)
 
-    def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
-        """Take control or leave it, and record it in the audit."""
+    def stop(self, command: PageCommand, person: Person, page: int) -> CommandReply:
+        """Leave control, or end that of whoever has it; waits for nothing."""
         key = command.arguments['question']
-        client, listed = self._clients.get(key), self._front_end.find(key)
         if command.name == 'leave_wheel':
             self._leave(key, page, 'left')
             return CommandReply(True)
+        client = self._clients.get(key)
+        if client is not None:
+            client.stop_whoever_drives()
+        self._leave(key, None, '{} has stopped the hand'.format(person.expert))
+        reply = CommandReply(client is not None, '' if client is not None else NOT_RUNNING)
+        self._audit.record(person, command.name, reply.ok, reply.message, {},
+                           self._front_end.find(key))
+        return reply
+
+    def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
+        """Take control, and record it in the audit."""
+        key = command.arguments['question']
+        client, listed = self._clients.get(key), self._front_end.find(key)
         if client is None or listed is None:
             reply = CommandReply(False, NOT_RUNNING)
         else:

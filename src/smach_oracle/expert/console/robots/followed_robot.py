@@ -1,6 +1,6 @@
 """One robot as its topics show it: containers, active states, learned rates."""
 import threading
-from typing import Any, Dict, List
+from typing import Any, Dict, FrozenSet, List
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.msg import OracleEvent, OracleRates
@@ -17,6 +17,7 @@ from ..graphs.container_graph import (
 )
 from ..graphs.layout_worker import LayoutWorker
 from ..web.sections import PageSections
+from .same_machine import Source
 
 MOST_CONTAINERS = 200
 _LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
@@ -31,6 +32,7 @@ class FollowedRobot:
         self.name = name
         self.changed = True
         self.alive = True
+        self.learns = False
         self._reshaped = True
         self._lock = threading.Lock()
         self._structures: Dict[str, ContainerGraph] = {}
@@ -72,6 +74,7 @@ class FollowedRobot:
         for row in message.transitions:
             rows.setdefault(row.path, []).append((row.state, row.outcome, row.target, row.count))
         with self._lock:
+            self.learns = True
             self._rates.update(rates)
             self._counts.update({path: shares(counts) for path, counts in rows.items()})
             self.changed = True
@@ -80,6 +83,7 @@ class FollowedRobot:
     def on_event(self, message: OracleEvent) -> None:
         """The path that is taken, and where it failed."""
         with self._lock:
+            self.learns = True
             self._trial = message.trial_id
             self._take_health(message)
             if message.kind == OracleEvent.TRIAL_START:
@@ -133,6 +137,14 @@ class FollowedRobot:
         for path in self._all_structures():
             sections.put('graph {} {}'.format(self.name, path), None)
         sections.put('live ' + self.name, None)
+
+    def source(self, nodes: FrozenSet[str]) -> Source:
+        """What it shows, to compare; `nodes`: those that publish it."""
+        with self._lock:
+            return Source(self.name, nodes, self.learns, {
+                path: frozenset(structure.states)
+                for path, structure in self._all_structures().items()
+            })
 
     def set_alive(self, alive: bool) -> None:
         """Whether the master knows it now."""

@@ -1,7 +1,8 @@
 """All robots that the master knows, found by the types of their topics and then followed."""
 import threading
 from collections import OrderedDict
-from typing import Any, Callable, Dict, List, Sequence, Tuple
+from types import MappingProxyType
+from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Sequence, Set, Tuple
 
 import rosgraph
 import rospy
@@ -14,6 +15,7 @@ from ..graphs.layout_worker import LayoutWorker
 from ..trials.trial_log import TrialLog
 from ..web.sections import PageSections
 from .followed_robot import FollowedRobot
+from .same_machine import copies
 
 MOST_ROBOTS = 100
 _GONE_AFTER = 2  # rounds without any of its topics
@@ -34,14 +36,22 @@ class FollowedRobots:
         self._robots: 'OrderedDict[str, FollowedRobot]' = OrderedDict()
         self._subscribers: Dict[str, List[rospy.Subscriber]] = {}
         self._unseen: Dict[str, int] = {}
+        self._nodes: Dict[str, FrozenSet[str]] = {}  # by robot
         self._lock = threading.Lock()
 
     def discover(self) -> None:
         """Ask the master once; call it in a thread of its own, since a master may hang."""
-        self.follow(rosgraph.Master(rospy.get_name()).getPublishedTopics(''))
+        master = rosgraph.Master(rospy.get_name())
+        published = master.getPublishedTopics('')
+        self.follow(published, dict(master.getSystemState()[0]))
 
-    def follow(self, published: Sequence[Sequence[str]]) -> None:
-        """Subscribe to what is new; `published`: topics and their types. One thread calls it."""
+    def follow(self, published: Sequence[Sequence[str]],
+               nodes: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
+        """Subscribe to what is new. One thread calls it.
+
+        :param published: topics and their types.
+        :param nodes: the nodes that publish a topic.
+        """
         seen = set()
         for topic, kind in published:
             for suffix, (message, _) in _TOPICS.items():
@@ -50,6 +60,9 @@ class FollowedRobots:
         for name in sorted(seen - set(self._robots)):
             self._begin(name)
         for name, robot in list(self._robots.items()):
+            if name in seen:
+                self._nodes[name] = frozenset(
+                    node for suffix in _TOPICS for node in nodes.get(name + suffix, ()))
             self._unseen[name] = 0 if name in seen else self._unseen.get(name, 0) + 1
             robot.set_alive(self._unseen[name] < _GONE_AFTER)
             if self._unseen[name] == _GONE_AFTER:
@@ -62,7 +75,14 @@ class FollowedRobots:
             robots = list(self._robots.values())
             for robot in robots:
                 robot.write_sections(self._sections, self._layouts)
-            self._sections.put('robots', sorted(robot.name for robot in robots))
+            twice = self._copies(robots)
+            self._sections.put('robots',
+                               sorted(robot.name for robot in robots if robot.name not in twice))
+
+    def _copies(self, robots: Sequence[FollowedRobot]) -> Set[str]:
+        if all(robot.learns for robot in robots):
+            return set()
+        return copies(robot.source(self._nodes.get(robot.name, frozenset())) for robot in robots)
 
     def _begin(self, name: str) -> None:
         """Without the lock: a master that hangs must not hold up the writing of sections."""
@@ -91,5 +111,6 @@ class FollowedRobots:
             for subscriber in self._subscribers.pop(name):
                 subscriber.unregister()
             del self._unseen[name]
+            self._nodes.pop(name, None)
             with self._lock:
                 self._robots.pop(name).forget(self._sections)

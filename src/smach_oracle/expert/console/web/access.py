@@ -151,13 +151,16 @@ class ClientRateLimits:
         self._all = self._make(for_all)
         self._by_key: 'OrderedDict[str, RateLimit]' = OrderedDict()
 
-    def take(self, key: str) -> bool:
-        """Whether one more of this client may pass now."""
+    def take(self, key: str, known: bool = False) -> bool:
+        """Whether one more of this client may pass now.
+
+        :param known: it has come with a token: the limit for all together is for strangers.
+        """
         if key not in self._by_key:
             self._by_key[key] = self._make(1.0)
             if len(self._by_key) > MOST_KEYS:
                 self._by_key.popitem(last=False)
-        return self._by_key[key].take() and self._all.take()
+        return self._by_key[key].take() and (known or self._all.take())
 
 
 class SocketRateLimits(NamedTuple):

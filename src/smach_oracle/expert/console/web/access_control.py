@@ -1,6 +1,6 @@
 """What every request passes first: its host, its rate, its origin, and whose session it is."""
 import time
-from typing import Dict, Optional
+from typing import Dict, Optional, Tuple
 
 import tornado.web
 
@@ -63,11 +63,21 @@ class AccessControl:
         request = handler.request
         if not self.settings.hosts.allows(request.headers.get('Host', '')):
             return 421
-        if not (limits or self.requests).take(request.remote_ip or ''):
+        if not (limits or self.requests).take(*self._share_of(handler)):
             return 429
         if not self.from_own_page(handler, must_say=request.method not in ('GET', 'HEAD')):
             return 403
         return 0
+
+    def _share_of(self, handler: tornado.web.RequestHandler) -> Tuple[str, bool]:
+        """For whose limit a request counts, and whether that one has come with a token.
+
+        Strangers of the same address, or very many of them, take nothing from who has a token.
+        """
+        session = self.session(handler)
+        if self.settings.tokens is not None and session is not None and self.identity(session):
+            return 'session ' + session.id, True
+        return handler.request.remote_ip or '', False
 
     def from_own_page(self, handler: tornado.web.RequestHandler, must_say: bool) -> bool:
         """Whether the Origin is this console; `must_say`: a request without one is refused, too."""

@@ -140,14 +140,14 @@ class SessionHandler(CheckedHandler):
         """Take a token."""
         session = self.demand_xsrf(self.access.session(self))
         person = Person(self.request.remote_ip or '', session.short, '', '')
-        if not self.access.sign_ins.take(person.client):
-            self.access.audit.record(person, 'sign_in', False, 'too many tries')
-            raise tornado.web.HTTPError(429)
         tokens = self.access.settings.tokens
         identity = tokens.identify(self._token()) if tokens is not None else None
         if identity is None:
-            self.access.audit.record(person, 'sign_in', False, 'no such token')
-            raise tornado.web.HTTPError(401)
+            # who comes with a right token is let in, whatever others have tried
+            slow = not self.access.sign_ins.take(person.client)
+            self.access.audit.record(person, 'sign_in', False,
+                                     'too many tries' if slow else 'no such token')
+            raise tornado.web.HTTPError(429 if slow else 401)
         self._end(session)  # another page of this browser may have signed in meanwhile
         session = self._begin(identity)
         self.access.audit.record(Person(person.client, session.short, *identity), 'sign_in', True,

@@ -82,6 +82,16 @@ def test_questions_of_one_second_keep_their_places_though_each_list_tells_their_
     assert shown == ['q3', 'q1', 'q2']
 
 
+def test_a_question_that_an_interface_has_opened_anew_is_as_old_as_before():
+    front_end, sections = FakeFrontEnd(), PageSections()
+    board = QuestionSections(front_end, TrialLog())
+    ages = []
+    for front_end.asked in ({'q1': 10.0}, {}, {'q1': 55.0}):
+        board.write_sections(sections)
+        ages += [view['asked'] for view in sections.get('questions')]
+    assert len(ages) == 2 and ages[0] == ages[1]
+
+
 def test_userdata_is_shown_by_kind():
     point = PointStamped()
     point.header.frame_id = 'base_link'

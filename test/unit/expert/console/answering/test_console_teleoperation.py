@@ -42,6 +42,9 @@ class NoQuestions:
     def questions(self):
         return []
 
+    def find(self, _):
+        """None is open any more."""
+
 
 @pytest.fixture(name='make')
 def make_hands(monkeypatch):
@@ -88,6 +91,34 @@ def test_an_arm_that_is_not_there_stops_the_hand(make):
     reply = drive(made, arm='/cmd_vel')
     assert (reply.ok, reply.message) == (False, "unknown arm '/cmd_vel'; allowed: left, right")
     assert [each.dead_man for each in sent] == [True, False] and sent[-1].arm == 'right'
+
+
+def stop(made, page=9):
+    return made.stop(PageCommand(1, 'stop_hand', {'question': 'q'}),
+                     Person('', '', 'viewer', 'vera'), page)
+
+
+def test_whoever_sees_a_hand_stops_it_and_its_driver_has_lost_the_wheel(make):
+    made, client, sent = make()
+    drive(made)
+    assert stop(made).ok
+    assert [(each.operator, each.dead_man) for each in sent[1:]][0] == ('', False), 'at once'
+    assert client.control.session is None
+    assert drive(made).message == teleoperation.TAKE_FIRST
+
+
+def test_a_hand_that_no_page_drives_is_stopped_as_well(make):
+    made, client, sent = make()
+    client.control.leave(0.0)
+    assert stop(made).ok and [(each.operator, each.dead_man) for each in sent] == [('', False)]
+
+
+def test_a_release_that_comes_late_stops_the_hand_all_the_same(make, monkeypatch):
+    made, _, sent = make()
+    drive(made)
+    sent_s = time.monotonic()
+    monkeypatch.setattr(time, 'monotonic', lambda: sent_s + 2.0)
+    assert drive(made, sent_s=sent_s, held=False).ok and not sent[-1].dead_man
 
 
 def test_another_page_drives_nothing(make):

@@ -125,12 +125,13 @@ def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
     assert question.encode('utf-8') == b'?'
 
 
-def test_viewers_may_only_look():
-    assert {name for name in COMMANDS if needed_role(name) == 'viewer'} == {'hello', 'watch'}
+def test_viewers_may_only_look_and_stop():
+    assert {name for name in COMMANDS if needed_role(name) == 'viewer'
+            } == {'hello', 'watch', 'leave_wheel', 'stop_hand'}
     assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
     assert {name
             for name in COMMANDS
-            if needed_role(name) == 'teleoperator'} == {'take_wheel', 'leave_wheel', 'drive'}
+            if needed_role(name) == 'teleoperator'} == {'take_wheel', 'drive'}
 
 
 def test_no_command_names_a_topic_a_service_or_a_type():

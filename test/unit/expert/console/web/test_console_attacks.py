@@ -2,6 +2,7 @@
 import hmac
 import json
 import socket
+import threading
 import time
 
 import console_case
@@ -11,7 +12,7 @@ import tornado.web
 from console_case import TOKENS
 
 from smach_oracle.expert.console import page_socket
-from smach_oracle.expert.console.commands.commands import COMMANDS
+from smach_oracle.expert.console.commands.commands import COMMANDS, CommandReply
 from smach_oracle.expert.console.web import sessions
 from smach_oracle.expert.console.web.access import ROLES, AccessTokens, ClientRateLimits
 
@@ -83,6 +84,15 @@ class TestOdd(console_case.ConsoleCase):
         ]
         assert codes == [200, 200, 429, 429]
 
+    def test_strangers_take_nothing_from_who_has_come_with_a_token(self):
+        cookie, _ = self.sign_in('viewer')
+        self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=1.0)
+        assert [self.ask('/session').code for _ in range(4)] == [200, 200, 429, 429]
+        assert [self.ask('/session', Cookie=cookie).code for _ in range(4)] == [200, 200, 429, 429]
+        self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=0.0)
+        assert self.ask('/session').code == 429
+        assert self.ask('/session', Cookie=cookie).code == 200, 'however many they are'
+
     def cookie_of(self, secret, clock=time.time, text=None):
         text = text or sessions.to_text(
             sessions.BrowserSession('known-to-the-attacker', time.time(), 'teleoperator'))
@@ -129,6 +139,37 @@ class TestPages(console_case.ConsoleCase):
                 assert (reply['ok'], 'may not'
                         in reply['message']) == (False, True), (role, name, reply)
         assert self.question_commands.done == [] and self.teleoperation.relayed == []
+        assert not self.teleoperation.drivers
+
+    @tornado.testing.gen_test
+    async def test_a_viewer_stops_what_another_one_drives(self):
+        page = await self.open_page(*await self.signed('teleoperator'))
+        await self.say(page, 2, do='take_wheel', question='q')
+        viewer = await self.open_page(*await self.signed('viewer'))
+        assert (await self.say(viewer, 3, do='stop_hand', question='q'))['ok']
+        assert self.teleoperation.stopped == [('stop_hand', 'viewer')]
+        assert not self.teleoperation.drivers
+
+    @tornado.testing.gen_test
+    async def test_a_stop_waits_for_no_limit_and_no_other_command(self):
+        page = await self.open_page(*await self.signed('operator'))
+        hanging = threading.Event()
+        self.addCleanup(hanging.set)
+        self.question_commands.carry_out = lambda *_: hanging.wait(60) and CommandReply(True)
+        for number in range(10, 60):  # more than may be at work, and than the rate allows
+            await page.write_message(json.dumps({'id': number, 'do': 'claim', 'question': 'q'}))
+        assert (await self.say(page, 99, do='stop_hand', question='q'))['ok']
+        assert (await self.say(page, 100, do='leave_wheel', question='q'))['ok']
+
+    @tornado.testing.gen_test
+    async def test_what_a_page_drives_stops_as_soon_as_the_page_is_closed_for_too_much(self):
+        page = await self.open_page(*await self.signed('teleoperator'))
+        await self.say(page, 2, do='take_wheel', question='q')
+        assert self.teleoperation.drivers
+        socket = next(iter(self.pages.open))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(socket, 'close', lambda *_: None)  # its browser does not answer
+            socket.end(page_socket.TOO_FAST, 'too many commands')
         assert not self.teleoperation.drivers
 
     @tornado.testing.gen_test

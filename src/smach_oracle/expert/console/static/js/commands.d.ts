@@ -40,6 +40,7 @@ export interface Commands {
   give_up_interface: OfQuestion & { why: string };
   take_wheel: OfQuestion;
   leave_wheel: OfQuestion;
+  stop_hand: OfQuestion;
   drive: OfQuestion & DriveWish & { frame: DriveFrame; arm: string; sent: number }; // ms
 }
 

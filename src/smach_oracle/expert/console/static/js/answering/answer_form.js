@@ -1,8 +1,9 @@
 // @ts-check
-// Everything that may be answered, each a button: one press sends it. Keys: 1 to 9 a state, s the
-// first supersede, i the first interface, g give up.
+// Everything that may be answered, each a button: one press sends it, but for giving up. Keys: 1 to
+// 9 a state, s the first supersede, i the first interface, g asks whether to give up.
 import { h, setText } from '../page/dom.js';
 import { whenLetGo } from '../page/redraw.js';
+import { GiveUp } from './give_up.js';
 import { outputFields, readOutputs } from './output_field.js';
 import { PreconditionList } from './precondition_list.js';
 import { likeliest, stateLines } from './state_choices.js';
@@ -36,17 +37,25 @@ export class AnswerForm {
       placeholder: REASON + ' (optional)', 'aria-label': REASON });
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outputs = outputFields(question, () => setText(this.problem, ''));
+    this.on = false;
+    this.giveUp = this.makeGiveUp();
     this.root = h('div', { class: 'answer-form' }, this.goTo(), this.interfaces(), this.supersede(),
-      this.giveUp(), this.problem, this.why);
+      this.giveUp.root, this.problem, this.why);
     this.enable(false);
   }
 
   /** @param {boolean} on */
   enable(on) {
+    this.on = on;
+    if (!on) this.giveUp.cancel();
+    const may = on && !this.giveUp.counting;
     for (const button of this.buttons) {
-      button.disabled = !on || button.dataset['blocked'] === 'yes';
+      button.disabled = !may || button.dataset['blocked'] === 'yes';
     }
   }
+
+  /** Take back what is asked or about to be sent; whether there was any such thing. */
+  cancel() { return this.giveUp.cancel(); }
 
   /**
    * Whether the preconditions of states hold.
@@ -80,10 +89,11 @@ export class AnswerForm {
    * @param {string} name of the state, outcome or interface
    * @param {string} key that presses it, '' for none
    * @param {Child} words
+   * @param {() => void} [act] sends it at once, where it is left out
    */
-  choice(kind, name, key, words) {
+  choice(kind, name, key, words, act = () => this.send(kind, name)) {
     const button = h('button', { class: 'choice ' + kind, type: 'button', 'data-kind': kind,
-      'data-name': name, onclick: () => this.send(kind, name) },
+      'data-name': name, 'data-deliberate': kind + ' ' + name, onclick: act },
     h('kbd', {}, key), h('span', { class: 'choice-text' }, words));
     if (key) this.keys.set(key, button);
     this.buttons.push(button);
@@ -159,14 +169,10 @@ export class AnswerForm {
           h('span', { class: 'dim' }, '→ ', target)]))), 'short')];
   }
 
-  /** @returns {Child} */
-  giveUp() {
-    const { give_up: outcomes, path, running } = this.question;
-    const asFailed = h('strong', {}, running ? 'as a failure' : 'as the failure',
-      ' would have ended ', path);
-    return [h('h4', {}, 'Give up'), choicesBox([this.choice('give_up', '', 'g', asFailed),
-      ...outcomes.map((outcome) => (
-        this.choice('give_up', outcome, '', h('strong', {}, 'with ', outcome))))], 'short')];
+  makeGiveUp() {
+    return new GiveUp(this.question,
+      (outcome, key, words, act) => this.choice('give_up', outcome, key, words, act),
+      { send: (outcome) => this.send('give_up', outcome), changed: () => this.enable(this.on) });
   }
 }
 

@@ -1,5 +1,5 @@
 // @ts-check
-// What the robot does after an answer.
+// What the robot does after an answer: until its trial ends, or it asks again.
 import { h, setText } from '../page/dom.js';
 import { added } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
@@ -10,46 +10,56 @@ import { redraw } from '../page/redraw.js';
 /** @typedef {import('../server').EventSlice} EventSlice */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').TrialEvent} TrialEvent */
+/**
+ * Where one may go from a question: to the list, or to another one, by its key.
+ * @typedef {{ leave: () => void, choose: (key: string) => void }} Ways
+ */
 
 /** @type {Set<EventKind>} */
 const SHOWN = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end',
   'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure',
   'trial_end', 'query_opened', 'health_wait_start', 'health_wait_end']);
-const MOST_SHOWN = 8;
+const MOST_SHOWN = 12; // the latest
 const SILENCE_MS = 6000;
-const AGAIN = 'It asks again; the question is in the list.';
 
 export class FollowUp {
   /**
    * @param {App} app
    * @param {Question} question
-   * @param {() => void} onLeave
+   * @param {Ways} ways
    */
-  constructor(app, question, onLeave) {
+  constructor(app, question, ways) {
     this.app = app;
     this.question = question;
+    this.ways = ways;
     /** @type {TrialEvent[]} */
     this.events = []; // of the question's trial
+    /** @type {TrialEvent | null} */
+    this.last = null; // with which it is over: the trial's end, or the next question
     this.since = 0; // ms, since the answer; 0 before
-    this.silent = false; // it does nothing new: the state runs on
+    this.waits = false; // it does nothing new: the state runs on
+    this.earlier = h('p', { class: 'dim' });
     this.steps = h('ol', { class: 'steps' });
-    this.hint = h('p', { class: 'dim' });
+    this.hint = h('p', { class: 'hint-of-steps' });
     this.title = h('h3', { class: 'done' });
-    this.root = h('div', { class: 'follow-up', role: 'status' }, this.title, this.steps, this.hint,
+    this.next = h('div', { class: 'row next-question' });
+    this.root = h('div', { class: 'follow-up', role: 'status' }, this.title, this.earlier,
+      this.steps, this.hint, this.next,
       h('div', { class: 'row' },
-        h('button', { class: 'primary', onclick: onLeave }, 'Back to the list')));
-    app.store.onEvents((slice) => this.take(slice));
+        h('button', { 'data-action': 'back', onclick: ways.leave }, 'Back to the list')));
+    this.stop = app.store.onEvents((slice) => this.take(slice));
   }
 
   /** @param {Pick<Answer, 'kind' | 'name'>} answer */
   begin(answer) {
     const { state, running } = this.question;
-    const waits = running && answer.kind === 'goto' && answer.name === state;
-    this.silent = waits;
-    setText(this.title, '✓ The robot has your answer: '
-      + (waits ? 'wait on' : answerWords(answer, state)));
-    setText(this.hint, waits ? state + ' runs on. You are asked again if it takes twice as long.'
-      : 'Waiting for what it does…');
+    const gaveUp = answer.kind === 'give_up';
+    this.waits = running && answer.kind === 'goto' && answer.name === state;
+    this.title.className = gaveUp ? 'gave-up' : 'done';
+    setText(this.title, (gaveUp ? '■ The robot gives up, as you said: '
+      : '✓ The robot has your answer: ')
+      + (this.waits ? 'wait on' : answerWords(answer, this.question)));
+    setText(this.hint, this.hintOf([]));
     this.since = Date.now();
     this.watch();
   }
@@ -66,17 +76,64 @@ export class FollowUp {
     const answered = this.events.findIndex(({ kind, query }) => (
       kind === 'query_answered' && query === this.question.id));
     if (answered < 0) return;
-    const shown = this.events.slice(answered + 1).filter((event) => SHOWN.has(event.kind))
-      .slice(0, MOST_SHOWN);
-    redraw(this.steps, shown.map((event) => h('li', { class: event.kind },
+    const after = this.events.slice(answered + 1).filter((event) => SHOWN.has(event.kind));
+    const end = after.findIndex((event) => this.ends(event));
+    this.last = end < 0 ? null : after[end];
+    this.show(end < 0 ? after : after.slice(0, end + 1));
+  }
+
+  /** @param {TrialEvent} event */
+  ends({ kind }) { return kind === 'trial_end' || kind === 'query_opened'; }
+
+  /** @param {TrialEvent[]} steps */
+  show(steps) {
+    const hidden = Math.max(0, steps.length - MOST_SHOWN);
+    setText(this.earlier, hidden ? hidden + ' earlier steps are left out.' : '');
+    this.earlier.hidden = !hidden;
+    redraw(this.steps, steps.slice(hidden).map((event) => h('li', { class: event.kind },
       event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
-    if (this.silent && !shown.length) return;
-    setText(this.hint, shown.some((event) => event.kind === 'query_opened') ? AGAIN : '');
+    setText(this.hint, this.hintOf(steps));
+    this.root.classList.toggle('over', Boolean(this.last));
+    this.showNext();
+  }
+
+  /** @param {TrialEvent[]} steps */
+  hintOf(steps) {
+    if (!this.last && steps.length) return 'It goes on…';
+    if (!this.last) {
+      return this.waits
+        ? this.question.state + ' runs on. You are asked again if it takes twice as long.'
+        : 'Waiting for what it does…';
+    }
+    if (this.last.kind === 'query_opened') return 'It asks again, about ' + this.last.state + '.';
+    const { outcome } = this.last;
+    return 'The trial is over' + (outcome ? ': it ended with ' + outcome + '.' : '.');
+  }
+
+  /** The question that it asks now; else the oldest that nobody works on. */
+  nextQuestion() {
+    const { last } = this;
+    if (!last) return undefined;
+    const { questions } = this.app.store;
+    const again = questions.find(({ id, trial }) => (
+      last.kind === 'query_opened' && id === last.query && trial === this.question.trial));
+    return again || questions.find(({ status }) => status === 'pending');
+  }
+
+  showNext() {
+    const next = this.nextQuestion();
+    this.next.hidden = !next;
+    redraw(this.next, next && h('button', { class: 'primary', key: next.key,
+      'data-action': 'next-question', 'data-deliberate': 'choose ' + next.key,
+      onclick: () => this.ways.choose(next.key) },
+    'Next question: ' + next.state + ' of ' + next.robot));
   }
 
   update() {
-    if (!this.since || this.silent || this.steps.childElementCount) return;
-    if (Date.now() - this.since > SILENCE_MS) {
+    if (!this.since) return;
+    this.showNext();
+    if (!this.waits && !this.steps.childElementCount
+        && Date.now() - this.since > SILENCE_MS) {
       setText(this.hint, 'What it does next is not known: nothing is heard on '
         + this.question.robot + '/oracle/events.');
     }
@@ -85,11 +142,13 @@ export class FollowUp {
 
 /**
  * @param {Pick<Answer, 'kind' | 'name'>} answer
- * @param {string} state that failed
+ * @param {Question} question
  */
-function answerWords({ kind, name }, state) {
+function answerWords({ kind, name }, { state, path }) {
   if (kind === 'goto') return 'go to ' + name;
   if (kind === 'supersede') return state + ' counts as done, with ' + name;
-  if (kind === 'give_up') return 'give up' + (name ? ' with ' + name : '');
+  if (kind === 'give_up') {
+    return path + ' ends ' + (name ? 'with ' + name : 'as the failure would have ended it');
+  }
   return 'interface ' + name;
 }

@@ -3,6 +3,7 @@
 // cannot be seen to be held.
 import { vector } from '../drawing/transforms.js';
 import { modified, typing } from '../page/dom.js';
+import { keysOn } from '../page/shortcuts.js';
 import { MOTIONS, MOVE_OF_KEY } from './drive_moves.js';
 import { GamepadInput } from './gamepad.js';
 
@@ -48,7 +49,7 @@ export class DriveInput {
   key(event, down) {
     const move = MOVE_OF_KEY.get(event.code);
     if (!move || !this.active) return;
-    if (down && typing(event.target)) return;
+    if (down && (typing(event.target) || !keysOn())) return;
     if (down && modified(event)) {
       this.releaseAll();
       return;

@@ -41,9 +41,11 @@ export class InterfacePanel {
     this.why = h('input', { type: 'text', maxlength: 2000, placeholder: RECORD + ' (optional)',
       'aria-label': RECORD });
     this.outputs = outputFields(question, () => setText(this.problem, ''));
-    this.finish = h('button', { class: 'primary finish', onclick: () => this.handOver() },
+    this.finish = h('button', { class: 'primary finish',
+      'data-deliberate': 'finish', onclick: () => this.handOver() },
       'Done: the work is finished');
-    this.quit = h('button', { class: 'quit', onclick: () => this.giveUp() }, 'Give up');
+    this.quit = h('button', { class: 'quit', 'data-deliberate': 'give up',
+      onclick: () => this.giveUp() }, 'Give up');
     this.end = this.buildEnd();
     this.place = h('div', { class: 'manipulation-place' });
     this.root = h('div', { class: 'interface-panel' }, this.place, this.end, this.output);

@@ -8,6 +8,7 @@ import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
 import { DriveCamera } from './drive_camera.js';
 import { DriveInput } from './drive_input.js';
+import { NO_EMERGENCY_STOP } from './emergency.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { factsOf, lightOf } from './hand_state.js';
 
@@ -23,6 +24,7 @@ const PERIOD_MS = 25;
 const IDLE_MS = 500; // how often a page that holds the wheel says so while nothing moves
 const FRAMES = { tool: 'Tool', base: 'Base', camera: 'Camera' };
 const TITLES = { linear: 'Move', angular: 'Turn' };
+const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
 const HOLD = 'Hold to move, let go to stop. ';
 const PAD = 'A gamepad moves while a shoulder button is held.';
 /** @type {DriveWish} */
@@ -53,6 +55,8 @@ export class ManipulationPanel {
     this.arms = h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm' });
     this.wheelButton = h('button', { class: 'primary wheel', onclick: () => this.turnWheel() });
     this.driver = h('span', { class: 'dim driver', role: 'status' });
+    this.stopButton = h('button', { class: 'stop', 'data-action': 'stop-hand',
+      onclick: () => this.stopHand() }, '■ Stop the hand');
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.frames = { tool: this.frameButton('tool'), base: this.frameButton('base'),
       camera: this.frameButton('camera') };
@@ -78,8 +82,8 @@ export class ManipulationPanel {
     return h('section', { class: 'card manipulation', 'aria-label': 'Drive the hand' },
       h('div', { class: 'manipulation-head' },
         h('h3', {}, 'Drive the hand for ', this.question.state), this.driver,
-        h('span', { class: 'spacer' }), this.wheelButton),
-      this.problem,
+        h('span', { class: 'spacer' }), this.wheelButton, this.stopButton),
+      this.problem, h('p', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP),
       h('div', { class: 'manipulation-body' },
         h('div', { class: 'manipulation-see' }, this.light, this.camera.root, this.facts),
         this.buildControls()));
@@ -117,7 +121,8 @@ export class ManipulationPanel {
   /** @param {Move} move */
   pad(move) {
     const { key, sign } = BUTTONS[move];
-    const button = h('button', { class: 'pad', 'data-move': move, title: move },
+    const button = h('button', { class: 'pad', 'data-move': move, title: move,
+      'data-deliberate': 'hold ' + move },
       h('span', { class: 'sign' }, sign), h('span', { class: 'pad-name' }, move),
       h('kbd', {}, key));
     this.input.bind(button, move);
@@ -156,6 +161,20 @@ export class ManipulationPanel {
     }
     dropFocus();
     this.update();
+  }
+
+  /** Whoever drives: always possible, for everybody, and sent at once. */
+  async stopHand() {
+    this.input.releaseAll();
+    setText(this.problem, '');
+    try {
+      const reply = await this.app.connection.request('stop_hand', { question: this.question.key });
+      if (!reply.ok) setText(this.problem, reply.message);
+    } catch (err) {
+      unlessLost(err);
+      setText(this.problem, CANNOT_STOP);
+    }
+    dropFocus();
   }
 
   /**
@@ -205,9 +224,9 @@ export class ManipulationPanel {
    * @param {boolean} held
    */
   changed(held) {
+    if (!held && this.wheel) this.send(NOTHING); // whoever the server takes for the driver
     if (!this.mine) return;
     if (held) this.beat();
-    else this.send(NOTHING);
     this.showHeld(this.input.read());
   }
 
@@ -264,6 +283,8 @@ export class ManipulationPanel {
     const may = this.app.role === 'teleoperator';
     this.wheelButton.disabled = !may || !now || !connected;
     setText(this.wheelButton, this.mine ? 'Leave the wheel' : 'Take the wheel');
+    if (this.mine) delete this.wheelButton.dataset['deliberate']; // to leave it is always possible
+    else this.wheelButton.dataset['deliberate'] = 'take the wheel';
     const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
     const driver = now && now.driver ? now.driver + ' drives.' : nobody;
     const shown = this.mine ? 'You drive.' : driver;

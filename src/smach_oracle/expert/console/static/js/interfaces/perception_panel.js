@@ -88,8 +88,8 @@ export class PerceptionPanel {
       clear: button('Clear', () => this.clear()),
       failed: button('Image of the failure', () => this.useFrame('at_goal')),
       fresh: button('New image', () => this.useFrame('fresh')),
-      accept: button('Accept the object', () => this.accept(), 'primary accept'),
-      quit: button('Give up', () => this.giveUp(), 'quit'),
+      accept: button('Accept the object', () => this.accept(), 'primary accept', 'accept'),
+      quit: button('Give up', () => this.giveUp(), 'quit', 'give up'),
     };
   }
 
@@ -292,7 +292,8 @@ export class PerceptionPanel {
  * @param {string} text
  * @param {() => void} onclick
  * @param {string} [kind]
+ * @param {string} [deliberate] what it starts or ends
  */
-function button(text, onclick, kind = 'tool') {
-  return h('button', { class: kind, onclick }, text);
+function button(text, onclick, kind = 'tool', deliberate) {
+  return h('button', { class: kind, 'data-deliberate': deliberate, onclick }, text);
 }

@@ -2,8 +2,10 @@
 // The frame around the panels: the top bar, the tabs, and which panel is shown.
 import { Alerts } from './alerts.js';
 import { Connection } from './connection.js';
+import { watchOverClicks } from './deliberate.js';
 import { h, part, replace, setText, toast } from './dom.js';
 import { leaveNote, remember, remembered, takeNote } from './preferences.js';
+import { keysButton } from './shortcuts.js';
 import { askName, askToken } from './sign_in.js';
 import { Store } from './store.js';
 
@@ -54,6 +56,7 @@ export class App {
     replace(part('nav'), this.tabs.map((tab) => tab.button));
     this.store.onChange((names) => this.update(names));
     setInterval(() => this.tick(), 1000);
+    watchOverClicks();
   }
 
   get role() { return this.connection.session ? this.connection.session.role : ''; }
@@ -67,7 +70,8 @@ export class App {
     this.setTheme(theme === 'light' || theme === 'dark' ? theme : 'auto');
     replace(part('top'), h('img', { src: 'static/icon.svg', alt: '', class: 'logo' }),
       h('strong', { class: 'brand' }, 'Operator console'), this.status,
-      h('span', { class: 'spacer' }), this.alerts.buttons(), this.themeButton, this.person);
+      h('span', { class: 'spacer' }), this.alerts.buttons(), keysButton(),
+      this.themeButton, this.person);
   }
 
   /**

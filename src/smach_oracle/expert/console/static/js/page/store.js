@@ -36,8 +36,16 @@ export class Store {
   /** @param {(names: string[]) => void} listener */
   onChange(listener) { this.listeners.push(listener); }
 
-  /** @param {(slice: EventSlice) => void} listener */
-  onEvents(listener) { this.eventListeners.push(listener); }
+  /**
+   * @param {(slice: EventSlice) => void} listener
+   * @returns {() => void} ends it
+   */
+  onEvents(listener) {
+    this.eventListeners.push(listener);
+    return () => {
+      this.eventListeners = this.eventListeners.filter((each) => each !== listener);
+    };
+  }
 
   /** @param {Batch} batch */
   receive({ now, all, sections = {}, events }) {

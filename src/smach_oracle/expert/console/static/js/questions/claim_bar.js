@@ -33,7 +33,15 @@ export class ClaimBar {
     this.use = use;
     this.root = h('div', { class: 'claim-bar', role: 'status' });
     this.key = ''; // of what is shown
-    this.offersTakeOver = false;
+  }
+
+  /**
+   * Press one of its buttons, if it is there.
+   * @param {string} action
+   */
+  press(action) {
+    const found = this.root.querySelector('[data-action="' + action + '"]');
+    if (found instanceof HTMLElement) found.click();
   }
 
   /** @param {ClaimState} state */
@@ -42,7 +50,6 @@ export class ClaimBar {
     const key = JSON.stringify([{ ...state, now: now && [now.holder, now.status] }]);
     if (key === this.key) return;
     this.key = key;
-    this.offersTakeOver = false;
     const { kind, words } = this.barOf(state);
     this.root.className = 'claim-bar ' + kind;
     replace(this.root, words && h('span', {}, words),
@@ -75,10 +82,7 @@ export class ClaimBar {
   /** @returns {Child} */
   yours() { return ['It is yours. ', button('Leave it to others', this.use.leave)]; }
 
-  takeOver() {
-    this.offersTakeOver = true;
-    return button('Take it over', this.use.takeOver, 'take-over');
-  }
+  takeOver() { return button('Take it over', this.use.takeOver, 'take-over'); }
 }
 
 /**
@@ -87,5 +91,6 @@ export class ClaimBar {
  * @param {string} [id]
  */
 function button(text, onclick, id) {
-  return h('button', { class: 'inline', onclick, 'data-action': id }, text);
+  return h('button', { class: 'inline', onclick, 'data-action': id,
+    'data-deliberate': id || text }, text);
 }

@@ -24,13 +24,14 @@ export class QuestionDetail {
   /**
    * @param {App} app
    * @param {Question} question as it was when it was chosen
-   * @param {() => void} onLeave
+   * @param {import('../answering/follow_up.js').Ways} ways
    */
-  constructor(app, question, onLeave) {
+  constructor(app, question, ways) {
     this.app = app;
     this.question = question;
     this.key = question.key;
-    this.onLeave = onLeave;
+    this.ways = ways;
+    this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
     this.claiming = false;
     this.held = false; // this page has claimed it
@@ -49,7 +50,7 @@ export class QuestionDetail {
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
-    this.claimBar = new ClaimBar({ leave: onLeave, claim: () => this.claim('claim'),
+    this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
       takeOver: () => this.claim('take_over') });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'),
@@ -73,7 +74,8 @@ export class QuestionDetail {
   head() {
     const { state, stands, robot, path } = this.question;
     return h('header', { class: 'detail-head' },
-      h('button', { class: 'back', 'aria-label': 'Back to the list', onclick: this.onLeave }, '‹'),
+      h('button', { class: 'back', 'aria-label': 'Back to the list',
+        onclick: this.ways.leave }, '‹'),
       h('div', {}, h('h2', {}, state, ' ', stands),
         h('p', { class: 'dim' }, robot, ' · ', path)),
       h('span', { class: 'spacer' }), this.time);
@@ -101,12 +103,17 @@ export class QuestionDetail {
     if (this.followUp) this.followUp.watch();
   }
 
+  /** It is looked at again: meanwhile another panel may have watched another trial. */
+  shown() { if (this.followUp) this.followUp.watch(); }
+
   end() {
     if (this.held && !this.settled) this.release();
     this.ended = true;
+    this.form.cancel();
     this.camera.stop();
     if (this.perceptionPanel) this.perceptionPanel.stop();
     if (this.interfacePanel) this.interfacePanel.stop();
+    if (this.followUp) this.followUp.stop();
   }
 
   release() {
@@ -118,6 +125,7 @@ export class QuestionDetail {
     if (this.claiming) return;
     this.claiming = true;
     this.problem = '';
+    this.holderBefore = this.now?.holder || '';
     try {
       const reply = await this.app.connection.request(command, { question: this.key });
       this.held = reply.ok;
@@ -136,12 +144,11 @@ export class QuestionDetail {
     this.sending = true;
     this.problem = '';
     this.show();
-    const followUp = new FollowUp(this.app, this.question, this.onLeave);
     try {
       const reply = await this.app.connection.request('answer', { question: this.key, ...answer });
       if (reply.ok) {
         this.held = false;
-        this.turnTo(followUp, answer);
+        this.turnTo(answer);
       } else {
         this.problem = reply.message;
       }
@@ -153,9 +160,12 @@ export class QuestionDetail {
     this.show();
   }
 
+  /** Take back what is not sent yet; whether there was any such thing. */
+  cancel() { return !this.settled && this.form.cancel(); }
+
   /** @param {string} key */
   press(key) {
-    if (key === 't' && this.claimBar.offersTakeOver) this.claim('take_over');
+    if (key === 't') this.claimBar.press('take-over');
     else if (this.mine && !this.settled) this.form.press(key);
   }
 
@@ -192,18 +202,17 @@ export class QuestionDetail {
   follow() {
     if (this.followUp) return;
     const { now } = this;
-    this.turnTo(new FollowUp(this.app, this.question, this.onLeave),
-      { kind: 'interface', name: now ? now.interface : '' });
+    this.turnTo({ kind: 'interface', name: now ? now.interface : '' });
     this.show();
   }
 
   /**
    * What the robot does takes the place of what it could do; where the page is narrow it comes
    * first.
-   * @param {FollowUp} followUp
    * @param {Pick<Answer, 'kind' | 'name'>} answer
    */
-  turnTo(followUp, answer) {
+  turnTo(answer) {
+    const followUp = new FollowUp(this.app, this.question, this.ways);
     this.settled = true;
     this.followUp = followUp;
     followUp.begin(answer);
@@ -257,9 +266,11 @@ export class QuestionDetail {
     const free = now && !now.holder && now.status === 'pending';
     // a server that was restarted knows nobody who holds it
     if (free && this.held && this.app.connection.connected) this.claim('claim');
-    if (this.held && now && now.holder && now.holder !== this.app.expert) {
+    if (this.mine) this.holderBefore = ''; // whoever holds it next has taken it over
+    const other = now && now.holder !== this.app.expert ? now.holder : '';
+    if (this.held && other && other !== this.holderBefore) { // else it is not told yet
       this.held = false;
-      this.problem = now.holder + ' has taken this question over.';
+      this.problem = other + ' has taken this question over.';
     }
     this.show();
   }

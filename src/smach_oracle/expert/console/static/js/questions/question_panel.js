@@ -1,8 +1,10 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
+import { NO_EMERGENCY_STOP } from '../interfaces/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
+import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -26,7 +28,8 @@ class QuestionPanel {
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.servers), this.stage);
+      h('aside', { class: 'queue-side' }, this.queue, this.servers,
+        h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     window.addEventListener('keydown', (event) => this.key(event));
     this.showStage();
   }
@@ -35,7 +38,10 @@ class QuestionPanel {
 
   badge() { return this.open.filter((each) => each.status === 'pending').length; }
 
-  shown() { this.update(['questions', 'servers']); }
+  shown() {
+    this.update(['questions', 'servers']);
+    if (this.detail) this.detail.shown();
+  }
 
   connected() { if (this.detail) this.detail.connected(); }
 
@@ -71,7 +77,8 @@ class QuestionPanel {
   row(question) {
     const { key, status, state, robot, path, rate } = question;
     return h('button', { key, class: 'question-row ' + status, 'data-key': key,
-      'aria-current': this.isChosen(key), onclick: () => this.choose(key) },
+      'data-deliberate': 'choose ' + key, 'aria-current': this.isChosen(key),
+      onclick: () => this.choose(key) },
     h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
       h('span', { class: 'spacer' }), this.statusChip(question)),
     h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
@@ -104,9 +111,10 @@ class QuestionPanel {
   /** @param {string} key */
   choose(key) {
     const question = this.open.find((each) => each.key === key);
-    if (!question || this.isChosen(key)) return;
+    if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
     this.close();
-    this.detail = new QuestionDetail(this.app, question, () => this.close());
+    this.detail = new QuestionDetail(this.app, question,
+      { leave: () => this.close(), choose: (next) => this.choose(next) });
     this.showStage();
     this.showQueue();
     this.detail.begin();
@@ -128,21 +136,25 @@ class QuestionPanel {
       return;
     }
     const waiting = this.badge();
-    const title = waiting ? counted(waiting, 'question waits', 'questions wait') : 'All quiet';
-    const hint = waiting ? h('p', {}, 'Choose one, or press ', h('kbd', {}, 'n'),
-      ' for the oldest that nobody works on.') : h('p', {}, QUIET);
+    const title = waiting ? counted(waiting, 'question waits', 'questions wait')
+      : (this.open.length ? 'Nobody is waited for' : 'All quiet');
+    const choose = keysOn() ? ['Choose one, or press ', h('kbd', {}, 'n'),
+      ' for the oldest that nobody works on.'] : 'Choose one.';
+    const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
+      : 'each of the ' + this.open.length + ' open questions.');
+    const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
     replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, title), hint));
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     if (this.app.current !== 'questions' || modified(event) || typing(event.target)
-      || document.querySelector('dialog[open]')) return;
+      || document.querySelector('dialog[open]') || event.repeat || turnedOff(event)) return;
     if (event.key === 'n') {
       const next = this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
       if (next) this.choose(next.key);
     } else if (event.key === 'Escape') {
-      this.close();
+      if (!this.detail || !this.detail.cancel()) this.close();
     } else if (this.detail) {
       this.detail.press(event.key);
     }

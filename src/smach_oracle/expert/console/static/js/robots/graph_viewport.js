@@ -123,17 +123,25 @@ export class GraphViewport {
       this.zoom(Math.exp(-event.deltaY / 400), this.inFrame(event.clientX, event.clientY));
     }, { passive: false });
     drawing.addEventListener('pointerdown', (event) => {
+      if (!pointers.size) this.listenWhilePressed();
       pointers.set(event.pointerId, event);
       this.spread = 0;
     });
-    window.addEventListener('pointermove', (event) => this.move(event));
+  }
+
+  /** To the window, and no longer: it would keep every drawing that there ever was. */
+  listenWhilePressed() {
+    const off = new AbortController();
+    const { signal } = off;
+    window.addEventListener('pointermove', (event) => this.move(event), { signal });
     /** @param {PointerEvent} event */
     const end = (event) => {
-      pointers.delete(event.pointerId);
+      this.pointers.delete(event.pointerId);
       this.spread = 0;
+      if (!this.pointers.size) off.abort();
     };
-    window.addEventListener('pointerup', end);
-    window.addEventListener('pointercancel', end);
+    window.addEventListener('pointerup', end, { signal });
+    window.addEventListener('pointercancel', end, { signal });
   }
 
   /**

@@ -1,0 +1,118 @@
+// @ts-check
+// Giving up ends the task: it is asked for, confirmed, and can be undone for some seconds before it
+// is sent.
+import { dropFocus, h, replace, setText } from '../page/dom.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Question} Question */
+/**
+ * Makes a button of the form: the outcome, its key, its words, and what it does.
+ * @typedef {(outcome: string, key: string, words: Child, act: () => void) => HTMLButtonElement}
+ *   MakeButton
+ */
+
+const UNDO_S = 5;
+
+export class GiveUp {
+  /**
+   * @param {Question} question
+   * @param {MakeButton} makeButton
+   * @param {{ send: (outcome: string) => void, changed: () => void }} use `changed`: whether it is
+   *   about to be sent
+   */
+  constructor(question, makeButton, use) {
+    this.question = question;
+    this.use = use;
+    this.timer = 0;
+    this.left = 0; // s until it is sent; 0 where nothing is about to be
+    this.outcome = ''; // '': as the failure would have ended it
+    this.choices = h('div', { class: 'give-up-choices' }, this.buildChoices(makeButton));
+    this.asking = h('div', { class: 'give-up-asking', role: 'group', 'aria-label': 'Give up',
+      hidden: true });
+    this.root = h('div', { class: 'give-up-part' }, h('h4', {}, 'Give up'), this.choices,
+      this.asking);
+  }
+
+  /** Whether it is confirmed, and will be sent in some seconds. */
+  get counting() { return this.left > 0; }
+
+  /**
+   * @param {MakeButton} makeButton
+   * @returns {Child}
+   */
+  buildChoices(makeButton) {
+    const { path, give_up: outcomes, running } = this.question;
+    const asFailed = [h('strong', {}, running ? 'as a failure' : 'as the failure',
+      ' would have ended ', path)];
+    const others = outcomes.map((outcome) => makeButton(outcome, '',
+      h('strong', {}, 'with ', outcome), () => this.ask(outcome)));
+    return [h('div', { class: 'choices' }, makeButton('', 'g', asFailed, () => this.ask(''))),
+      others.length > 0 && h('details', { class: 'other-ends' },
+        h('summary', {}, 'Give up, and say that ', path, ' has ended otherwise'),
+        h('div', { class: 'choices short' }, others))];
+  }
+
+  /** @param {string} outcome */
+  ask(outcome) {
+    this.outcome = outcome;
+    const back = h('button', { 'data-action': 'keep', onclick: () => this.cancel() },
+      'No, go back');
+    replace(this.asking, h('p', {}, 'Give up? ', this.consequence()),
+      h('div', { class: 'row wrap' },
+        h('button', { class: 'danger', 'data-action': 'confirm-give-up',
+          'data-deliberate': 'confirm giving up', onclick: () => this.count() }, 'Yes, give up'),
+        back));
+    this.turn(true);
+    back.focus();
+  }
+
+  consequence() {
+    const { path, state } = this.question;
+    return this.outcome
+      ? 'The work of ' + state + ' stays undone, and ' + path + ' ends with ' + this.outcome + '.'
+      : 'The work of ' + state + ' stays undone, and ' + path
+        + ' ends as the failure would have ended it.';
+  }
+
+  /** Confirmed: wait for an undo. */
+  count() {
+    this.left = UNDO_S;
+    const words = h('p', { role: 'status' });
+    const undo = h('button', { class: 'primary', 'data-action': 'undo-give-up',
+      onclick: () => this.cancel() }, 'Undo');
+    replace(this.asking, words, h('div', { class: 'row' }, undo));
+    undo.focus();
+    const show = () => setText(words, 'Giving up in ' + this.left + ' s. ' + this.consequence());
+    show();
+    this.timer = setInterval(() => {
+      this.left -= 1;
+      if (this.left > 0) show();
+      else this.send();
+    }, 1000);
+    this.use.changed();
+  }
+
+  send() {
+    const { outcome } = this;
+    this.cancel();
+    this.use.send(outcome);
+  }
+
+  /** Back to the choices; whether there was anything to take back. */
+  cancel() {
+    const { counting } = this;
+    const asked = !this.asking.hidden;
+    clearInterval(this.timer);
+    this.left = 0;
+    this.turn(false);
+    if (asked) dropFocus();
+    if (counting) this.use.changed();
+    return asked;
+  }
+
+  /** @param {boolean} asking */
+  turn(asking) {
+    this.asking.hidden = !asking;
+    this.choices.hidden = asking;
+  }
+}

@@ -1,0 +1,139 @@
+// @ts-check
+// What starts or ends something is sent only where it was meant. An element with `data-deliberate`
+// is settled once it has lain still, enabled and uncovered, for a while; before that, a click on it
+// is refused. The second tap of a double tap thus never reaches what the first one has brought.
+//
+// The attribute's value says what a click would do: where it changes, the element is another one.
+// What is held begins with `hold`, and is refused as it is pressed. What stops or lets go never has
+// the attribute.
+import { toast } from './dom.js';
+
+/**
+ * @typedef {object} Place
+ * @property {string} meaning
+ * @property {number[]} sides px, on the screen: left, top, right, bottom
+ */
+/** @typedef {{ place: Place, sinceMs: number }} Rest */
+
+const SETTLING_MS = 700;
+const PERIOD_MS = 100;
+const SELECTOR = '[data-deliberate]';
+const HELD = /^hold /;
+const STILL = 4; // px by which an element may move and yet lie under the same finger
+const TOO_SOON = 'Not sent: the page had just changed there. Press again.';
+
+/** @type {Map<HTMLElement, Rest>} */
+let rests = new Map(); // of those that can be pressed
+/** @type {{ element: HTMLElement, meaning: string, settled: boolean } | null} */
+let pressed = null;
+
+/** Begin: once a page. */
+export function watchOverClicks() {
+  window.addEventListener('pointerdown', (event) => press(event), true);
+  window.addEventListener('click', (event) => judge(event), true);
+  document.addEventListener('visibilitychange', () => {
+    if (!document.hidden) rests.clear(); // what lay there before is not remembered
+  });
+  setInterval(look, PERIOD_MS);
+}
+
+/**
+ * Whether an element has lain there for long enough to be pressed on purpose.
+ * @param {HTMLElement} element
+ */
+function settled(element) {
+  const nowMs = performance.now();
+  const rest = restOf(element, nowMs);
+  if (!rest) return false;
+  rests.set(element, rest);
+  return nowMs - rest.sinceMs >= SETTLING_MS;
+}
+
+/** Say that a press was refused, for that it came too soon. */
+function sayTooSoon() {
+  const { dataset } = document.body;
+  dataset['refused'] = String(Number(dataset['refused'] || 0) + 1);
+  toast(TOO_SOON, 'warn');
+}
+
+function look() {
+  const nowMs = performance.now();
+  const before = rests;
+  const now = new Map();
+  for (const element of document.querySelectorAll(SELECTOR)) {
+    if (!(element instanceof HTMLElement)) continue;
+    const rest = restOf(element, nowMs);
+    if (rest) now.set(element, rest);
+    element.toggleAttribute('data-settled',
+      Boolean(rest && before.has(element) && nowMs - rest.sinceMs >= SETTLING_MS));
+  }
+  rests = now;
+}
+
+/**
+ * @param {HTMLElement} element
+ * @param {number} nowMs
+ * @returns {Rest | null} null: it cannot be pressed
+ */
+function restOf(element, nowMs) {
+  const place = placeOf(element);
+  if (!place) return null;
+  const before = rests.get(element);
+  return before && same(before.place, place) ? before : { place, sinceMs: nowMs };
+}
+
+/**
+ * @param {HTMLElement} element
+ * @returns {Place | null}
+ */
+function placeOf(element) {
+  const { left, top, right, bottom } = element.getBoundingClientRect();
+  if (right <= left || bottom <= top || element.matches(':disabled')) return null;
+  const over = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+  if (over && !element.contains(over)) return null; // null: out of the window
+  return { meaning: meaningOf(element), sides: [left, top, right, bottom] };
+}
+
+/** @param {HTMLElement} element */
+function meaningOf(element) { return element.dataset['deliberate'] || ''; }
+
+/**
+ * @param {Place} one
+ * @param {Place} other
+ */
+function same(one, other) {
+  return one.meaning === other.meaning
+    && one.sides.every((side, index) => Math.abs(side - other.sides[index]) <= STILL);
+}
+
+/** @param {Event} event */
+function elementOf({ target }) {
+  const element = target instanceof Element ? target.closest(SELECTOR) : null;
+  return element instanceof HTMLElement ? element : null;
+}
+
+/** @param {PointerEvent} event */
+function press(event) {
+  const element = elementOf(event);
+  pressed = element && { element, meaning: meaningOf(element), settled: settled(element) };
+  if (!pressed || pressed.settled || !HELD.test(pressed.meaning)) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  sayTooSoon();
+}
+
+/** @param {MouseEvent} event */
+function judge(event) {
+  const element = elementOf(event);
+  const before = pressed;
+  pressed = null;
+  if (!element || HELD.test(meaningOf(element))) return;
+  // a key that presses a button, or a script, has no pointer that went down before
+  const ofPointer = event.detail > 0 && before && before.element === element;
+  const meant = ofPointer ? before.settled && before.meaning === meaningOf(element)
+    : settled(element);
+  if (meant) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  sayTooSoon();
+}

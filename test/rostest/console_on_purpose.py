@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+"""The console commands nothing by accident, and says what an answer has led to: in a real browser,
+with a real machine under a real oracle.
+"""
+import os
+import sys
+import unittest
+
+import rosgraph
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
+from waiting import stays, wait_for  # noqa: E402
+
+from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent  # noqa: E402
+from smach_oracle.srv import ClaimQuery, ClaimQueryRequest  # noqa: E402
+
+QUESTION = '.question-row[data-key^="/alpha/"]'
+OWN_SERVER = '/a_server_of_its_own'
+GO_TO_PLACE = '.choice.goto[data-name=PLACE]'
+GIVE_UP = '.choice.give_up[data-name=""]'
+# what a second tap does as soon as there is something to tap: no wall clock has a part in it
+TAP_AT_ONCE = '''
+const [row, answer, done] = arguments;
+const tap = (element) => {
+  const it = { bubbles: true, cancelable: true, detail: 1 };
+  element.dispatchEvent(new PointerEvent("pointerdown", it));
+  element.dispatchEvent(new MouseEvent("click", it));
+};
+tap(document.querySelector(row));
+const look = () => {
+  const button = document.querySelector(answer);
+  if (!button || button.disabled) { requestAnimationFrame(look); return; }
+  tap(button);
+  done();
+};
+look();'''
+MOVE_AND_TAP = '''
+const [selector] = arguments;
+const box = document.createElement("div");
+box.style.height = "60px";
+document.querySelector(".answer-form").prepend(box);
+document.querySelector(selector).click();
+box.remove();'''
+# somebody takes a question over; the list that tells of it comes later than the reply
+TAKEN = '''
+const paths = ["questions/question_detail.js", "page/store.js"];
+return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
+  [{ QuestionDetail }, { Store }]) => {
+  const store = new Store();
+  const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
+    state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
+    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
+    asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
+    give_up: [], interfaces: [], userdata: [] };
+  const request = async () => ({ ok: true, message: "" });
+  const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
+    connection: { connected: true, request } };
+  const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
+  store.onChange((names) => detail.update(names));
+  const said = (holder) => {
+    store.receive({ now: 0, sections: { questions: [{ ...question, holder }] } });
+    return detail.claimBar.root.textContent;
+  };
+  said("bob");
+  await detail.claim("take_over");
+  said("bob");
+  return [said("ann"), said("carl")];
+});'''
+REFUSED = 'the page had just changed there'
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class OnPurpose(ConsolePage, unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.audited, cls.events = [], []
+        rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
+        rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
+        rospy.set_param('/alpha/own_introspection', True)
+        cls.listed = []
+        rospy.Subscriber('/alpha/expert_query/open', OpenQueries, cls.listed.append)
+        cls.begin('console_robot.py', 'PICK', '0.05', '6', '9')
+
+    def answers(self):
+        """The kinds of the answers that the console was told to send."""
+        return [told.arguments for told in self.audited if told.command == 'answer']
+
+    def press(self, key):
+        self.browser.run('document.activeElement.blur()')
+        self.browser.find('body').send_keys(key)
+
+    def open_question(self):
+        self.browser.click(QUESTION)
+        self.assertTrue(wait_for(lambda: self.browser.settled(self.browser.find(GO_TO_PLACE))))
+
+    def test_1_the_second_tap_of_a_double_tap_answers_nothing(self):
+        browser = self.browser
+        self.assertTrue(wait_for(lambda: browser.settled(browser.find(QUESTION))))
+        browser.driver.set_script_timeout(40)
+        browser.driver.execute_async_script(TAP_AT_ONCE, QUESTION, GO_TO_PLACE)
+        self.assertTrue(browser.says(REFUSED), browser.text())
+        self.assertEqual(self.answers(), [])
+        self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
+        browser.run(MOVE_AND_TAP, GO_TO_PLACE)
+        self.assertEqual(browser.run('return document.body.dataset.refused'), '2',
+                         'it has moved under the pointer')
+        self.assertTrue(browser.says('It is yours.'))
+        self.assertEqual(self.answers(), [])
+
+    def test_2_giving_up_is_confirmed_and_can_be_undone(self):
+        browser = self.browser
+        self.press('g')
+        self.assertTrue(browser.says('Give up? The work of PICK stays undone'))
+        self.press('g')
+        self.assertTrue(stays(lambda: not self.answers(), 0.5), 'the key alone sends nothing')
+        browser.click('[data-action=confirm-give-up]')
+        self.assertTrue(browser.says('Giving up in'))
+        self.assertFalse(browser.find('.choice.goto').is_enabled())
+        browser.click('[data-action=undo-give-up]')
+        self.assertTrue(wait_for(lambda: browser.find(GIVE_UP).is_enabled()))
+        browser.click(GIVE_UP)
+        browser.click('[data-action=confirm-give-up]')
+        self.assertTrue(browser.says('Giving up in'))
+        self.press('\ue00c')  # Escape
+        self.assertTrue(browser.says('as the failure would have ended', '.give-up-part'),
+                        'undone, and the question is still shown')
+        browser.click('.other-ends summary')
+        browser.click('.choice.give_up[data-name=succeeded]')
+        self.assertTrue(browser.says('KITCHEN/FETCH ends with succeeded', '.give-up-asking'))
+        browser.click('[data-action=confirm-give-up]')
+        self.assertTrue(browser.find('.follow-up'))
+        self.assertEqual(len(self.answers()), 1, 'sent once, undone twice')
+        self.assertTrue(
+            wait_for(lambda: OracleEvent.GIVE_UP in [event.kind for event in self.events]))
+        self.assertTrue(browser.says('The robot gives up, as you said', '.follow-up .gave-up'),
+                        'that is no success')
+        self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'),
+                        'after more than eight steps')
+        self.assertIn('earlier steps are left out', browser.text('.follow-up'))
+
+    def test_3_single_letter_keys_can_be_turned_off(self):
+        browser = self.browser
+        browser.click('.follow-up [data-action=back]')
+        browser.find(QUESTION)
+        browser.click('#keys')
+        self.press('n')
+        self.assertTrue(stays(lambda: not browser.run('return document.querySelector(".detail")'),
+                              0.5))
+        browser.click('#keys')
+        self.press('n')
+        browser.find('.detail')
+        self.assertEqual(browser.errors(), [])
+
+    def claim(self, action):
+        """As bob, from elsewhere."""
+        self.assertTrue(wait_for(lambda: self.listed[-1].queries))
+        call = rospy.ServiceProxy('/alpha/expert_query/claim', ClaimQuery)
+        question = self.listed[-1].queries[0].query.query_id
+        self.assertTrue(call(ClaimQueryRequest(action, question, 'bob', 30.0)).ok)
+
+    def test_4_what_follows_an_answer_leads_to_the_next_question(self):
+        browser = self.browser
+        self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
+        browser.click('.choice.goto[data-name=DETECT]')
+        self.assertTrue(browser.says('It asks again, about PICK.', '.follow-up'))
+        browser.click('[data-action=next-question]')
+        self.assertTrue(browser.says('It is yours.'))
+        browser.click('.choice.goto[data-name=PLACE]')
+        self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'))
+        browser.click('.follow-up [data-action=back]')
+
+    def test_5_what_somebody_else_works_on_is_told(self):
+        browser = self.browser
+        browser.find(QUESTION)
+        self.claim(ClaimQueryRequest.CLAIM)
+        self.assertTrue(browser.says('Somebody works on the open question.'))
+        self.assertNotIn('All quiet', browser.text())
+        self.claim(ClaimQueryRequest.RELEASE)
+        self.assertTrue(browser.says('1 question waits'))
+        mine, taken = browser.run(TAKEN)
+        self.assertEqual(mine, 'It is yours. Leave it to others')
+        self.assertIn('carl has taken this question over.', taken)
+        self.assertEqual(browser.errors(), [])
+
+    def test_6_a_machine_with_a_server_of_its_own_is_listed_once(self):
+        def known():
+            heard = dict(rosgraph.Master('/test').getSystemState()[1])
+            return '/expert_console' in heard.get(OWN_SERVER + '/smach/container_structure', [])
+        browser = self.browser
+        self.assertTrue(wait_for(known), 'the console follows it')
+        browser.click('#tab-machines')
+        browser.find('[id="/alpha/KITCHEN/FETCH"]')
+        # it tells its structure every 2 s
+        self.assertTrue(
+            stays(lambda: browser.run(
+                'return [...document.querySelectorAll(".picker .robot")]'
+                '.map((robot) => robot.textContent)') == ['/alpha'], 5.0))
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_on_purpose')
+    rostest.rosrun('smach_oracle', 'console_on_purpose', OnPurpose)

@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""A page does not wear out: a question that was opened and left leaves nothing behind in it."""
+import os
+import sys
+import unittest
+
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
+
+BEGINNING, QUESTIONS = 10, 200
+MOST_NODES, MOST_LISTENERS = 40, 2  # a question; it has some 400 and 60
+# by keys: open the oldest question, until it is taken and drawn; leave it, until it waits again
+OPEN_AND_LEAVE = '''
+const [times, done] = arguments;
+const press = (key) => window.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+const until = (selector) => new Promise((resolve) => {
+  const look = () => (document.querySelector(selector) ? resolve() : setTimeout(look, 20));
+  look();
+});
+(async () => {
+  for (let time = 0; time < times; time += 1) {
+    await until(".question-row.pending");
+    press("n");
+    await until(".detail .claim-bar.good");
+    await until(".detail .state");
+    press("Escape");
+  }
+  await until(".question-row.pending");
+  done();
+})();'''
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class Worn(ConsolePage, unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.begin('console_robot.py', 'PICK', '0.05', '0', '1')
+
+    def counted(self, questions):
+        """Open so many; returns how many nodes and listeners the browser holds afterwards."""
+        driver = self.browser.driver
+        driver.execute_async_script(OPEN_AND_LEAVE, questions)
+        for _ in range(2):
+            driver.execute_cdp_cmd('HeapProfiler.collectGarbage', {})
+        metrics = {
+            metric['name']: metric['value']
+            for metric in driver.execute_cdp_cmd('Performance.getMetrics', {})['metrics']
+        }
+        return metrics['Nodes'], metrics['JSEventListeners']
+
+    def test_a_question_that_was_left_leaves_nothing_behind(self):
+        driver = self.browser.driver
+        driver.set_script_timeout(240)
+        driver.execute_cdp_cmd('Performance.enable', {})
+        self.browser.find('.question-row.pending')
+        before, after = self.counted(BEGINNING), self.counted(QUESTIONS)
+        nodes, listeners = ((late - early) / QUESTIONS for early, late in zip(before, after))
+        self.assertLess(nodes, MOST_NODES, (before, after))
+        self.assertLess(listeners, MOST_LISTENERS, (before, after))
+        self.assertEqual(self.browser.errors(), [])
+
+
+if __name__ == '__main__':
+    rospy.init_node('console_worn')
+    rostest.rosrun('smach_oracle', 'console_worn', Worn)
