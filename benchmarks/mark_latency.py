@@ -20,12 +20,12 @@ import numpy as np
 from std_msgs.msg import Header
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'unit' / 'support'))
-from ray_camera import camera_at, see  # noqa: E402
+from ray_camera import camera_at, see
 
-from smach_oracle.expert.console.answering.interface_commands import marked_view  # noqa: E402
-from smach_oracle.geometry.camera_image import CameraImage  # noqa: E402
-from smach_oracle.interfaces.perception.marked_scene import MarkedSceneError, scene_of  # noqa: E402
-from smach_oracle.interfaces.perception.marking import ObjectInImage, output_messages  # noqa: E402
+from smach_oracle.expert.console.answering.interface_commands import marked_view
+from smach_oracle.geometry.camera_image import CameraImage
+from smach_oracle.interfaces.perception.marked_scene import MarkedSceneError, scene_of
+from smach_oracle.interfaces.perception.marking import ObjectInImage, output_messages
 from smach_oracle.interfaces.perception.segmentation import (
     ITERATIONS,
     WORK_AREA,
@@ -34,9 +34,9 @@ from smach_oracle.interfaces.perception.segmentation import (
     rectangle,
     segment,
 )
-from smach_oracle.ros.images import mask_image  # noqa: E402
-from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
-from smach_oracle.srv import SegmentObjectResponse  # noqa: E402
+from smach_oracle.ros.images import mask_image
+from smach_oracle.simulation.scenes.scene import Body
+from smach_oracle.srv import SegmentObjectResponse
 
 LIMIT = 2.5  # runs of GrabCut alone
 FRAMES, REPEATS = 6, 4

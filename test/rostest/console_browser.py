@@ -14,10 +14,10 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage
+from waiting import wait_for
 
-from smach_oracle.msg import ConsoleCommand, OracleEvent  # noqa: E402
+from smach_oracle.msg import ConsoleCommand, OracleEvent
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'

@@ -21,19 +21,19 @@ from std_msgs.msg import Header
 from control_msgs.msg import PointHeadAction, PointHeadGoal
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import Node  # noqa: E402
-from thin_line import ThinLine  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from console_page import Node
+from thin_line import ThinLine
+from waiting import wait_for
 
-from smach_oracle.experiment.launching import free_port  # noqa: E402
-from smach_oracle.geometry.transforms import from_quaternion  # noqa: E402
-from smach_oracle.msg import CollisionBoxes, ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+from smach_oracle.experiment.launching import free_port
+from smach_oracle.geometry.transforms import from_quaternion
+from smach_oracle.msg import CollisionBoxes, ConsoleCommand, TeleopCommand, TeleopState
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
-    from selenium.webdriver.common.keys import Keys  # noqa: E402
+    from browser import Browser
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
 HERE = os.path.dirname(os.path.abspath(__file__))
 BASE, CAMERA = 'base_footprint', 'wide_stereo_optical_frame'
 TOOLS = {'left': 'l_gripper_tool_frame', 'right': 'r_gripper_tool_frame'}

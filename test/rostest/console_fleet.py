@@ -16,16 +16,16 @@ import rostest
 from roslib.packages import find_node
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from waiting import wait_for  # noqa: E402
+from waiting import wait_for
 
-from smach_oracle.experiment.launching import free_port  # noqa: E402
-from smach_oracle.msg import ConsoleCommand, ExpertDecision, OpenQueries  # noqa: E402
-from smach_oracle.srv import AnswerQuery  # noqa: E402
+from smach_oracle.experiment.launching import free_port
+from smach_oracle.msg import ConsoleCommand, ExpertDecision, OpenQueries
+from smach_oracle.srv import AnswerQuery
 
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+    from browser import Browser
+    from selenium.webdriver.common.action_chains import ActionChains
 ROBOTS = 10
 LEASE_S = 15.0
 ROW = '.question-row[data-key^="/robot_{}/"]'

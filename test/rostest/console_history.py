@@ -13,19 +13,19 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_browser import YOURS  # noqa: E402
-from console_page import WITH_BROWSER, ConsolePage, Node  # noqa: E402
-from published_camera import PublishedCamera  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from console_browser import YOURS
+from console_page import WITH_BROWSER, ConsolePage, Node
+from published_camera import PublishedCamera
+from waiting import wait_for
 
-from smach_oracle.experiment.launching import free_port  # noqa: E402
-from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, OpenQueries  # noqa: E402
-from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
+from smach_oracle.experiment.launching import free_port
+from smach_oracle.msg import ExpertQueryGoal, FailureFrames, InterfaceOutput, OpenQueries
+from smach_oracle.simulation.scenes.scene import Body
 
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
-    from selenium.webdriver.common.keys import Keys  # noqa: E402
+    from browser import Browser
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
 TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.9, 0.1, 0.1))
 CAMERA = '/head_camera/rgb/image_raw'
 QUESTION = '.question-row[data-key^="/alpha/"]'

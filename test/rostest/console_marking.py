@@ -12,18 +12,18 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
-from published_camera import OPTICAL, PublishedCamera  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage
+from published_camera import OPTICAL, PublishedCamera
+from waiting import wait_for
 
-from smach_oracle.msg import ConsoleCommand  # noqa: E402
-from smach_oracle.ros.images import cloud_message  # noqa: E402
-from smach_oracle.simulation.node.state_publisher import publish_description  # noqa: E402
-from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
+from smach_oracle.msg import ConsoleCommand
+from smach_oracle.ros.images import cloud_message
+from smach_oracle.simulation.node.state_publisher import publish_description
+from smach_oracle.simulation.scenes.scene import Body
 
 if WITH_BROWSER:
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
-    from selenium.webdriver.common.keys import Keys  # noqa: E402
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
 TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22))
 CAN = Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.80, 0.10, 0.78), colour=(0.1, 0.3, 0.9))
 BOX = Body('box', 'box', (0.05, 0.05, 0.14), (0.68, -0.15, 0.79), colour=(0.2, 0.8, 0.2))

@@ -11,11 +11,11 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
-from waiting import stays, wait_for  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage
+from waiting import stays, wait_for
 
-from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent  # noqa: E402
-from smach_oracle.srv import ClaimQuery, ClaimQueryRequest  # noqa: E402
+from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent
+from smach_oracle.srv import ClaimQuery, ClaimQueryRequest
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
 OWN_SERVER = '/a_server_of_its_own'

@@ -12,16 +12,16 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
-from machine_lag import MachineLag  # noqa: E402
-from teleoperation_fixtures import FakeArm  # noqa: E402
-from waiting import assert_soon, stays, wait_for  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage
+from machine_lag import MachineLag
+from teleoperation_fixtures import FakeArm
+from waiting import assert_soon, stays, wait_for
 
-from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState  # noqa: E402
+from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState
 
 if WITH_BROWSER:
-    from browser import Browser  # noqa: E402
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+    from browser import Browser
+    from selenium.webdriver.common.action_chains import ActionChains
 HERE = os.path.dirname(os.path.abspath(__file__))
 STOPS_WITHIN_S = 0.1
 QUEUED = 2  # commands that the console's publisher may hold

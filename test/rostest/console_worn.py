@@ -8,7 +8,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage  # noqa: E402
+from console_page import WITH_BROWSER, ConsolePage
 
 BEGINNING, QUESTIONS = 10, 200
 MOST_NODES, MOST_LISTENERS = 40, 2  # a question; it has some 400 and 60

@@ -11,14 +11,14 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, Process, make_question  # noqa: E402
-from waiting import stays, wait_for  # noqa: E402
+from expert_fixtures import Asked, Process, make_question
+from waiting import stays, wait_for
 
-from smach_oracle.expert import followed_server  # noqa: E402
-from smach_oracle.expert.front_end import FrontEnd, ServerGoneError, wait_for_question  # noqa: E402
-from smach_oracle.msg import ExpertDecision, OpenQuery  # noqa: E402
-from smach_oracle.oracle.asking.question import AnswerKind, StateChoice  # noqa: E402
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
+from smach_oracle.expert import followed_server
+from smach_oracle.expert.front_end import FrontEnd, ServerGoneError, wait_for_question
+from smach_oracle.msg import ExpertDecision, OpenQuery
+from smach_oracle.oracle.asking.question import AnswerKind, StateChoice
+from smach_oracle.ros.expert.client import ExpertQueryClient
 
 SHARED = '/shared/expert_query'
 EXIT_S = 6.0  # in which a node ends after SIGINT; roslaunch would kill it after 15

@@ -13,10 +13,10 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, make_question  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from expert_fixtures import Asked, make_question
+from waiting import wait_for
 
-from smach_oracle.expert.front_end import FrontEnd  # noqa: E402
+from smach_oracle.expert.front_end import FrontEnd
 from smach_oracle.msg import (
     ExpertDecision,
     OpenQuery,
@@ -25,11 +25,11 @@ from smach_oracle.msg import (
     SharedAutonomyResult,
     UserdataItem,
 )
-from smach_oracle.oracle.asking.answer_rules import check_answer, choices_of  # noqa: E402
-from smach_oracle.oracle.asking.question import AnswerKind, InterfaceOffer  # noqa: E402
-from smach_oracle.oracle.errors import AnswerError, InterfaceError  # noqa: E402
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
-from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
+from smach_oracle.oracle.asking.answer_rules import check_answer, choices_of
+from smach_oracle.oracle.asking.question import AnswerKind, InterfaceOffer
+from smach_oracle.oracle.errors import AnswerError, InterfaceError
+from smach_oracle.ros.expert.client import ExpertQueryClient
+from smach_oracle.ros.userdata_codec import decode_all, encode_all
 
 SERVER = '/expert_interface/expert_query'
 

@@ -12,10 +12,10 @@ import xmlrpc.client
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Process  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from expert_fixtures import Process
+from waiting import wait_for
 
-from smach_oracle.experiment.launching import free_port  # noqa: E402
+from smach_oracle.experiment.launching import free_port
 
 SHARED = '/shared/expert_query'
 RESTART_S = 8.0  # within which a master is back, also on a machine busy with other tests

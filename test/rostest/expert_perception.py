@@ -15,13 +15,13 @@ from geometry_msgs.msg import Point32, Polygon, PoseStamped, Vector3
 from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from published_camera import PublishedCamera  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from published_camera import PublishedCamera
+from waiting import wait_for
 
-from smach_oracle.msg import SegmentStroke, SharedAutonomyAction, SharedAutonomyGoal  # noqa: E402
-from smach_oracle.ros.images import colour_of  # noqa: E402
-from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
-from smach_oracle.simulation.scenes.scene import Body  # noqa: E402
+from smach_oracle.msg import SegmentStroke, SharedAutonomyAction, SharedAutonomyGoal
+from smach_oracle.ros.images import colour_of
+from smach_oracle.ros.userdata_codec import decode_all, encode_all
+from smach_oracle.simulation.scenes.scene import Body
 from smach_oracle.srv import (
     FinishInterface,
     GiveUpInterface,

@@ -12,15 +12,15 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, make_question  # noqa: E402
-from waiting import stays, wait_for  # noqa: E402
+from expert_fixtures import Asked, make_question
+from waiting import stays, wait_for
 
-from smach_oracle.expert.front_end import FrontEnd, wait_for_question  # noqa: E402
-from smach_oracle.msg import ExpertDecision, UserdataItem  # noqa: E402
-from smach_oracle.oracle.asking.question import AnswerKind  # noqa: E402
-from smach_oracle.oracle.errors import AnswerError  # noqa: E402
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
-from smach_oracle.ros.userdata_codec import encode  # noqa: E402
+from smach_oracle.expert.front_end import FrontEnd, wait_for_question
+from smach_oracle.msg import ExpertDecision, UserdataItem
+from smach_oracle.oracle.asking.question import AnswerKind
+from smach_oracle.oracle.errors import AnswerError
+from smach_oracle.ros.expert.client import ExpertQueryClient
+from smach_oracle.ros.userdata_codec import encode
 
 SERVER = '/expert_protocol/expert_query'
 

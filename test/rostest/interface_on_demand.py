@@ -17,15 +17,15 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import make_question  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from expert_fixtures import make_question
+from waiting import wait_for
 
-from smach_oracle.msg import InterfaceOutput  # noqa: E402
-from smach_oracle.oracle.errors import InterfaceError  # noqa: E402
-from smach_oracle.oracle.settings.settings import Settings  # noqa: E402
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
-from smach_oracle.ros.service_calls import ServerGoneError, call_service  # noqa: E402
-from smach_oracle.srv import FinishInterface, FinishInterfaceRequest  # noqa: E402
+from smach_oracle.msg import InterfaceOutput
+from smach_oracle.oracle.errors import InterfaceError
+from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.ros.expert.client import ExpertQueryClient
+from smach_oracle.ros.service_calls import ServerGoneError, call_service
+from smach_oracle.srv import FinishInterface, FinishInterfaceRequest
 
 PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'shared_autonomy.md')
 LAUNCH = '<launch><node pkg="my_robot" type="by_hand.py" name="by_hand" output="screen"/></launch>'

@@ -11,9 +11,9 @@ import rostest
 from sensor_msgs.msg import Joy
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from machine_lag import MachineLag  # noqa: E402
-from teleoperation_fixtures import FakeArm, Person  # noqa: E402
-from waiting import assert_soon, stays, wait_for  # noqa: E402
+from machine_lag import MachineLag
+from teleoperation_fixtures import FakeArm, Person
+from waiting import assert_soon, stays, wait_for
 
 STOPS_WITHIN_S = 0.1
 SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it

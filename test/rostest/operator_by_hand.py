@@ -17,11 +17,11 @@ from std_msgs.msg import Header
 from control_msgs.msg import PointHeadAction, PointHeadGoal
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, make_question  # noqa: E402
+from expert_fixtures import Asked, make_question
 
-from smach_oracle.oracle.asking.question import AnswerKind, InterfaceOffer, OutcomeChoice  # noqa: E402
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
-from smach_oracle.srv import Judge, ResetWorld, Reveal  # noqa: E402
+from smach_oracle.oracle.asking.question import AnswerKind, InterfaceOffer, OutcomeChoice
+from smach_oracle.ros.expert.client import ExpertQueryClient
+from smach_oracle.srv import Judge, ResetWorld, Reveal
 
 OFFERS = (InterfaceOffer('perception', '/perception_interface'),
           InterfaceOffer('manipulation', '/manipulation_interface'))

@@ -12,13 +12,13 @@ import rospy
 import smach
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, make_question  # noqa: E402
+from expert_fixtures import Asked, make_question
 
 from smach_oracle.oracle.asking.question import AnswerKind, OutcomeChoice, StateChoice
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
-from smach_oracle.ros.expert.client import ExpertQueryClient  # noqa: E402
-from smach_oracle.srv import Judge, ResetWorld, Reveal  # noqa: E402
-from smach_oracle.tasks import drink_retrieval  # noqa: E402
+from smach_oracle.ros.expert.client import ExpertQueryClient
+from smach_oracle.srv import Judge, ResetWorld, Reveal
+from smach_oracle.tasks import drink_retrieval
 
 OFFERS = (InterfaceOffer('perception', '/perception_interface'),
           InterfaceOffer('manipulation', '/manipulation_interface'))

@@ -14,11 +14,11 @@ from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'unit',
                                 'support'))
-from ray_camera import INTRINSICS, camera_at, see  # noqa: E402
+from ray_camera import INTRINSICS, camera_at, see
 
-from smach_oracle.geometry.transforms import quaternion  # noqa: E402
-from smach_oracle.ros.images import colour_image, depth_image  # noqa: E402
-from smach_oracle.srv import Snapshot, SnapshotResponse  # noqa: E402
+from smach_oracle.geometry.transforms import quaternion
+from smach_oracle.ros.images import colour_image, depth_image
+from smach_oracle.srv import Snapshot, SnapshotResponse
 
 POSE = camera_at((0.05, 0.03, 1.38), (0.75, 0.0, 0.75))
 OPTICAL = 'camera_optical_frame'

@@ -14,11 +14,11 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, driver_of_its_own, result_of  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, driver_of_its_own, result_of
+from waiting import wait_for
 
-from smach_oracle.msg import CollisionBoxes  # noqa: E402
-from smach_oracle.ros.userdata_codec import decode_all, encode_all  # noqa: E402
+from smach_oracle.msg import CollisionBoxes
+from smach_oracle.ros.userdata_codec import decode_all, encode_all
 
 SERVER = 'manipulation_interface'
 STOPS_WITHIN_S = 0.1

@@ -11,11 +11,11 @@ from waiting import wait_for
 
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
-import checks  # noqa: E402
-import upstream  # noqa: E402
-from checks import Bench, benchmark_checks, rostest_checks, upstream_checks  # noqa: E402
-from processes import Runner, kill_marked  # noqa: E402
-from report import (  # noqa: E402
+import checks
+import upstream
+from checks import Bench, benchmark_checks, rostest_checks, upstream_checks
+from processes import Runner, kill_marked
+from report import (
     Outcome,
     on_upstream,
     read_junit,

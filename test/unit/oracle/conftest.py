@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import smach  # noqa: E402
+import smach
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,8 @@ from waiting import stays, wait_for
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
-from smach_ros import action_link  # noqa: E402
-from smach_ros.action_link import ActionLink  # noqa: E402
+from smach_ros import action_link
+from smach_ros.action_link import ActionLink
 
 
 class FakeTopic:

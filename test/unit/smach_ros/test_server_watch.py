@@ -3,7 +3,7 @@ import pytest
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
-from smach_ros import node_probe, server_watch  # noqa: E402
+from smach_ros import node_probe, server_watch
 
 
 class FakeClock(object):

@@ -5,7 +5,7 @@ import smach
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros.user_callback')
-from smach_ros.user_callback import UserCallback, checked_slots  # noqa: E402
+from smach_ros.user_callback import UserCallback, checked_slots
 
 
 def test_callback_sees_the_states_keys_or_its_own():

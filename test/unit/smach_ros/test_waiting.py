@@ -8,7 +8,7 @@ import smach
 
 rospy = pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
-from smach_ros.waiting import Aside, Signal, seconds  # noqa: E402
+from smach_ros.waiting import Aside, Signal, seconds
 
 
 @pytest.mark.parametrize('given, meant', [(None, None), (2, 2.0), (0.5, 0.5),

@@ -6,7 +6,7 @@ import pytest
 import smach
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import ContainerTree  # noqa: E402
+from smach_oracle.ros.introspection.container_watch import ContainerTree
 
 
 class Step(smach.State):

@@ -5,8 +5,8 @@ import smach
 from smach_oracle.oracle import OracleContainer
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import ContainerWatch  # noqa: E402
-from smach_oracle.ros.introspection.introspection_server import set_initial_states  # noqa: E402
+from smach_oracle.ros.introspection.container_watch import ContainerWatch
+from smach_oracle.ros.introspection.introspection_server import set_initial_states
 
 
 def wrapped_machine():

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection import plain_pickle  # noqa: E402
+from smach_oracle.ros.introspection import plain_pickle
 
 PLAIN = {
     'number': 1, 'big': 2**100, 'real': 1.5, 'text': 'Käse', 'raw': b'\x00\xff', 'none': None,

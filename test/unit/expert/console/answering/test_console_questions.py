@@ -8,7 +8,7 @@ from geometry_msgs.msg import PointStamped
 
 from smach_oracle.expert.console.answering.question_commands import OutputError, items
 from smach_oracle.expert.console.answering.question_sections import QuestionSections
-from smach_oracle.expert.console.answering.question_view import question_view  # noqa: E402
+from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.commands.checks import TypedOutput
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
 from smach_oracle.expert.console.trials.trial_log import TrialLog

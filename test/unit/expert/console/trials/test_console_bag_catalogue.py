@@ -10,19 +10,19 @@ import time
 
 import console_case
 import pytest
-from fake_trials import FakeMachine, play  # noqa: E402
-from waiting import wait_for  # noqa: E402
+from fake_trials import FakeMachine, play
+from waiting import wait_for
 
-from smach_oracle.analysis.trials import load_trials  # noqa: E402
-from smach_oracle.analysis.variants import count_variants  # noqa: E402
-from smach_oracle.expert.console.graphs.layout_worker import LayoutWorker  # noqa: E402
-from smach_oracle.expert.console.sensors.question_images import ImageStore  # noqa: E402
-from smach_oracle.expert.console.trials import bag_catalogue, recorded_trials  # noqa: E402
-from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue, RecordedTrialError  # noqa: E402
-from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials  # noqa: E402
-from smach_oracle.expert.console.web.sections import PageSections  # noqa: E402
-from smach_oracle.oracle.records.events import EventKind  # noqa: E402
-from smach_oracle.ros.recorder import TrialRecorder  # noqa: E402
+from smach_oracle.analysis.trials import load_trials
+from smach_oracle.analysis.variants import count_variants
+from smach_oracle.expert.console.graphs.layout_worker import LayoutWorker
+from smach_oracle.expert.console.sensors.question_images import ImageStore
+from smach_oracle.expert.console.trials import bag_catalogue, recorded_trials
+from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue, RecordedTrialError
+from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials
+from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.ros.recorder import TrialRecorder
 
 TRIALS = 12
 
