@@ -105,7 +105,7 @@ class Step:
             if why_not:
                 return HeldBack(why_not)
         node.emit(EventKind.STATE_START, state=record.label)
-        blocked = node.tree.workers.blocked(state)
+        blocked = node.tree.workers.blocked(state) if node.abandoned else ''
         entered_by_oracle = record.entered_by_oracle
         if entered_by_oracle:
             record.forget_entry()
@@ -122,8 +122,10 @@ class Step:
                 outcome = state.execute(userdata)
             return outcome
         finally:
-            if not (isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
-                record.took(time.monotonic() - begun_s)
+            took_s = time.monotonic() - begun_s
+            if took_s > (record.longest_s or 0.0) and not (
+                    isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
+                record.longest_s = took_s
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""

@@ -121,14 +121,11 @@ class EventSource:
             event = Event(kind, self.trial_id, self._seq, time.time(), path, **fields)
             self._seq += 1
             for observer in tuple(self.observers):
-                self._tell(observer, event)
-
-    def _tell(self, observer: Observer, event: Event) -> None:
-        try:
-            observer(event)
-        except Exception as err:  # an observer's fault must not stop the robot
-            self._log_error('Observer {!r} failed on event {} ({}): {!r}'.format(
-                observer, event.seq, event.kind.name, err))
+                try:
+                    observer(event)
+                except Exception as err:  # an observer's fault must not stop the robot
+                    self._log_error('Observer {!r} failed on event {} ({}): {!r}'.format(
+                        observer, event.seq, event.kind.name, err))
 
     def __getstate__(self) -> Dict[str, Any]:
         """Without the lock and the observers: neither can travel with a pickled machine."""

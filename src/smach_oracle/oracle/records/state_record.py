@@ -121,11 +121,6 @@ class StateRecord:
         self.entered_by_oracle = False
         self.special = self._is_special
 
-    def took(self, seconds: float) -> None:
-        """Note how long a visit has taken that ended by itself."""
-        if self.longest_s is None or seconds > self.longest_s:
-            self.longest_s = seconds
-
     def _up_to_date(self) -> Estimator:
         """The estimator, told of the successes by way of edges; to be called with the lock held."""
         by_edges = self._by_edges()
