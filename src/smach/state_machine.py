@@ -93,8 +93,7 @@ class StateMachine(Container):
         self._states[label] = state
         self._transitions[label] = transitions
         self._remappings[label] = {} if remapping is None else remapping
-        if constants is not None:
-            self._constants[label] = constants
+        self._constants[label] = {} if constants is None else constants
         if self._connector_outcomes and self._last_added_label is not None:
             for outcome in self._connector_outcomes:
                 self._transitions[self._last_added_label][outcome] = label

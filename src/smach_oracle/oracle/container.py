@@ -18,7 +18,7 @@ from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone
-from .machine.userdata_view import StateView, constants_of, write_constants
+from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
@@ -264,8 +264,9 @@ class OracleContainer(smach.StateMachine):
     def _update_once(self) -> Optional[str]:
         """Execute the current state and make the transition, and go on with the next state.
 
-        It goes on while each is a plain success, and nothing makes the engine's loop stop or pause.
-        It returns None to let the engine go on, else the container's outcome.
+        It goes on while each is a plain success, the engine's own loop has called it, and nothing
+        makes that stop or pause. It returns None to let the loop go on, else the container's
+        outcome.
 
         Every transition takes this way, so it is kept flat: a plain success costs what is on this
         page.
@@ -291,17 +292,21 @@ class OracleContainer(smach.StateMachine):
                     or view.input_keys is not state._input_keys
                     or view.output_keys is not state._output_keys):
                 view = record.view = StateView(self, label, state)
-            record.snapshot = view.data.copy()
+            record.snapshot = userdata._data.copy()
             observed = node.events.observers
             transitions: Transitions = self._current_transitions  # type: ignore[assignment]
             outcome: Any  # a user's state may return anything
             error = None
+            try:
+                constants = self._constants[label]
+            except KeyError:
+                constants = None
             if engine.lock_is_held:
                 lock.release()
             try:
                 try:
-                    if self._constants:
-                        write_constants(userdata, constants_of(self, label))
+                    if constants:
+                        write_constants(userdata, constants)
                     if observed or record.special or node.abandoned:
                         outcome = Step(node, record).execute(state, view.remapper)
                     else:
@@ -335,7 +340,8 @@ class OracleContainer(smach.StateMachine):
                 smach.loginfo(edge.message)
                 if self._transition_cbs or engine.tells_transitions:
                     self.call_transition_cbs()
-                if not self._is_running or smach.is_shutdown() or self._pause_requested:
+                if (not engine.has_own_loop or not self._is_running or smach.is_shutdown()
+                        or self._pause_requested):
                     return None
             finally:
                 if not engine.lock_is_held:

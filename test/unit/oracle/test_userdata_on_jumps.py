@@ -295,3 +295,26 @@ def test_replaced_dictionaries_and_shared_userdata_are_respected(shared):
     machine = chain_of(Scripted(swap), Scripted(writes('x', 'half done', 'aborted'), 'ok', **IO))
     assert Watched(machine).run() == 'done'
     assert other.x == 'other'
+
+
+def test_a_dictionary_replaced_before_a_later_visit_is_restored():
+    seen = []
+
+    def replace(state, ud):
+        machine.userdata._data = {'x': 'new {}'.format(len(seen))}
+        return 'again'
+
+    def work(state, ud):
+        seen.append(ud.x)
+        if len(seen) == 2:
+            ud.x = 'half done'
+            return 'aborted'
+        return 'done' if len(seen) == 3 else 'again'
+    machine = smach.StateMachine(['done', 'aborted'])
+    machine.userdata.x = 'old'
+    with machine:
+        smach.StateMachine.add('A', Scripted(replace, replace, outcomes=['again']), {'again': 'B'})
+        failing = Scripted(work, work, work, outcomes=['again', 'done', 'aborted'], **IO)
+        smach.StateMachine.add('B', failing, {'again': 'A'})
+    assert Watched(machine).run() == 'done'
+    assert seen == ['new 0', 'new 1', 'new 1']

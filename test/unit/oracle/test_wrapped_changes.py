@@ -186,3 +186,28 @@ def test_new_settings_that_do_not_fit_leave_the_old_ones():
         OracleContainer.wrap(machine, settings={'states': {'GHOST': {'memory': 3}}})
     assert machine.settings.defaults.memory == 7
     assert machine.execute() == 'done'
+
+
+class OwnLoop(smach.StateMachine):
+    """Takes five steps at most."""
+
+    def execute(self, ud=None):
+        with self._state_transitioning_lock:
+            self._is_running = True
+            self._set_current_state(self._initial_state_label)
+            for _ in range(5):
+                outcome = self._update_once()
+                if outcome is not None:
+                    break
+            self._is_running = False
+        return outcome or 'paused'
+
+
+@pytest.mark.parametrize('wrap', [lambda machine: machine, OracleContainer.wrap])
+def test_a_machine_with_a_loop_of_its_own_takes_one_step_at_a_time(wrap):
+    state = Scripted(*['again'] * 50, outcomes=['again'])
+    machine = OwnLoop(outcomes=['paused'])
+    with machine:
+        smach.StateMachine.add('A', state, {'again': 'A'})
+    assert wrap(machine).execute() == 'paused'
+    assert state.runs == 5

@@ -1,4 +1,6 @@
 """What the engine is like that executes a machine."""
+import functools
+
 import smach
 
 from .protocols import Machine
@@ -9,16 +11,19 @@ class EngineProbe:
 
     `lock_is_held`: whether the engine holds the machine's lock around a step. `attentive`: whether
     a step begins with a closer look at preempt requests. `tells_transitions`: whether the machine's
-    class wants every transition told. `stepped`: whether this execution has come to a state.
+    class wants every transition told. `has_own_loop`: whether the engine itself calls for the next
+    step, and no class of a user's. `stepped`: whether this execution has come to a state.
     """
 
-    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'tells_transitions')
+    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'tells_transitions',
+                 'has_own_loop')
 
     def __init__(self) -> None:
         self.stepped = False
         self.lock_is_held = False
         self.attentive = True
         self.tells_transitions = True
+        self.has_own_loop = False
 
     def begin_execution(self) -> None:
         """Forget what was seen: the next step looks again."""
@@ -38,3 +43,17 @@ class EngineProbe:
         cls = type(machine)
         self.attentive = cls.preempt_requested is not smach.State.preempt_requested
         self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
+        self.has_own_loop = _has_own_loop(machine)
+
+
+def _has_own_loop(machine: Machine) -> bool:
+    """Whether nobody but SMACH and this package has a say in how a machine steps."""
+    step = getattr(machine, '_update_once', None)
+    return (getattr(step, '__func__', None) is getattr(type(machine), '_update_once', None)
+            and _steps_as_drawn(type(machine)))
+
+
+@functools.lru_cache(maxsize=256)
+def _steps_as_drawn(cls: type) -> bool:
+    return all(each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+               for each in cls.__mro__ if 'execute' in vars(each) or '_update_once' in vars(each))

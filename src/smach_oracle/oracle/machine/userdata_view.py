@@ -60,12 +60,11 @@ class StateView:
     each visit.
     """
 
-    __slots__ = ('remapper', 'state', 'userdata', 'data', 'remapping', 'input_keys', 'output_keys')
+    __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
 
     def __init__(self, machine: Machine, label: str, state: smach.State) -> None:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
-        self.data = machine.userdata._data
         self.state = None  # what no state is: made for one visit
         if _KEEPS_KEY_SETS and _has_plain_keys(state):
             self.state = state

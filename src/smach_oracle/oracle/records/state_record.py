@@ -26,7 +26,6 @@ class KeptView(Protocol):
     """
 
     remapper: Any  # a smach.Remapper, which this module does not know
-    data: Dict[str, Any]  # what the container's userdata holds
 
     @property
     def state(self) -> object:
@@ -53,7 +52,6 @@ class _NoView:
     """Before the first visit: a view of no state."""
 
     state = userdata = remapping = input_keys = output_keys = remapper = None
-    data: Dict[str, Any] = {}
 
 
 _NO_VIEW = _NoView()
