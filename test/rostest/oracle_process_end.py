@@ -55,6 +55,11 @@ oracle_of(sm).events.observers.append(lambda event: time.sleep(0.5))
 RUN = '''
 print('OUTCOME', sm.execute(), flush=True)
 '''
+# rospy has closed the topics by then, and rospy.is_shutdown does not say so yet
+LATE_TRIAL = RUN + '''
+rospy.core.add_preshutdown_hook(lambda reason: print('LATE', sm.execute(), flush=True))
+rospy.signal_shutdown('the end')
+'''
 # kind of end: exit code, outcome; the exception surfaces as InvalidUserCodeError
 ENDS = {'succeeds': (0, 'succeeded'), 'fails': (0, 'aborted'), 'raises': (1, ''),
         'preempted': (0, 'preempted'), 'signalled': (0, 'preempted')}
@@ -130,6 +135,14 @@ class ProcessEndTest(unittest.TestCase):
 
     def test_the_end_is_in_the_bag_though_an_observer_is_slow(self) -> None:
         self.check('signalled', self.library('signalled', SLOW_OBSERVER))
+
+    def test_a_trial_on_topics_that_rospy_has_closed_is_no_error(self) -> None:
+        program = Process([sys.executable, script(self, TASK + LIBRARY + LATE_TRIAL), 'succeeds'])
+        self.addCleanup(program.stop)
+        self.assertEqual(program.wait(EXIT_LIMIT_S), 0, program.output())
+        self.assertIn('LATE succeeded', program.output())
+        for word in ('closed topic', 'ERROR', 'Traceback'):
+            self.assertNotIn(word, program.output())
 
 
 if __name__ == '__main__':

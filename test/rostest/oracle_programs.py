@@ -37,9 +37,19 @@ HELPLESS_WAY = {'fails': ORACLE_RUN, 'raises': LIBRARY}
 
 
 def smooth(said: List[str]) -> List[str]:
-    """What a program has said, without its failure and the oracle's way back."""
-    lines = [line for before, line in zip([''] + said, said)
-             if not re.search('does not succeed| ORACLE$', line) and not before.endswith(' ORACLE')]
+    """What a program has said, without its failure and the oracle's way back.
+
+    The way back is the next transition of the same machine: others may speak in between.
+    """
+    lines, at_oracle = [], set()
+    for line in said:
+        machine = re.split(' (?:is|ends) in ', line)[0]
+        if line.endswith(' ORACLE'):
+            at_oracle.add(machine)
+        elif machine in at_oracle:
+            at_oracle.remove(machine)
+        elif 'does not succeed' not in line:
+            lines.append(line)
     return list(dict.fromkeys(lines))
 
 

@@ -1,13 +1,17 @@
-"""Connections that are there, and those of which the other side surely knows."""
+"""Connections that are there, of which the other side surely knows, or that rospy is closing."""
 import socket
 import time
-from typing import List, Sequence, Tuple
+from contextlib import contextmanager
+from typing import Iterator, List, Sequence, Tuple
 
 import rospy
 from rospy.impl.tcpros_base import TCPROSTransport as Connection
 
 GRACE_S = 0.1
 """A publisher greets a new subscriber before it lists it among those that it sends to (rospy)."""
+
+TOPIC_ERRORS = (AttributeError, TypeError, rospy.ROSException)
+"""What rospy raises where a topic is closed, or is being closed."""
 
 
 def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
@@ -17,6 +21,20 @@ def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
     return [
         each for each in subscriber.impl.connections if getattr(each, 'socket', None) is not None
     ]
+
+
+@contextmanager
+def quiet_at_shutdown() -> Iterator[None]:
+    """Within it one publishes; nothing is raised where the node goes down meanwhile.
+
+    rospy closes the topics before `rospy.is_shutdown` says so. Whoever publishes in between meets a
+    closed topic, or one that is being taken apart.
+    """
+    try:
+        yield
+    except TOPIC_ERRORS:
+        if not rospy.core.is_shutdown_requested():
+            raise
 
 
 class ConnectionGrace:

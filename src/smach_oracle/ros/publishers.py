@@ -16,6 +16,7 @@ from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
+from .connections import TOPIC_ERRORS, quiet_at_shutdown
 from .event_messages import rates_to_msg, to_msg
 
 QUEUE_SIZE = 1000  # events waiting for one slow subscriber; about 0.3 MB
@@ -72,8 +73,7 @@ class EventPublisher:
         try:
             if not rospy.is_shutdown() and self._publisher.get_num_connections():
                 self._publisher.publish(to_msg(event))
-        except (AttributeError, TypeError, rospy.ROSException):
-            # rospy takes a topic apart while it shuts down
+        except TOPIC_ERRORS:  # as quiet_at_shutdown, but cheaper for a machine's every event
             if not rospy.core.is_shutdown_requested():
                 raise
 
@@ -125,7 +125,8 @@ class RatesPublisher:
         with self._publishing:
             message = rates_of(machine)
             if not rospy.is_shutdown() and not self._closed:
-                self._publisher.publish(message)
+                with quiet_at_shutdown():
+                    self._publisher.publish(message)
 
     def forget(self, machine: WatchedMachine) -> None:
         """Publish nothing of a machine any more that has ended and comes out of its oracle."""

@@ -16,6 +16,7 @@ import rospy
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 from smach_oracle.oracle.settings.paths import path_of
 
+from .connections import quiet_at_shutdown
 from .recording.recorder_queue import (
     EndItem,
     EventItem,
@@ -255,7 +256,8 @@ class StatusPublisher:
     def __call__(self, status: RecordingStatus) -> None:
         message = status_message(status)
         message.header.stamp.secs, message.header.stamp.nsecs = now().ros or (0, 0)
-        self._publisher.publish(message)
+        with quiet_at_shutdown():
+            self._publisher.publish(message)
 
 
 def has_node() -> bool:

@@ -18,8 +18,12 @@ def ending():
 
 
 def say(*words):
-    """One line, whole also where two threads speak."""
-    sys.stdout.write(' '.join(str(word) for word in words) + '\n')
+    """One line, whole also where two threads speak.
+
+    It begins a line of its own: the log of upstream's SMACH prints a text and its end of line
+    apart, and another thread may speak in between, also where there is no oracle.
+    """
+    sys.stdout.write('\n' + ' '.join(str(word) for word in words) + '\n')
     sys.stdout.flush()
 
 

@@ -15,6 +15,8 @@ from smach_oracle.oracle.asking.question import Question
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
 
+from ..connections import quiet_at_shutdown
+
 TOPIC = '~failure_frames'
 PARAMETER = '~failure_cameras'
 MOST_CAMERAS = 4
@@ -95,7 +97,8 @@ class FailureCameras:
                 rospy.logwarn('The image of %s at the failure cannot be published: %s', topic, err)
         message.header.stamp = rospy.get_rostime()
         if message.images and not rospy.is_shutdown():
-            self._publisher.publish(message)
+            with quiet_at_shutdown():
+                self._publisher.publish(message)
 
 
 def compressed(image: CameraMessage) -> CompressedImage:

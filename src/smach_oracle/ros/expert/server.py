@@ -32,7 +32,7 @@ from smach_oracle.srv import (
 )
 
 from ..command_line import parameters_only
-from ..connections import Connection
+from ..connections import Connection, quiet_at_shutdown
 from ..master_watch import start_master_watch
 from ..parameters import name_of, number_of
 from .open_questions import (
@@ -43,6 +43,7 @@ from .open_questions import (
     QuestionRefusedError,
     SettledQuestion,
 )
+from .quiet_action_server import QuietActionServer
 
 SERVER_NAME = '~expert_query'
 ASKER_GONE_S = 3.0
@@ -96,8 +97,8 @@ class ExpertQueryServer:
         self._stopped = False
         self._open_publisher = rospy.Publisher(self.name + '/open', OpenQueries, latch=True,
                                                queue_size=2)
-        self._action = actionlib.ActionServer(self.name, ExpertQueryAction, self._on_goal,
-                                              self._on_cancel, auto_start=False)
+        self._action = QuietActionServer(self.name, ExpertQueryAction, self._on_goal,
+                                         self._on_cancel, auto_start=False)
         self._lock = self._action.lock
         self._services = [rospy.Service(self.name + '/claim', ClaimQuery, self._on_claim),
                           rospy.Service(self.name + '/answer', AnswerQuery, self._on_answer)]
@@ -207,7 +208,8 @@ class ExpertQueryServer:
         message.header.stamp = rospy.Time.now()
         self._listed_s = time.monotonic()
         if not self._stopped and not rospy.is_shutdown():
-            self._open_publisher.publish(message)
+            with quiet_at_shutdown():
+                self._open_publisher.publish(message)
 
     def _watch_time(self) -> None:
         """Watch deadlines, leases and askers that vanish.

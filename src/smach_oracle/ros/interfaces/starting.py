@@ -20,6 +20,8 @@ from smach_oracle.msg import InterfaceOutput
 from smach_oracle.oracle.errors import InterfaceError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 
+from ..connections import quiet_at_shutdown
+
 OUTPUT_TOPIC = '~interface_output'
 MOST_LINES = 200
 LONGEST_LINE = 500
@@ -142,8 +144,7 @@ class StartedInterface:
         with self._lock:
             message = InterfaceOutput(query_id=self._query_id, interface=self._name,
                                       status=self._status, text=self._text, lines=list(self._lines))
-        if not rospy.is_shutdown():
-            self._publish(message)
+        self._publish(message)
 
 
 class InterfaceStarter:
@@ -168,10 +169,10 @@ class InterfaceStarter:
                     'what was started for an earlier question has not ended within {:g} s'.format(
                         END_LIMIT_S))
         try:
-            started = StartedInterface(offer, query_id, self._publisher.publish)
+            started = StartedInterface(offer, query_id, self._publish)
         except InterfaceError as err:
-            self._publisher.publish(InterfaceOutput(query_id=query_id, interface=offer.name,
-                                                    status=InterfaceOutput.FAILED, text=str(err)))
+            self._publish(InterfaceOutput(query_id=query_id, interface=offer.name,
+                                          status=InterfaceOutput.FAILED, text=str(err)))
             raise
         with self._lock:
             self._last[offer.name] = started
@@ -185,3 +186,8 @@ class InterfaceStarter:
         with self._lock:
             for started in self._last.values():
                 started.stop()
+
+    def _publish(self, message: InterfaceOutput) -> None:
+        if not rospy.is_shutdown():
+            with quiet_at_shutdown():
+                self._publisher.publish(message)

@@ -1,13 +1,12 @@
 """A node that goes down while a question is open logs no error and no warning about it."""
 import threading
 
-import actionlib
 import pytest
 import rospy
 from expert_fixtures import make_question
 from waiting import wait_for
 
-from smach_oracle.ros.expert import client
+from smach_oracle.ros.expert import client, server
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.expert.server import ExpertQueryServer
 
@@ -91,7 +90,7 @@ def shutdown_hooks(monkeypatch):
     monkeypatch.setattr(rospy, 'resolve_name', lambda name: '/robot/' + name.lstrip('~'))
     monkeypatch.setattr(rospy.Time, 'now', lambda: rospy.Time(1))
     monkeypatch.setattr(rospy, 'Service', lambda *_: FakeTopic())
-    monkeypatch.setattr(actionlib, 'ActionServer', FakeActionServer)
+    monkeypatch.setattr(server, 'QuietActionServer', FakeActionServer)
     return hooks
 
 
@@ -112,6 +111,16 @@ def test_a_server_that_goes_down_does_not_publish_its_status_on_closed_topics(ho
     for hook in hooks:
         hook()
     assert not hosted._action.status_timer.running
+
+
+def test_a_list_of_questions_meets_a_closed_topic_in_a_shutdown_only(hooks, monkeypatch):
+    hosted = ExpertQueryServer()
+    hosted._open_publisher.closed = True
+    with pytest.raises(rospy.ROSException):
+        hosted._publish_list()
+    monkeypatch.setattr(rospy.core, 'is_shutdown_requested', lambda: True)
+    hosted._publish_list()
+    assert len(hosted._open_publisher.sent) == 1  # at the start
 
 
 class LostLink:
