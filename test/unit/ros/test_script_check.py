@@ -1,5 +1,6 @@
 """`oracle_run --check` executes no machine, reaches no master but its own, and reports."""
 import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -218,6 +219,29 @@ def test_the_exit_code_says_whether_a_machine_was_reached(check, text, code, tol
     found, report, errors = check(text)
     assert (found, told in ' '.join(report.split())) == (code, True), report + errors
     assert ('ValueError: no robot' in errors) is ('ValueError' in text)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('begin', ["rospy.init_node('task')", 'signal.signal(15, print)'])
+def test_a_signal_ends_the_check_of_a_script_that_sleeps(tmp_path, begin, number):
+    (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent('''
+        import signal, time
+        {}
+        print('SLEEPS', flush=True)
+        time.sleep(600)
+    ''').format(begin))
+    process = subprocess.Popen(
+        [sys.executable, '-c', RUNNER, '--check', 'task.py'], cwd=str(tmp_path),
+        env=dict(os.environ, ROS_MASTER_URI=NOBODY, ROS_HOSTNAME='localhost'),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+    try:
+        assert any('SLEEPS' in line for line in process.stderr)
+        process.send_signal(number)
+        report, _ = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number
+    assert report.endswith('The check was ended by {}.\n'.format(number.name))
 
 
 def test_what_contains_machines_or_serves_them_is_not_executed_either(check):
