@@ -11,7 +11,7 @@ from .records.events import FailureKind
 from .recovery.failure import Route, author_recovers, failure_kind, route_of
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
-from .settings.settings import Settings, StateSettings
+from .settings.settings import ALLOW, Settings, StateSettings
 
 Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
 
@@ -37,7 +37,10 @@ class StateProspect(NamedTuple):
 
 
 class ContainerProspect(NamedTuple):
-    """One wrapped container; `initial` is '' where it has no state."""
+    """One wrapped container; `initial` is '' where it has no state.
+
+    `guarded`: the states at or below it that the oracle repeats by no decision of its own.
+    """
 
     path: str
     machine: smach.StateMachine
@@ -47,11 +50,14 @@ class ContainerProspect(NamedTuple):
     is_top: bool
     recovers: bool
     states: Tuple[StateProspect, ...]
+    guarded: Tuple[str, ...] = ()
 
 
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
-    return [_container(node) for node in nodes_of(cast(WrappedMachine, machine))]
+    nodes = list(nodes_of(cast(WrappedMachine, machine)))
+    decides = nodes[0].settings.budget.recoveries != 0  # the budget is that of the top
+    return [_container(node, decides) for node in nodes]
 
 
 def good_outcome(container: smach.Container, settings: Settings) -> Optional[str]:
@@ -65,22 +71,30 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
     return names[0] if names else None
 
 
-def _container(node: TreeNode) -> ContainerProspect:
+def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     machine: Any = node.machine
     initial = machine._initial_state_label or next(iter(node.labels()), '')
     return ContainerProspect(
         node.path, machine, initial, tuple(sorted(machine.get_registered_outcomes(), key=str)),
         node.settings, node.parent is None, node.tree.recover,
-        tuple(_state(node, label) for label in node.labels()))
+        tuple(_state(node, label, decides) for label in node.labels()), tuple(_guarded(node)))
 
 
-def _state(node: TreeNode, label: str) -> StateProspect:
+def _guarded(node: TreeNode) -> Iterator[str]:
+    for each in nodes_of(node.machine):
+        below = each.path[len(node.path) + 1:]
+        for label in each.labels():
+            if each.settings_of(label).on_retry != ALLOW:
+                yield '{}/{}'.format(below, label) if below else label
+
+
+def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
     state, settings = node.machine._states[label], node.settings_of(label)
     return StateProspect(
         label, state, settings,
         tuple(_outcome(node, label, outcome, settings)
               for outcome in sorted(state.get_registered_outcomes(), key=str)),
-        tuple(_actions(node.in_force.policy, settings)),
+        tuple(_actions(node.in_force.policy, settings, decides)),
         node.settings.offers_for(node.relative_path, label))
 
 
@@ -93,14 +107,18 @@ def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) 
                         settings.author_recoveries))
 
 
-def _actions(policy: Policy, settings: StateSettings
+def _actions(policy: Policy, settings: StateSettings, decides: bool
              ) -> Iterator[Tuple[FailureClass, Tuple[Action, ...]]]:
-    """Yield each class of the failure rate with what the policy may do in it, mildest first."""
+    """Yield each class of the failure rate with what the policy may do in it, mildest first.
+
+    `decides`: whether the budget of the trial lets the oracle go anywhere by itself.
+    """
+    only_asks = not (decides and settings.max_recoveries and settings.on_retry == ALLOW)
     for failure_class in (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH):
         possible: Dict[Action, None] = {}
         for situation in _situations(policy, failure_class, bool(settings.preconditions)):
             possible[policy.decide(situation)] = None
-        if not settings.max_recoveries:
+        if only_asks:
             possible = {Action.ASK: None}
         yield failure_class, tuple(action for action in Action if action in possible)
 

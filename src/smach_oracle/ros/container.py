@@ -98,7 +98,7 @@ class OracleContainer(BareContainer):
 
     def _attach(self) -> None:
         try:
-            _take_parameters(self)
+            take_parameters(self)
             outside_main_thread(functools.partial(attachments().attach, self))
         except rospy.ROSInterruptException as err:
             # as a bare machine, it runs and finds the shutdown itself
@@ -133,10 +133,13 @@ def _remember(machine: BareContainer, settings: SettingsLike, preconditions: Pre
         _given[machine] = _GivenSettings(settings, preconditions, nested)
 
 
-def _take_parameters(machine: BareContainer) -> None:
+def take_parameters(machine: BareContainer) -> None:
     """Merge the parameter `~oracle` over what the machine was given in code.
 
     Once, and only in a node.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    :raises rospy.ROSInterruptException: where the node shuts down meanwhile.
     """
     if machine not in _given or not rospy.core.is_initialized():
         return

@@ -1,4 +1,6 @@
 """What the oracle may do in each state, told before anything runs."""
+import pytest
+
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.failure_rate import FailureClass
@@ -68,6 +70,21 @@ def test_the_actions_are_those_of_the_policy():
     listing = told({'policy': 'algorithm1', 'states': {'PICK': {'preconditions': ['HOME']}}})
     assert dict(listing['HOME'].actions)[low] == (Action.STEP_BACK,)
     assert dict(listing['PICK'].actions)[low] == (Action.REVISIT, Action.STEP_BACK)
+
+
+@pytest.mark.parametrize('on_retry', ['confirm', 'never'])
+def test_of_a_state_that_is_not_repeated_by_itself_the_oracle_asks(on_retry):
+    settings = {'states': {'PICK': {'on_retry': on_retry}, 'PLACE/PUT': {'on_retry': on_retry}}}
+    states = told(settings)
+    assert {actions for _, actions in states['PICK'].actions} == {(Action.ASK,)}
+    assert (Action.ASK,) not in dict(states['HOME'].actions[:2]).values()
+    top, inner = prospects_of(OracleContainer.wrap(machine(), settings=settings, name='TOP'))
+    assert (top.guarded, inner.guarded) == (('PICK', 'PLACE/PUT'), ('PUT',))
+
+
+def test_without_recoveries_in_the_budget_the_oracle_asks_everywhere():
+    for state in told({'budget': {'recoveries': 0}}).values():
+        assert {actions for _, actions in state.actions} == {(Action.ASK,)}
 
 
 def test_a_good_outcome_is_no_failure_and_a_preempt_only_where_there_is_no_other():

@@ -111,6 +111,36 @@ def test_a_fallback_may_lead_to_a_place_from_which_nothing_is_repeated():
     assert watched.visits() == ['POUR', 'PLACE', 'PARK']
 
 
+def behind_a_held_back_state(fallback, *answers):
+    """DETECT, POUR, HOME, PLACE; PLACE fails once, and an expert goes to DETECT."""
+    machine = chain(DETECT=Scripted(), POUR=Scripted(), HOME=Scripted(), PLACE=Scripted('aborted'))
+    return guarded(machine, goto('DETECT'), *answers, max_recoveries=0, deadline_s=0.1,
+                   on_no_answer='goto:' + fallback)
+
+
+def test_a_fallback_leads_past_a_state_that_was_held_back():
+    machine, expert = behind_a_held_back_state('HOME', None)
+    assert machine.run() == 'done'
+    assert machine.visits() == ['DETECT', 'POUR', 'HOME', 'PLACE', 'DETECT', 'HOME', 'PLACE']
+    assert [choice.state for choice in expert.questions[1].choices if choice.repeats] == [
+        'DETECT', 'POUR']
+
+
+def test_a_fallback_does_not_lead_before_a_state_that_was_held_back():
+    machine, expert = behind_a_held_back_state('DETECT', None)
+    assert machine.run() == 'aborted'
+    assert machine.visits() == ['DETECT', 'POUR', 'HOME', 'PLACE', 'DETECT']
+
+
+def test_what_an_expert_has_done_counts_as_done_then():
+    machine, expert = guarded(
+        chain(DETECT=Scripted(), POUR=Scripted(), PLACE=Scripted('aborted', 'aborted')),
+        goto('DETECT'), supersede('ok'), give_up(), max_recoveries=0)
+    assert machine.run() == 'aborted'
+    assert [choice.repeats for choice in expert.questions[2].choices
+            if choice.state == 'DETECT'] == [('POUR',)]
+
+
 def test_a_fallback_that_repeats_nothing_is_taken():
     machine, _ = guarded(pouring('aborted'), max_recoveries=0, on_no_answer='goto:PLACE')
     assert machine.run() == 'done'

@@ -1,5 +1,6 @@
 """`oracle_run --check` executes no machine, reaches no master but its own, and reports."""
 import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -120,6 +121,47 @@ def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(ch
     assert 'executes a machine for the second time' in report and 'for 2 machines' in report
 
 
+TWO = "machine('A').execute(); machine('B').execute(); machine('A').execute()"
+
+
+@pytest.mark.parametrize('text, options, names', [
+    (TWO, (), ('TASK', 'TASK_2')),
+    (TWO, ('--name', 'kitchen'), ('kitchen', 'kitchen_2')),
+    ("rospy.init_node('cook')\n" + TWO, (), ('cook', 'cook_2')),
+])
+def test_names_are_those_of_a_real_run(check, text, options, names):
+    code, report, errors = check(text, options=options)
+    assert code == 0, errors
+    assert '{} begins at A'.format(names[0]) in report, report
+    assert '{} begins at B'.format(names[1]) in report, report
+    assert '{}: another machine of the same structure'.format(names[0]) in report
+    assert 'for 2 machines' in report
+
+
+WRAPPED = '''
+    from smach_oracle import OracleContainer
+    rospy.init_node('task')
+    for label in 'AB':
+        OracleContainer.wrap(machine(label), name='SAME', settings={'memory': 7}).execute()
+'''
+
+
+def test_machines_wrapped_in_code_take_the_parameters_of_their_node(check, spy):
+    code, report, errors = check(WRAPPED, master=spy.uri)
+    assert code == 0, errors
+    assert 'SAME begins at A' in report and 'SAME begins at B' in report, report
+    assert report.count('prior 0.2') == 2 and report.count('memory 7') == 2, report
+
+
+def test_a_wrong_parameter_of_a_machine_wrapped_in_code_is_an_error(check, spy):
+    spy.parameters['task']['oracle'] = {'prior': 'high'}
+    code, _, errors = check(WRAPPED, master=spy.uri)
+    assert code == 2
+    last = errors.splitlines()[-1]
+    assert last.startswith('oracle_run: ') and "'high' is not allowed" in last
+    assert 'parameter /task/oracle' in last
+
+
 @pytest.mark.parametrize('settings, why', [
     ('memory: many', "memory: 'many' is not allowed"),
     ('states: {PICK: {preconditions: [HOEM]}}', "'HOEM' is not allowed"),
@@ -177,6 +219,29 @@ def test_the_exit_code_says_whether_a_machine_was_reached(check, text, code, tol
     found, report, errors = check(text)
     assert (found, told in ' '.join(report.split())) == (code, True), report + errors
     assert ('ValueError: no robot' in errors) is ('ValueError' in text)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('begin', ["rospy.init_node('task')", 'signal.signal(15, print)'])
+def test_a_signal_ends_the_check_of_a_script_that_sleeps(tmp_path, begin, number):
+    (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent('''
+        import signal, time
+        {}
+        print('SLEEPS', flush=True)
+        time.sleep(600)
+    ''').format(begin))
+    process = subprocess.Popen(
+        [sys.executable, '-c', RUNNER, '--check', 'task.py'], cwd=str(tmp_path),
+        env=dict(os.environ, ROS_MASTER_URI=NOBODY, ROS_HOSTNAME='localhost'),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+    try:
+        assert any('SLEEPS' in line for line in process.stderr)
+        process.send_signal(number)
+        report, _ = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number
+    assert report.endswith('The check was ended by {}.\n'.format(number.name))
 
 
 def test_what_contains_machines_or_serves_them_is_not_executed_either(check):

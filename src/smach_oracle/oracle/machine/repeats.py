@@ -37,6 +37,7 @@ def note_visit(node: TreeNode, record: StateRecord) -> str:
     if mark.spent and on_retry != ALLOW:
         return 'was done in this trial and {}'.format(
             'must not be repeated' if on_retry == NEVER else 'is not repeated by itself')
+    mark.executed = mark.reached
     mark.done = True
     return ''
 
@@ -49,15 +50,20 @@ def has_visited(node: TreeNode, label: str) -> bool:
 def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a state.
 
-    They are those that were executed since it came to `target` last, itself among them. If it has
-    not been there in this trial, they are those to which the author's transitions lead from there.
+    They are those that were executed since it came to `target` last, itself among them, and the
+    spent ones to which the author's transitions lead from there; but not what only a precondition
+    has done, until the machine has come to it once. If the machine has not been at the target in
+    this trial, they are all to which the author's transitions lead.
     """
-    repeated = tuple(done.name for done in _done_since(node, target))
-    if not repeated or has_visited(node, target):
-        return repeated
-    reached = _reached_from(node, target)
-    return tuple(name for name in repeated
-                 if any(_is_at_or_below(name, label) for label in reached))
+    if not node.tree.numbers_visits:
+        return ()
+    since = node.records.marks.of(target).reached
+    done = list(_done_below(node))
+    reached = _reached_from(node, target) if done else set()
+    return tuple(each.name for each in done
+                 if (since and each.mark.executed >= since)
+                 or ((each.mark.spent and each.mark.reached or not since)
+                     and any(_is_at_or_below(each.name, label) for label in reached)))
 
 
 def _reached_from(node: TreeNode, target: str) -> Set[str]:
@@ -87,7 +93,10 @@ def leave_for(node: TreeNode, target: str) -> None:
 
 def note_superseded(node: TreeNode, label: str) -> None:
     """Note that an expert has done the work of a spent state: the author's loops are free again."""
-    node.records.marks.of(label).spent = False
+    mark = node.records.marks.of(label)
+    mark.spent = False
+    if mark.done:
+        mark.executed = mark.reached  # it was done then, if not by the machine
 
 
 def why_closed(node: TreeNode, label: str) -> str:
@@ -118,24 +127,22 @@ def note_precondition(node: TreeNode, label: str) -> None:
     node.records.marks.of(label).done = True
     for done in _done_within(node, label):
         done.mark.spent = True
-        done.mark.reached = 0
+        done.mark.reached = done.mark.executed = 0
 
 
 def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:
-    if not node.tree.numbers_visits:
-        return
     since = node.records.marks.of(target).reached
-    for each in nodes_of(node.machine):
-        for done in _done_in(node, each):
-            if done.mark.reached >= since:
-                yield done
+    return (done for done in _done_below(node) if done.mark.executed >= since)
 
 
 def _done_within(node: TreeNode, label: str) -> Iterator[_Done]:
+    return (done for done in _done_below(node) if _is_at_or_below(done.name, label))
+
+
+def _done_below(node: TreeNode) -> Iterator[_Done]:
+    """Yield the guarded states at or below a container that were executed."""
     for each in nodes_of(node.machine):
-        for done in _done_in(node, each):
-            if _is_at_or_below(done.name, label):
-                yield done
+        yield from _done_in(node, each)
 
 
 def _is_at_or_below(name: str, label: str) -> bool:

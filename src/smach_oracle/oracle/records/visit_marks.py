@@ -5,15 +5,17 @@ from typing import Dict
 class VisitMark:
     """Of one state in one trial.
 
-    `reached`: number of its latest visit, over the whole tree; 0: none. `done`: whether it was
+    `reached`: number of its latest visit, over the whole tree; 0: none. `executed`: number of the
+    latest visit in which it was executed, and not held back; 0: none. `done`: whether it was
     executed, by a visit or as a precondition. `spent`: whether the oracle has left for a place from
     which the machine may come here again: if it is guarded, it is not executed then.
     """
 
-    __slots__ = ('reached', 'done', 'spent')
+    __slots__ = ('reached', 'executed', 'done', 'spent')
 
     def __init__(self) -> None:
         self.reached = 0
+        self.executed = 0
         self.done = False
         self.spent = False
 

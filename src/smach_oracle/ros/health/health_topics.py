@@ -16,7 +16,9 @@ from ..recording.recorder_topics import types_at_master, types_in_process
 from .field_rules import Status
 
 DIAGNOSTICS = ('/diagnostics', '/diagnostics_agg')
-LOOK_AGAIN_S = 0.5  # for the types of topics that nobody has advertised yet
+# for the types of topics that nobody has advertised yet: twice as long after each look
+LOOK_AGAIN_S = 0.5
+LOOK_AGAIN_MOST_S = 10.0
 
 
 class Latest:
@@ -50,6 +52,7 @@ class HealthTopics:
         self._unknown: Dict[str, Callable[[Any], None]] = {}  # topics without a type so far
         self._subscribers: List[rospy.Subscriber] = []
         self._looking = False
+        self._has_more = threading.Event()  # topics to look for
         # sources that somebody warns of already, or has warned of: a script may build a machine
         # for each trial
         self.watched: Set[str] = set()
@@ -63,6 +66,7 @@ class HealthTopics:
             latest = self._messages.setdefault(name, Latest())
             if is_new:
                 self._unknown[name] = latest.put
+                self._has_more.set()
         self._subscribe()
         return latest
 
@@ -74,6 +78,7 @@ class HealthTopics:
             if is_first:
                 self._unknown.update((rospy.resolve_name(topic), self._take_diagnostics)
                                      for topic in DIAGNOSTICS)
+                self._has_more.set()
         self._subscribe()
         return latest
 
@@ -98,8 +103,13 @@ class HealthTopics:
                 threading.Thread(target=self._look, name='health topics', daemon=True).start()
 
     def _look(self) -> None:
+        pause_s = LOOK_AGAIN_S
         while not rospy.core.is_shutdown_requested():
-            time.sleep(LOOK_AGAIN_S)
+            if self._has_more.wait(pause_s):
+                self._has_more.clear()
+                pause_s = LOOK_AGAIN_S
+            else:
+                pause_s = min(2.0 * pause_s, LOOK_AGAIN_MOST_S)
             self._subscribe()
             with self._lock:
                 if not self._unknown:

@@ -14,6 +14,8 @@ from smach_oracle.oracle.prospects import (
 )
 from smach_oracle.oracle.settings.settings import Settings, StateSettings
 
+from .setting_words import in_words
+
 WIDTH = 100
 _IN_WORDS = {Action.REVISIT: 'retry', Action.STEP_BACK: 'step back', Action.ASK: 'ask'}
 # told by lines of their own
@@ -54,10 +56,18 @@ def _heading(container: ContainerProspect) -> List[str]:
         return lines
     lines += _entry('policy', '{}; a step back leads to an earlier state, to {} where none has '
                     'succeeded'.format(settings.policy, container.initial), 2)
+    lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
     lines += _entry('set', ', '.join(_changed(settings, Settings(), _PARTS) +
                                      _changed(settings.defaults, StateSettings(), ())), 2)
     return lines
+
+
+def _not_repeated(container: ContainerProspect) -> str:
+    if not container.guarded:
+        return ''
+    return '{}: where a retry or a step back would do so, the oracle asks'.format(
+        ', '.join(container.guarded))
 
 
 def _asking(settings: Settings) -> str:
@@ -135,7 +145,7 @@ def _usual_actions(container: ContainerProspect) -> str:
 def _actions(state: StateProspect) -> str:
     """What the policy may do, by failure rate."""
     settings = state.settings
-    if not settings.max_recoveries:
+    if all(actions == (Action.ASK,) for _, actions in state.actions):
         return 'ask'
     limits = {FailureClass.LOW: 'rate below {:g}'.format(settings.moderate_from),
               FailureClass.MODERATE: '{:g} to {:g}'.format(settings.moderate_from,
@@ -152,19 +162,9 @@ def _either(actions: Sequence[Action]) -> str:
 
 def _changed(settings: Any, others: Any, left_out: Sequence[str]) -> List[str]:
     """The fields in which settings differ from others, as "memory 5"."""
-    return ['{} {}'.format(each.name, _value(getattr(settings, each.name)))
+    return ['{} {}'.format(each.name, in_words(getattr(settings, each.name)))
             for each in fields(settings) if each.name not in left_out
             and getattr(settings, each.name) != getattr(others, each.name)]
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        return '{:g}'.format(value)
-    if isinstance(value, (tuple, list)):
-        return '[{}]'.format(', '.join(_value(each) for each in value))
-    return str(value)
 
 
 def _entry(name: str, text: str, indent: int) -> List[str]:

@@ -1,13 +1,14 @@
 """Every machine that a checked script executes: it is checked, and not executed."""
 import functools
 import threading
-from typing import Any, Callable, Iterator, List, Type, cast
+from typing import Any, Callable, Iterator, List, Sequence, Tuple, Type, cast
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.prospects import good_outcome, prospects_of
+from smach_oracle.oracle.prospects import ContainerProspect, good_outcome, prospects_of
 from smach_oracle.oracle.settings.settings import Settings
 
+from ..container import take_parameters
 from ..machine_names import machine_names
 from .check_report import lines_of, wrapped
 from .interception import MARK, family, machines_inside
@@ -31,7 +32,7 @@ class MachineCheck:
         self._tell = tell
         self._lock = threading.RLock()
         self._seen: List[smach.Container] = []  # the objects themselves, so that no id comes again
-        self._names: List[str] = []
+        self._told: List[Tuple[str, ...]] = []  # of each machine, but for its name
         self.machines = 0  # of different structure
         self.warnings = 0
 
@@ -57,20 +58,37 @@ class MachineCheck:
         with _heard_warnings() as warnings:
             if not isinstance(machine, OracleContainer):
                 self._wrap(machine)
-        with machine_names().running(cast(OracleContainer, machine)):
-            name = oracle_of(machine).path  # shared by machines of the same structure
-        self._names.append(name)
-        if self._names.count(name) > MAX_ALIKE:
+            name = _prepare(cast(OracleContainer, machine))
+        prospects = prospects_of(machine)
+        told = _without_name(prospects, name)
+        self._told.append(told)
+        if self._told.count(told) > MAX_ALIKE:
             raise StopIteration('it builds machines of one structure again and again')
-        if self._names.count(name) > 1:
+        if self._told.count(told) > 1:
             self._tell(wrapped('{}: another machine of the same structure.'.format(name), 0))
             return
         self.machines += 1
-        for container in prospects_of(machine):
+        for container in prospects:
             self._tell(lines_of(container) + [''])
         self.warnings += len(warnings)
         for warning in warnings:
             self._tell(wrapped('Warning: ' + warning, 0, 4))
+
+
+def _prepare(machine: OracleContainer) -> str:
+    """Do what a real run does before the first state; return the machine's name.
+
+    :raises SettingsError: where the parameters of the node are wrong.
+    """
+    with machine_names().running(machine):
+        take_parameters(machine)
+    return oracle_of(machine).path
+
+
+def _without_name(prospects: Sequence[ContainerProspect], name: str) -> Tuple[str, ...]:
+    """What is said of a machine, which is the same for machines alike, whatever their names."""
+    return tuple(line for each in prospects
+                 for line in lines_of(each._replace(path=each.path[len(name):])))
 
 
 class _heard_warnings:

@@ -14,6 +14,7 @@ from smach_oracle.oracle.errors import SettingsError
 from ..shutdown import ShutdownGuard
 from . import check_stubs
 from .check_report import wrapped
+from .check_signals import SignalWatch
 from .machine_check import MachineCheck, intercept
 from .refusal import USAGE_ERROR, Refusal
 from .script_runner import (
@@ -29,7 +30,9 @@ from .script_runner import (
 LIMIT_S = 30.0  # for the script to reach a machine, or a further one
 # a script that has executed its machines, and waits: for one in another thread
 QUIET_S = 2.0
-NO_MACHINE = 1  # exit code
+# exit codes
+NO_MACHINE = 1
+SIGNALLED = 128  # and the number of the signal
 
 
 def check_script(args: Sequence[str], notes: Sequence[str]) -> NoReturn:
@@ -87,6 +90,7 @@ def _run(script: str, args: Sequence[str], watch: '_ScriptWatch') -> str:
     except SystemExit as end:
         return 'The script has ended by SystemExit({!r}).'.format(end.code) if end.code else ''
     except BaseException:
+        watch.end_if_signalled()
         sys.excepthook(*sys.exc_info())
         if watch.machines:
             return ('The script has ended in the error above: with the machines not executed, that '
@@ -112,6 +116,7 @@ class _ScriptWatch:
         self._stream = stream
         self._lock = threading.RLock()
         self._notes: List[str] = []
+        self._signals = SignalWatch()
         self._idle = False  # nothing but threads can reach a further machine
         self._latest = time.monotonic()
         self.machines = self.warnings = 0
@@ -156,11 +161,20 @@ class _ScriptWatch:
 
     def end(self, why: str = '') -> NoReturn:
         """End the process, with the code that says whether a machine was reached."""
+        self.end_if_signalled()
         with self._lock:
             if why:
                 self.tell(wrapped(why, 0))
             self.tell(wrapped(_summary(self.machines, self.warnings), 0))
             self._leave(0 if self.machines else NO_MACHINE)
+
+    def end_if_signalled(self) -> None:
+        """End the process as a shell expects it where SIGINT or SIGTERM came."""
+        number = self._signals.heard()
+        if number is not None:
+            with self._lock:
+                self.tell(['The check was ended by {}.'.format(number.name)])
+                self._leave(SIGNALLED + number)
 
     def refuse(self, err: Exception) -> NoReturn:
         """End the process with an error in the settings."""
@@ -176,8 +190,10 @@ class _ScriptWatch:
         main = threading.main_thread().ident or 0
         while True:
             time.sleep(0.05)
+            self.end_if_signalled()
             waited_s = time.monotonic() - self._latest
-            if self._idle and self.machines and waited_s > QUIET_S:
+            waits = self._idle or rospy.core.is_shutdown_requested()
+            if waits and self.machines and waited_s > QUIET_S:
                 self.end()
             if waited_s > LIMIT_S:
                 self.end('The script has not reached a{} machine in {:g} s; it is at {}.'.format(
