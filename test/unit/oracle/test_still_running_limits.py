@@ -1,11 +1,15 @@
 """What bounds the question about a state that still runs: the trial's budget, the state's end."""
+import threading
+
 import pytest
-from machines import FakeExpert, Gate, Scripted, goto, in_thread
+from guarded_machines import chain, guarded
+from machines import FakeExpert, Gate, Scripted, goto, in_thread, supersede
 from test_still_running import asked, told
 from waiting import wait_for
 
 from smach_oracle.oracle.machine import trial_budget
-from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.machine.alarm_clock import AlarmClock
+from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 
 
@@ -97,3 +101,23 @@ def test_an_answer_after_the_state_has_ended_is_none(log):
     assert machine.run() == 'done'
     assert wait_for(lambda: any('came too late' in text for _, text in log))
     assert [kind for kind, _ in told(machine)] == ['QUERY_OPENED', 'QUERY_CANCELLED']
+
+
+def test_a_state_that_is_held_back_is_no_longer_one_that_the_oracle_has_entered():
+    machine, expert = guarded(
+        chain(DETECT=Scripted('ok', 'aborted'), POUR=Scripted(), PLACE=Scripted('aborted')),
+        goto('DETECT'), supersede('ok'), supersede('ok'), max_recoveries=0)
+    assert machine.run() == 'done' and len(expert.questions) == 3
+    assert expert.questions[2].failure_kind is FailureKind.HELD_BACK
+    assert not machine.machine._oracle.record('POUR').entered_by_oracle
+
+
+def test_the_clock_lives_on_after_an_alarm_that_fails(log):
+    clock, rung = AlarmClock(), threading.Event()
+
+    def fails():
+        raise RuntimeError('no more threads')
+    clock.ring_in(0.0, fails)
+    clock.ring_in(0.05, rung.set)
+    assert rung.wait(10)
+    assert any('no more threads' in text for _, text in log)

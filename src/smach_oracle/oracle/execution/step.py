@@ -98,6 +98,9 @@ class Step:
         when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
+        entered_by_oracle = record.entered_by_oracle
+        if entered_by_oracle:
+            record.forget_entry()
         if node.in_force.deep_copy_keys:
             record.snapshot = node.snapshot()
         if node.tree.numbers_visits:
@@ -106,9 +109,6 @@ class Step:
                 return HeldBack(why_not)
         node.emit(EventKind.STATE_START, state=record.label)
         blocked = node.tree.workers.blocked(state) if node.abandoned else ''
-        entered_by_oracle = record.entered_by_oracle
-        if entered_by_oracle:
-            record.forget_entry()
         if blocked:
             return Overrun(blocked)
         begun_s = time.monotonic()
