@@ -29,9 +29,9 @@ QUERIES = (EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_CAN
            EventKind.QUERY_EXPIRED)
 
 
-def asked(*states, expert=None, **settings):
+def asked(*states, expert=None, health=None, **settings):
     """A chain whose first state fails, so that the oracle enters a state."""
-    return watched(*states, expert=expert, settings=dict(SOON, **settings))
+    return watched(*states, expert=expert, health=health, settings=dict(SOON, **settings))
 
 
 def letting_go(gate, answer):

@@ -3,13 +3,14 @@ import threading
 
 import pytest
 from guarded_machines import chain, guarded
-from machines import FakeExpert, Gate, Scripted, goto, in_thread, supersede
+from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, supersede
 from test_still_running import asked, told
 from waiting import wait_for
 
 from smach_oracle.oracle.machine import trial_budget
 from smach_oracle.oracle.machine.alarm_clock import AlarmClock
 from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.recovery import recovery, still_running
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 
 
@@ -121,3 +122,35 @@ def test_the_clock_lives_on_after_an_alarm_that_fails(log):
     clock.ring_in(0.05, rung.set)
     assert rung.wait(10)
     assert any('no more threads' in text for _, text in log)
+
+
+def test_the_answer_waits_until_the_robot_is_well():
+    health = FakeHealth()
+
+    def ask(question, cancelled, progress):
+        health.now = 'motors: off'
+        return goto('B')
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(ask),
+                    health=health, health_settle_s=0.05)
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START))
+    assert machine.visits() == ['A', 'A']
+    health.now = ''
+    assert run.result() == 'done' and machine.visits() == ['A', 'A', 'B']
+
+
+def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
+    closed = []
+    monkeypatch.setattr(recovery, 'why_closed',
+                        lambda node, label: 'still runs' if closed and label == 'B' else '')
+
+    def ask(question, cancelled, progress):
+        closed.append('B')
+        return goto('B')
+    expert = FakeExpert(ask, goto('C'))
+    monkeypatch.setattr(still_running, 'why_closed', lambda node, label: '')
+    machine = asked(Scripted('aborted', Gate()), Scripted(), Scripted(), expert=expert)
+    assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'C']
+    assert [event.text for event in machine.of(EventKind.WARNING)] == [
+        'cannot go to B, as was answered: B still runs']
+    assert expert.questions[1].text == 'was taken out while it still ran'

@@ -230,7 +230,8 @@ class Step:
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
         node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
                                  AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
-        return OracleVisit(node, record, taken.failure).follow(answer, outcome)
+        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        return OracleVisit(node, record, taken.failure).follow(answer, outcome, context)
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings
