@@ -6,6 +6,7 @@ from smach_oracle.oracle.decision.sentence import (
     DecisionFacts,
     decision_sentence,
     going_would_repeat,
+    ran_in_words,
 )
 
 
@@ -49,3 +50,11 @@ def facts(action, **fields):
 ])
 def test_a_decision_is_told_in_a_sentence(given, sentence):
     assert decision_sentence(given) == sentence
+
+
+@pytest.mark.parametrize('ran_s, longest_s, words', [
+    (62.4, 3.2, '62 s; its longest so far was 3.2 s'),
+    (0.5, 1.1e-6, '0.5 s; its longest so far was under 0.1 s'),
+    (0.05, None, 'under 0.1 s; how long it took before is not known')])
+def test_how_long_a_state_has_run_reads_well(ran_s, longest_s, words):
+    assert ran_in_words(ran_s, longest_s) == words

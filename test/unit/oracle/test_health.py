@@ -42,6 +42,14 @@ def awaits(machine):
     assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START), 10)
 
 
+def heals_at_once(machine, health):
+    """Make the robot well as soon as the machine waits."""
+    def heal(event):
+        if event.kind is EventKind.HEALTH_WAIT_START:
+            health.now = ''
+    machine.machine.events.observers.append(heal)
+
+
 def healthy_again(machine, health, run):
     awaits(machine)
     health.now = ''
@@ -108,14 +116,11 @@ def test_a_plain_success_asks_nobody(health):
 def test_failures_while_unwell_use_up_no_recovery(health):
     script = [fails_unwell(health)] * 4
     machine = watched(Scripted(*script), health=health,
-                      settings=dict(SETTINGS, max_recoveries=0))
-
-    def heal(event):
-        if event.kind is EventKind.HEALTH_WAIT_START:
-            health.now = ''
-    machine.machine.events.observers.append(heal)
+                      settings=dict(SETTINGS, max_recoveries=4))
+    heals_at_once(machine, health)
     assert machine.run() == 'done'
     assert machine.visits() == ['A'] * 5
+    assert not machine.of(EventKind.FAILURE) and machine.rate('A').recoveries == 0
     assert len(machine.of(EventKind.HEALTH_WAIT_START)) == 4
 
 

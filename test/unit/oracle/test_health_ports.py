@@ -115,3 +115,25 @@ def test_a_copied_machine_leaves_its_health_behind(health):
     twin = copy.deepcopy(machine)
     assert oracle_of(twin).health is None and oracle_of(machine).health is health
     assert twin.execute() == 'done'
+
+
+@pytest.mark.parametrize('is_asked_meanwhile', [True, False])
+def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
+    begun, go, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def is_well():
+        if begun.is_set():
+            return 'motors: off'
+        begun.set()
+        assert go.wait(20)
+        ended.set()
+        return True  # as it was when it began
+    port = health_ports.HealthFunctionPort('is_well', is_well)
+    assert port.why_unwell(begun.is_set) == ''  # a preempt: nobody waits for it
+    if is_asked_meanwhile:
+        monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
+        assert port.why_unwell() == 'is_well does not return'
+        monkeypatch.undo()
+    go.set()
+    assert ended.wait(10) and wait_for(port._call.done.is_set)
+    assert port.why_unwell() == 'is_well: motors: off'

@@ -60,6 +60,10 @@ def test_a_function_of_a_module_is_found_by_its_name():
     ({}, 'healthy', 'topic, diagnostics and function'),
     ([{'topic': '/a', 'function': is_well}], 'healthy[0]', 'one of the keys'),
     ({'topic': ''}, 'healthy.topic', 'a string that is not empty'),
+    ({'topic': 'motors on'}, 'healthy.topic', 'the name of a topic'),
+    ({'topic': '/a//b'}, 'healthy.topic', 'the name of a topic'),
+    ({'topic': '/a/'}, 'healthy.topic', 'the name of a topic'),
+    ({'topic': '1st'}, 'healthy.topic', 'the name of a topic'),
     ({'topic': '/a', 'feild': 'x'}, 'healthy.feild', 'topic, field, equals, at_least'),
     ({'topic': '/a', 'field': 'a..b'}, 'healthy.field', 'a field of the message'),
     ({'topic': '/a', 'equals': [1]}, 'healthy.equals', 'true, false, a number or a text'),
@@ -95,3 +99,8 @@ def test_a_name_that_cannot_be_imported_is_a_mistake():
 def test_the_settle_time_is_a_number_of_seconds(given):
     with pytest.raises(SettingsError, match='health_settle_s.* seconds from 0 to 60'):
         Settings.from_dict({'health_settle_s': given})
+
+
+@pytest.mark.parametrize('topic', ['/a', 'a', '~a', '~/a', '/a_1/2/b', 'ns/a'])
+def test_every_legal_name_of_a_topic_is_taken(topic):
+    assert Settings.from_dict({'healthy': {'topic': topic}}).healthy[0].source == topic

@@ -63,6 +63,8 @@ def ran_in_words(ran_s: float, longest_s: Optional[float]) -> str:
 
 
 def _seconds(seconds: float) -> str:
+    if seconds < 0.1:
+        return 'under 0.1 s'
     return ('{:.0f} s' if seconds >= 10 else '{:.2g} s').format(seconds)
 
 

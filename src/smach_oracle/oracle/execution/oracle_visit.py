@@ -10,14 +10,13 @@ from ..machine.repeats import leave_for, note_superseded
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
-from ..machine.write_watch import WriteWatch
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
-from ..recovery.failure import Failure, natural_ending, route_of
+from ..recovery.failure import Failure, route_of
 from ..recovery.judging import in_words
-from ..recovery.obeying import verdict_of
 from ..recovery.recovery import Recovery
+from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
 from .oracle_state import OracleState
 from .transitions import go_to, message_of, terminate
@@ -46,17 +45,14 @@ class OracleVisit:
     def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
         return Recovery(self._node, self._record, self._failure, context, continuous)
 
-    def follow(self, answer: Answer, outcome: str) -> Optional[str]:
+    def follow(self, answer: Answer, outcome: str, context: FailureContext) -> Optional[str]:
         """Go as an expert has answered who was asked while the state still ran.
 
         `outcome`: with what it ended then. It returns, and raises, what `run` does.
         """
-        node = self._node
         meta = self._pass_to_meta(outcome, outcome or 'taken_out')
-        watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
-        return self._leave(meta, verdict_of(
-            answer, node, self._record.label, watch, lambda: natural_ending(
-                self._failure, node.machine.get_registered_outcomes(), node.in_force.failing)))
+        return self._leave(meta, self._recover(meta, TakenOutRecovery(
+            self._node, self._record, self._failure, context, answer)))
 
     def _enter(self) -> OracleState:
         self._tell_failure()

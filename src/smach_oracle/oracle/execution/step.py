@@ -27,7 +27,7 @@ from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
-from .unwell_failure import UnwellVisit, why_unwell_after
+from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
 
 def before_step(node: TreeNode) -> bool:
@@ -98,6 +98,9 @@ class Step:
         when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
+        entered_by_oracle = record.entered_by_oracle
+        if entered_by_oracle:
+            record.forget_entry()
         if node.in_force.deep_copy_keys:
             record.snapshot = node.snapshot()
         if node.tree.numbers_visits:
@@ -106,9 +109,6 @@ class Step:
                 return HeldBack(why_not)
         node.emit(EventKind.STATE_START, state=record.label)
         blocked = node.tree.workers.blocked(state) if node.abandoned else ''
-        entered_by_oracle = record.entered_by_oracle
-        if entered_by_oracle:
-            record.forget_entry()
         if blocked:
             return Overrun(blocked)
         begun_s = time.monotonic()
@@ -197,10 +197,13 @@ class Step:
             if not why:
                 node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
             return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
+        if why and record.unwell_repeats >= record.most_repeats:
+            return self._failed(failure, why)
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
         return UnwellVisit(node, record, failure, why).run(context, False)
 
-    def _failed(self, failure: Failure) -> Optional[str]:
+    def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
+        """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         context = node.records.failure_context(record, self._machine._initial_state_label or '')
         node.records.note_failure(record)
@@ -213,7 +216,9 @@ class Step:
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
             return self._end_unrecovered(self._natural_ending(failure), failure)
-        return OracleVisit(node, record, failure).run(context, continuous)
+        visit = (OftenUnwellVisit(node, record, failure, why_unwell) if why_unwell
+                 else OracleVisit(node, record, failure))
+        return visit.run(context, continuous)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:
         """Go as an expert has answered while the state still ran; what it ended with is nothing."""
@@ -225,7 +230,8 @@ class Step:
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
         node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
                                  AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
-        return OracleVisit(node, record, taken.failure).follow(answer, outcome)
+        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        return OracleVisit(node, record, taken.failure).follow(answer, outcome, context)
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings

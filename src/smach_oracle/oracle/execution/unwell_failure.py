@@ -15,7 +15,7 @@ from ..records.state_record import StateRecord
 from ..recovery.failure import Failure
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
-from ..recovery.unwell_recovery import UnwellRecovery
+from ..recovery.unwell_recovery import OftenUnwellRecovery, UnwellRecovery
 from .oracle_visit import OracleVisit
 
 
@@ -68,3 +68,16 @@ class UnwellVisit(OracleVisit):
                    text: str) -> None:
         if target != self._record.label or by:  # else it runs again, and that is told
             super()._note_jump(target, userdata, missing, by, text)
+
+
+class OftenUnwellVisit(OracleVisit):
+    """The way of a failure that is counted, since its state has failed unwell too often."""
+
+    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure, why: str) -> None:
+        """`why`: the robot is not well."""
+        super().__init__(node, record, failure)
+        self._why = why
+
+    def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
+        return OftenUnwellRecovery(self._node, self._record, self._failure, context, continuous,
+                                   self._why)

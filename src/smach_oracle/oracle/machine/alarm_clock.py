@@ -3,6 +3,8 @@ import threading
 from time import monotonic
 from typing import Any, Callable, Dict, Optional, Tuple
 
+import smach
+
 Ring = Callable[[], None]
 
 
@@ -15,7 +17,10 @@ class AlarmClock:
         self._thread: Optional[threading.Thread] = None
 
     def ring_in(self, seconds: float, ring: Ring) -> None:
-        """Call `ring` once, when the time has come; it must return soon and not raise."""
+        """Call `ring` once, when the time has come; it must return soon.
+
+        What it raises is logged.
+        """
         with self._changed:
             self._due_s[ring] = monotonic() + seconds
             if self._thread is None:
@@ -43,8 +48,16 @@ class AlarmClock:
                     self._changed.wait(min(left_s, threading.TIMEOUT_MAX))
                     continue
                 del self._due_s[ring]
-            ring()
+            _call(ring)
 
     def __reduce__(self) -> Tuple[Any, ...]:
         """Nothing that waits travels with a copied or pickled machine."""
         return AlarmClock, ()
+
+
+def _call(ring: Ring) -> None:
+    """Call it; the others that wait are called all the same."""
+    try:
+        ring()
+    except Exception as err:
+        smach.logerr('an alarm has failed: {!r}'.format(err))

@@ -20,7 +20,8 @@ class HealthPort(Protocol):
 class HealthFunctionPort:
     """A function of the user's own, called in a thread that nobody has to wait for.
 
-    Several may ask at once: one call answers them all.
+    Several may ask at once: one call answers them all. What a call says after its limit, or after
+    nobody waited for it any more, is dropped: the robot may be otherwise by now.
     """
 
     def __init__(self, name: str, function: HealthFunction) -> None:
@@ -32,7 +33,7 @@ class HealthFunctionPort:
     def why_unwell(self, stopped: Callable[[], bool] = lambda: False) -> str:
         """Return what is wrong, '' where all is well; also where `stopped()` ends the asking."""
         call = self._call
-        if call is None:
+        if call is None or call.done.is_set():
             self._since_s = time.monotonic()
             call = self._call = BackgroundCall(self._function, 'smach_oracle health')
             call.start()
@@ -42,6 +43,8 @@ class HealthFunctionPort:
             if stopped():
                 return ''
         self._call = None
+        if time.monotonic() > self._since_s + FUNCTION_LIMIT_S:
+            return '{} took too long'.format(self._name)
         return self._in_words(call)
 
     def _in_words(self, call: BackgroundCall) -> str:

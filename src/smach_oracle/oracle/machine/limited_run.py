@@ -73,6 +73,10 @@ class LimitedRun:
         return LimitedRun, ()
 
 
+class WatchedRun(LimitedRun):
+    """One execution of a state without a time limit, which is asked about when it takes long."""
+
+
 _AROUND: 'contextvars.ContextVar[Tuple[LimitedRun, ...]]' = contextvars.ContextVar(
     'smach_oracle_limited_runs', default=())
 

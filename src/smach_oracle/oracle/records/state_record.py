@@ -66,6 +66,7 @@ class StateRecord:
     """
 
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
+                 'unwell_repeats',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
                  '_is_special', '_estimator', '_lock', '_learned', '_retired', '_edges', '_visits',
                  '_visits_before')
@@ -78,6 +79,8 @@ class StateRecord:
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
         self.fallbacks = 0
+        # of this trial: repeats after failures while the robot was not well, which nobody counts
+        self.unwell_repeats = 0
         # s, of the visits that ended by themselves and were timed; a plain success that nobody
         # observes is not
         self.longest_s: Optional[float] = None
@@ -173,9 +176,14 @@ class StateRecord:
 
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
-        self.recoveries = self.fallbacks = 0
+        self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self.forget_entry()  # of a trial that ended before the visit began
         self._visits_before = self._visits + self._by_edges()
+
+    @property
+    def most_repeats(self) -> int:
+        """How often it is repeated in a trial where no failure is counted, at least once."""
+        return max(1, self.settings.max_recoveries)
 
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""

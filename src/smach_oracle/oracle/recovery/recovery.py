@@ -198,7 +198,10 @@ class Recovery:
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
         self.emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
-        while why_not and self._has_waited_after('did not get its precondition ' + spec.name):
+        for _ in range(self._record.most_repeats):
+            if not why_not or not self._has_waited_after('did not get its precondition '
+                                                         + spec.name):
+                break
             why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
         self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
@@ -223,8 +226,16 @@ class Recovery:
     def _wait_until_well(self, what: str, why: str) -> bool:
         """Wait until the robot is well; False where something has ended the recovery."""
         with standing_still(self._node.runs_around):
-            return self._node.tree.health.wait_until_well(
-                self._node, self._record.label, what, why, self.stopped, self._cancelled.wait)
+            is_well = self._node.tree.health.wait_until_well(
+                self._node, self._record.label, what, why, self._is_over, self._cancelled.wait)
+        return is_well and not self._is_over()
+
+    def _is_over(self) -> bool:
+        return self.stopped() or bool(self._budget.why_over())
+
+    def _not_waited(self) -> Verdict:
+        """End the container, where something has ended the wait."""
+        return self._preempted() if self.stopped() else self._end_unaided()
 
     # -- asking
 
@@ -304,7 +315,7 @@ class Recovery:
             return verdict
         why = health.why_unwell(self.stopped)
         if why and not self._wait_until_well('is left for ' + verdict.state, why):
-            return self._preempted()
+            return self._not_waited()
         return verdict
 
     def _give_up(self, text: str, outcome: str = '') -> Verdict:

@@ -12,7 +12,7 @@ import smach
 from ..asking.inquiry import Inquiry, Reply
 from ..asking.question import Answer, AnswerKind, Expert, Question
 from ..decision.sentence import ran_in_words, still_running_sentence
-from ..machine.limited_run import LimitedRun, inside, standing_still
+from ..machine.limited_run import WatchedRun, inside, standing_still
 from ..machine.repeats import why_closed
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
@@ -42,12 +42,14 @@ class WatchedVisit:
         self._machine = node.machine
         self._record = record
         self._state: smach.State = node.machine._states[record.label]
-        self._run = LimitedRun()  # its time stands still while a person is asked inside the state
+        self._run = WatchedRun()  # its time stands still while a person is asked inside the state
         self._begun_s = time.monotonic()
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._answer: Optional[Answer] = None
         self._open_id = ''  # of the question that is open
+        self._answered = False  # by who wants the state to end; it has no effect before `_answer`
+        self._budget = node.tree.budget
         self.tried: List[str] = []
         self.question_cancelled = threading.Event()
 
@@ -84,6 +86,8 @@ class WatchedVisit:
         self._node.tree.clock.forget(self._ring)
         self.question_cancelled.set()
         self._close('{} has ended'.format(self._record.label))
+        if self._answered and self._answer is None and not self._machine.preempt_requested():
+            self.warn('{} has ended by itself; the answer is not used'.format(self._record.label))
         return self._answer
 
     def _ran_s(self) -> float:
@@ -103,26 +107,37 @@ class WatchedVisit:
         expert = self._node.tree.expert
         if self.stopped():
             return
-        if expert is None:
-            self.warn(self._sentence())
+        spent = self._why_nobody_is_asked()
+        if expert is None or spent:
+            self.warn('{} Nobody is asked: {}'.format(self._sentence(), spent)
+                      if spent else self._sentence())
             return
         reply = self._inquire(expert)
         if self.stopped():
             self._close(self._why_stopped())
         elif reply.answer is None:
-            self._expire(reply.why_none)
-            self._ask_later()
+            why_over = self._budget.why_over()
+            self._expire('; '.join(filter(None, (reply.why_none, why_over))))
+            if not why_over:
+                self._ask_later()
         elif self._is_wait_on(reply.answer):
-            self._open_id = ''
             smach.loginfo('{}: {} waits on'.format(self._place(), reply.answer.by or 'the expert'))
             self._ask_later()
         else:
-            self._open_id = ''
             self._take_out(reply.answer)
 
+    def _why_nobody_is_asked(self) -> str:
+        """Spend a question of the trial's; or say that time or questions are spent."""
+        if self._node.tree.expert is None:
+            return ''
+        return self._budget.why_over() or self._budget.take_question()
+
     def _inquire(self, expert: Expert) -> Reply:
-        with standing_still(self._node.runs_around):
-            return Inquiry(self, expert, 0.0).run()
+        # the state runs on, and so do the time limits around it; whoever looks whether a state
+        # around still runs has its answer in this question
+        watched = [run for run in self._node.runs_around if isinstance(run, WatchedRun)]
+        with standing_still(watched):
+            return Inquiry(self, expert, self._budget.within(0.0)[0]).run()
 
     def _ask_later(self) -> None:
         """Ask again once it has run twice as long."""
@@ -211,7 +226,19 @@ class WatchedVisit:
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers of a step that is about the state."""
+        if kind is EventKind.QUERY_ANSWERED and not self._note_answer(fields):
+            smach.logwarn('{}: the answer came too late and is not used'.format(self._place()))
+            return
         self._node.emit(kind, state=self._record.label, **fields)
+
+    def _note_answer(self, fields: Mapping[str, Any]) -> bool:
+        """Close the question, as it is answered; False where it was taken back before."""
+        waits_on = (fields.get('outcome'), fields.get('target')) == (
+            AnswerKind.GOTO.name.lower(), self._record.label)
+        with self._lock:
+            is_open, self._open_id = bool(self._open_id), ''
+            self._answered = is_open and not waits_on
+        return is_open
 
     def warn(self, text: str) -> None:
         """Log what the operator should know of this visit, and tell the observers."""

@@ -15,6 +15,8 @@ from .preconditions import PYTHON, Resolver
 # no arguments; True or '' is well, else what is wrong
 HealthFunction = Callable[[], Union[bool, str]]
 WORST = ('ok', 'warn')
+# of ROS: a name from the root, of the node's own, or relative
+_GRAPH_NAME = re.compile(r'(~/?|/)?[A-Za-z]\w*(/[A-Za-z0-9_]+)*', re.ASCII)
 _FIELD = re.compile(r'[A-Za-z_]\w*(\.\w+)*')
 _ALLOWED = 'a mapping with one of the keys topic, diagnostics and function'
 _NUMBER = values.number(-math.inf, math.inf, 'a number')
@@ -93,6 +95,8 @@ def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthC
 
 def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
     topic = values.label(prefix + 'topic', entry['topic'])
+    if not _GRAPH_NAME.fullmatch(topic):
+        raise SettingsError(prefix + 'topic', topic, 'the name of a topic, such as /motors_on')
     field = entry.get('field', 'data')
     if not isinstance(field, str) or not _FIELD.fullmatch(field):
         raise SettingsError(prefix + 'field', field, 'a field of the message, such as data or '

@@ -1,0 +1,156 @@
+"""What bounds the question about a state that still runs: the trial's budget, the state's end."""
+import threading
+
+import pytest
+from guarded_machines import chain, guarded
+from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, supersede
+from test_still_running import asked, told
+from waiting import wait_for
+
+from smach_oracle.oracle.machine import trial_budget
+from smach_oracle.oracle.machine.alarm_clock import AlarmClock
+from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.recovery import recovery, still_running
+from smach_oracle.oracle.recovery.still_running import WatchedVisit
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The budget's monotonic time, in s: a list of one number."""
+    now = [1000.0]
+    monkeypatch.setattr(trial_budget, 'monotonic', lambda: now[0])
+    return now
+
+
+def warned_once(machine, gate):
+    """Run until it warns, and a little longer; return what it warned of."""
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.WARNING))
+    assert not gate.go.wait(0.3)  # six times as long as it takes to ask
+    gate.go.set()
+    assert run.result() == 'done'
+    warning, = machine.of(EventKind.WARNING)
+    return warning.text
+
+
+def test_where_the_questions_are_spent_the_log_warns_once():
+    gate, expert = Gate(), FakeExpert(goto('A'))
+    machine = asked(Scripted('aborted', gate), expert=expert, budget={'questions': 1})
+    text = warned_once(machine, gate)
+    assert text.startswith('A still runs after ')
+    assert text.endswith("Nobody is asked: the trial's 1 question is spent")
+    assert len(expert.questions) == 1
+
+
+def test_where_the_minutes_are_over_the_log_warns_once(clock):
+    gate, expert = Gate(), FakeExpert()
+    machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.JUMP and clock.__setitem__(0, 1061.0))
+    assert warned_once(machine, gate).endswith("the trial's 1 minute is over")
+    assert not expert.questions
+
+
+def test_the_question_is_open_no_longer_than_the_minutes(clock):
+    gate = Gate()
+
+    def ask(question, cancelled, progress):
+        clock[0] += 61.0
+    expert = FakeExpert(ask)
+    machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.QUERY_EXPIRED))
+    assert not gate.go.wait(0.3)  # nobody is asked again
+    gate.go.set()
+    assert run.result() == 'done'
+    question, = expert.questions
+    assert 0 < question.deadline_s <= 60.0
+    assert machine.of(EventKind.QUERY_EXPIRED)[0].text.endswith(
+        "; the trial's 1 minute is over; it runs on")
+    assert not machine.of(EventKind.WARNING)
+
+
+@pytest.mark.parametrize('answer, warnings', [
+    (goto('B'), ['A has ended by itself; the answer is not used']), (goto('A'), [])])
+def test_an_answer_to_a_state_that_ends_at_that_moment_is_told_of(answer, warnings, monkeypatch):
+    gate = Gate()
+    take_out = WatchedVisit._take_out
+
+    def take_out_late(visit, answer):
+        assert visit._ended.wait(20)
+        take_out(visit, answer)
+    monkeypatch.setattr(WatchedVisit, '_take_out', take_out_late)
+    machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(answer))
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.QUERY_ANSWERED and gate.go.set())
+    assert machine.run() == 'done'
+    assert [kind for kind, _ in told(machine)][:2] == ['QUERY_OPENED', 'QUERY_ANSWERED']
+    assert [event.text for event in machine.of(EventKind.WARNING)] == warnings
+    answered, = [event.query_id for event in machine.of(EventKind.QUERY_ANSWERED)]
+    assert answered not in [event.query_id for event in machine.of(EventKind.QUERY_CANCELLED)]
+
+
+def test_an_answer_after_the_state_has_ended_is_none(log):
+    gate = Gate()
+
+    def ask(question, cancelled, progress):
+        gate.go.set()
+        assert cancelled.wait(20)
+        assert wait_for(lambda: machine.of(EventKind.QUERY_CANCELLED))
+        return goto('B')
+    machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(ask))
+    assert machine.run() == 'done'
+    assert wait_for(lambda: any('came too late' in text for _, text in log))
+    assert [kind for kind, _ in told(machine)] == ['QUERY_OPENED', 'QUERY_CANCELLED']
+
+
+def test_a_state_that_is_held_back_is_no_longer_one_that_the_oracle_has_entered():
+    machine, expert = guarded(
+        chain(DETECT=Scripted('ok', 'aborted'), POUR=Scripted(), PLACE=Scripted('aborted')),
+        goto('DETECT'), supersede('ok'), supersede('ok'), max_recoveries=0)
+    assert machine.run() == 'done' and len(expert.questions) == 3
+    assert expert.questions[2].failure_kind is FailureKind.HELD_BACK
+    assert not machine.machine._oracle.record('POUR').entered_by_oracle
+
+
+def test_the_clock_lives_on_after_an_alarm_that_fails(log):
+    clock, rung = AlarmClock(), threading.Event()
+
+    def fails():
+        raise RuntimeError('no more threads')
+    clock.ring_in(0.0, fails)
+    clock.ring_in(0.05, rung.set)
+    assert rung.wait(10)
+    assert any('no more threads' in text for _, text in log)
+
+
+def test_the_answer_waits_until_the_robot_is_well():
+    health = FakeHealth()
+
+    def ask(question, cancelled, progress):
+        health.now = 'motors: off'
+        return goto('B')
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(ask),
+                    health=health, health_settle_s=0.05)
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START))
+    assert machine.visits() == ['A', 'A']
+    health.now = ''
+    assert run.result() == 'done' and machine.visits() == ['A', 'A', 'B']
+
+
+def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
+    closed = []
+    monkeypatch.setattr(recovery, 'why_closed',
+                        lambda node, label: 'still runs' if closed and label == 'B' else '')
+
+    def ask(question, cancelled, progress):
+        closed.append('B')
+        return goto('B')
+    expert = FakeExpert(ask, goto('C'))
+    monkeypatch.setattr(still_running, 'why_closed', lambda node, label: '')
+    machine = asked(Scripted('aborted', Gate()), Scripted(), Scripted(), expert=expert)
+    assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'C']
+    assert [event.text for event in machine.of(EventKind.WARNING)] == [
+        'cannot go to B, as was answered: B still runs']
+    assert expert.questions[1].text == 'was taken out while it still ran'

@@ -1,0 +1,108 @@
+"""What ends the wait for health, and the repeats that nobody counts: a cap, and the budget."""
+import pytest
+from machines import FakeExpert, FakeHealth, Scripted, goto, supersede, watched
+from test_health import SETTINGS, fails_unwell, heals_at_once, notices
+
+from smach_oracle.oracle.machine import trial_budget
+from smach_oracle.oracle.records.events import EventKind
+
+
+@pytest.fixture
+def health():
+    return FakeHealth()
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The budget's monotonic time, in s: a list of one number."""
+    now = [1000.0]
+    monkeypatch.setattr(trial_budget, 'monotonic', lambda: now[0])
+    return now
+
+
+def flapping(health, times=100, expert=None, **settings):
+    """A state that makes the robot unwell, for a moment, so often as it runs; and one behind."""
+    machine = watched(Scripted(*[fails_unwell(health)] * times), Scripted(), health=health,
+                      expert=expert, settings=dict(SETTINGS, **settings))
+    heals_at_once(machine, health)
+    return machine
+
+
+@pytest.mark.parametrize('most, repeats', [(0, 1), (1, 1), (3, 3)])
+def test_a_state_that_makes_the_robot_unwell_is_not_repeated_without_end(health, most, repeats):
+    machine = flapping(health, max_recoveries=most)
+    assert machine.run() == 'aborted'
+    assert machine.visits() == ['A'] * (1 + repeats + most)
+    assert len(machine.of(EventKind.FAILURE)) == 1 + most == machine.rate('A').failures
+    # each failure is followed by a wait, counted or not
+    assert len(machine.of(EventKind.HEALTH_WAIT_END)) == len(machine.visits())
+
+
+def test_beyond_the_cap_a_person_is_asked_once_the_robot_is_well(health):
+    expert = FakeExpert(supersede('ok'))
+    machine = flapping(health, expert=expert, max_recoveries=0)
+    assert machine.run() == 'done'
+    kinds = [kind for kind in machine.kinds() if kind in (
+        'FAILURE', 'HEALTH_WAIT_START', 'HEALTH_WAIT_END', 'QUERY_OPENED', 'SUPERSEDE')]
+    assert kinds == ['HEALTH_WAIT_START', 'HEALTH_WAIT_END', 'FAILURE', 'HEALTH_WAIT_START',
+                     'HEALTH_WAIT_END', 'QUERY_OPENED', 'SUPERSEDE']
+
+
+def test_each_trial_has_its_own_uncounted_repeats(health):
+    machine = flapping(health, 1, max_recoveries=0)
+    for _ in range(2):
+        machine.machine.get_children()['A'].script[:] = [fails_unwell(health)]
+        assert machine.run() == 'done'
+    assert not machine.of(EventKind.FAILURE)
+
+
+def test_the_minutes_end_the_wait(health, clock):
+    machine = watched(Scripted(fails_unwell(health)), health=health,
+                      settings=dict(SETTINGS, budget={'minutes': 1}))
+
+    def pass_time(event):
+        if event.kind is EventKind.HEALTH_WAIT_START:
+            clock[0] += 61.0
+    machine.machine.events.observers.append(pass_time)
+    assert machine.run() == 'aborted'
+    assert machine.visits() == ['A'] and notices(machine)[1].outcome == 'stopped'
+    assert "the trial's 1 minute is over" in machine.of(EventKind.GIVE_UP)[0].text
+
+
+def test_after_the_minutes_nobody_waits(health, clock):
+    def late(state, ud):
+        clock[0] += 61.0
+        return fails_unwell(health)(state, ud)
+    machine = watched(Scripted(late), health=health,
+                      settings=dict(SETTINGS, budget={'minutes': 1}))
+    assert machine.run() == 'aborted'
+    assert machine.visits() == ['A'] and not notices(machine)
+
+
+def test_the_minutes_end_the_wait_before_a_jump(health, clock):
+    def answer(question, cancelled, progress):
+        health.now = 'motors: off'
+        return goto('B')
+    machine = watched(Scripted('aborted'), Scripted(), health=health, expert=FakeExpert(answer),
+                      settings=dict(SETTINGS, max_recoveries=0, budget={'minutes': 1}))
+
+    def pass_time(event):
+        if event.kind is EventKind.HEALTH_WAIT_START:
+            clock[0] += 61.0
+    machine.machine.events.observers.append(pass_time)
+    assert machine.run() == 'aborted' and machine.visits() == ['A']
+
+
+def test_a_precondition_that_makes_the_robot_unwell_is_not_run_without_end(health):
+    runs = []
+
+    def trips(ud):
+        runs.append(1)
+        health.now = 'motors: off'
+        return False
+    machine = watched(Scripted('aborted'), health=health,
+                      preconditions={'A': [trips]}, settings=dict(
+                          SETTINGS, max_recoveries=2))
+    heals_at_once(machine, health)
+    machine.run()
+    assert len(runs) == 3
