@@ -62,8 +62,8 @@ def main() -> int:
     tenth = args.transitions // 10
     smach.set_shutdown_check(
         itertools.chain(itertools.repeat(False, tenth), map(read, [False]),
-                        itertools.repeat(False, args.transitions - tenth), map(read,
-                                                                               [True])).__next__)
+                        itertools.repeat(False, args.transitions - tenth), map(read, [True]),
+                        itertools.repeat(True)).__next__)
     begin = time.perf_counter()
     machine.execute()
     elapsed_s = time.perf_counter() - begin

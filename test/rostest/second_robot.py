@@ -26,7 +26,7 @@ from smach_oracle.msg import ExpertDecision, FailureFrames, OpenQueries, Userdat
 from smach_oracle.srv import AnswerQuery
 
 CAMERA = '/camera/image_raw'
-AT_PLACE = 'INSPECTION/TOUR/AT_PLACE/'
+AT_PLACE = 'inspection/TOUR/AT_PLACE/'
 # the puddle that turns the robot most: it lies in the middle of a long way
 PUDDLE = (4.4, 3.2)
 
