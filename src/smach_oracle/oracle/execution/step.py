@@ -5,6 +5,7 @@ from typing import Any, Optional
 import smach
 
 from ..asking.question import AnswerKind
+from ..decision.policy import FailureContext
 from ..machine.repeats import note_visit
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
@@ -184,8 +185,7 @@ class Step:
         if stopping:
             recall_preempts(self._machine._states[record.label])  # it services none
             return self._end_unrecovered(self._preempted_ending(failure), failure)
-        context = node.records.failure_context(record, self._machine._initial_state_label or '')
-        return OracleVisit(node, record, failure).run(context, False)
+        return OracleVisit(node, record, failure).run(self._context(), False)
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
         """Go on after a failure while the robot was not well; `why`: see `why_unwell_after`."""
@@ -199,13 +199,17 @@ class Step:
             return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
-        context = node.records.failure_context(record, self._machine._initial_state_label or '')
-        return UnwellVisit(node, record, failure, why).run(context, False)
+        return UnwellVisit(node, record, failure, why).run(self._context(), False)
+
+    def _context(self) -> FailureContext:
+        """Return what the visits so far say about a failure of the state."""
+        return self._node.records.failure_context(self._record,
+                                                  self._machine._initial_state_label or '')
 
     def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
-        context = node.records.failure_context(record, self._machine._initial_state_label or '')
+        context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)
         # rate and class are those before this failure is counted
@@ -230,8 +234,7 @@ class Step:
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
         node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
                                  AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
-        context = node.records.failure_context(record, self._machine._initial_state_label or '')
-        return OracleVisit(node, record, taken.failure).follow(answer, outcome, context)
+        return OracleVisit(node, record, taken.failure).follow(answer, outcome, self._context())
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings
