@@ -239,7 +239,8 @@ def test_ctrl_c_ends_the_wait(health):
     assert machine.machine.is_running() is False
 
 
-def test_an_experts_answer_is_carried_out_once_the_robot_is_well(health):
+def answered_while_unwell(health):
+    """A machine that waits, since the robot was no longer well when the expert answered."""
     def answers(question, cancelled, progress):
         health.now = 'run-stop'
         return goto('B')
@@ -247,6 +248,11 @@ def test_an_experts_answer_is_carried_out_once_the_robot_is_well(health):
                       settings=dict(SETTINGS, max_recoveries=0))
     run = in_thread(machine.run)
     awaits(machine)
+    return machine, run
+
+
+def test_an_experts_answer_is_carried_out_once_the_robot_is_well(health):
+    machine, run = answered_while_unwell(health)
     assert not machine.of(EventKind.JUMP)
     assert healthy_again(machine, health, run) == 'done'
     kinds = machine.kinds()
@@ -256,13 +262,7 @@ def test_an_experts_answer_is_carried_out_once_the_robot_is_well(health):
 
 
 def test_a_preempt_in_the_wait_before_a_jump_ends_the_machine(health):
-    def answers(question, cancelled, progress):
-        health.now = 'run-stop'
-        return goto('B')
-    machine = watched(Scripted('aborted'), Scripted(), health=health, expert=FakeExpert(answers),
-                      settings=dict(SETTINGS, max_recoveries=0))
-    run = in_thread(machine.run)
-    awaits(machine)
+    machine, run = answered_while_unwell(health)
     machine.machine.request_preempt()
     assert run.result() == 'preempted'
     assert machine.visits() == ['A']
