@@ -8,25 +8,13 @@ import threading
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
+from machine_scripts import MACHINES, RUNNER
 
-RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
 NOBODY = 'http://localhost:1'
 PRELUDE = '''
 import sys, threading, rospy, smach, smach_ros
 print('SCRIPT SAYS THIS', flush=True)
-class Runs(smach.State):
-    def __init__(self):
-        smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
-    def execute(self, userdata):
-        print('STATE RUNS', flush=True)
-        return 'succeeded'
-def machine(*labels):
-    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
-    with sm:
-        for label, after in zip(labels, labels[1:] + ('succeeded',)):
-            smach.StateMachine.add(label, Runs(), {'succeeded': after})
-    return sm
-'''
+''' + MACHINES
 GOOD = '''
 max_recoveries: 3
 states:

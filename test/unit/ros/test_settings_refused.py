@@ -5,23 +5,12 @@ import sys
 import textwrap
 
 import pytest
+from machine_scripts import MACHINES, RUNNER
 
-RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
 PRELUDE = '''
 print('SCRIPT RUNS', flush=True)
 import smach
-class Runs(smach.State):
-    def __init__(self):
-        smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
-    def execute(self, userdata):
-        print('STATE RUNS', flush=True)
-        return 'succeeded'
-def machine(*labels):
-    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
-    with sm:
-        for label, after in zip(labels, labels[1:] + ('succeeded',)):
-            smach.StateMachine.add(label, Runs(), {'succeeded': after})
-    return sm
+''' + MACHINES + '''
 def ready(userdata):
     return True
 '''
