@@ -282,8 +282,10 @@ class OracleContainer(smach.StateMachine):
                 record = records.by_label[label]
             except KeyError:
                 record = node.record(label)
-            if (self._preempt_requested or engine.attentive) and before_step(node):
-                return None
+            if self._preempt_requested or engine.attentive:
+                stop = before_step(node)
+                if stop is not None:
+                    return stop.outcome
             state: smach.State = self._current_state  # type: ignore[assignment]
             userdata = self.userdata
             view = record.view

@@ -26,26 +26,32 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
+from .boundary import Stop, note_preempt, pass_boundary
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
 
-def before_step(node: TreeNode) -> bool:
+def before_step(node: TreeNode) -> Optional[Stop]:
     """Before the first state of an execution, and before any state under a preempt request.
 
-    Under a request the state is preempted too, unless the last one has serviced the request.
+    Likewise before any state while an operator has a say. Under a request the state is preempted
+    too, unless the last one has serviced the request.
 
-    :returns: whether the machine has to stop here, since the state around it was abandoned.
+    :returns: None where the state is executed now.
     """
-    if not node.engine.stepped:
+    if node.engine.stepped:
+        node.tree.control.calm(node.engine)
+    else:
         node.begin_stepping()
     if node.is_left_behind():
         stop_left_behind(node)
-        return True
+        return Stop()
     if node.machine.preempt_requested():
         _heed_preempt(node)
-    return False
+        if not node.machine.preempt_requested():
+            note_preempt(node)  # the last state has obeyed: what the author does then is not held
+    return pass_boundary(node) if node.engine.attentive else None
 
 
 def stop_left_behind(node: TreeNode) -> None:

@@ -1,0 +1,53 @@
+"""The topic `~oracle/control`: how the machines of a node stand as operators see them."""
+import threading
+import time
+from typing import Callable, Sequence, Tuple
+
+import rospy
+
+from smach_oracle.msg import ActiveState, ControlStatus, MachineControl
+from smach_oracle.oracle.operator_hand import HandStatus, OperatorHand
+
+from ..connections import quiet_at_shutdown
+
+TOPIC = '~oracle/control'
+_PERIOD_S = 0.05  # at most 20 Hz
+
+Hands = Callable[[], Sequence[Tuple[str, OperatorHand]]]
+
+
+class ControlPublisher:
+    """Publishes in a thread of its own, so that no machine waits for it."""
+
+    def __init__(self, hands: Hands) -> None:
+        self._hands = hands
+        self._changed = threading.Event()
+        self._topic = rospy.Publisher(TOPIC, ControlStatus, queue_size=1, latch=True)
+        threading.Thread(target=self._run, name='operator status', daemon=True).start()
+
+    def changed(self) -> None:
+        """Publish soon."""
+        self._changed.set()
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            self._changed.wait()
+            self._changed.clear()
+            with quiet_at_shutdown():
+                self._topic.publish(self._message())
+            time.sleep(_PERIOD_S)
+
+    def _message(self) -> ControlStatus:
+        message = ControlStatus(machines=[to_msg(hand.status()) for _, hand in self._hands()])
+        message.header.stamp = rospy.get_rostime()
+        return message
+
+
+def to_msg(status: HandStatus) -> MachineControl:
+    """A status as a message."""
+    return MachineControl(
+        path=status.path, running=status.running, paused=status.paused, paused_by=status.paused_by,
+        active=[ActiveState(*each) for each in status.active],
+        breakpoints=list(status.breakpoints), autonomy_patterns=list(status.autonomy),
+        autonomy_levels=list(status.autonomy.values()), jump_containers=list(status.jumps),
+        jump_states=list(status.jumps.values()))
