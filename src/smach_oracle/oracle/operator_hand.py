@@ -167,7 +167,8 @@ class OperatorHand:
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
         control = self._top.tree.control
         label = node.machine._current_label
-        is_held = any(hold.place.path == node.path for hold in control.holds())
+        is_held = any(hold.may_be_sent and hold.place.path == node.path
+                      for hold in control.holds())
         control.ask_jump(node.path, jump)
         if is_held:
             return '{} goes to {} instead of {}{}'.format(
@@ -231,15 +232,16 @@ class OperatorHand:
                           tuple(self._active()), control.breakpoints(), control.levels(), jumps)
 
     def _active(self) -> List[ActiveState]:
-        held = {hold.place.path: hold for hold in self._top.tree.control.holds()}
+        held = self._top.tree.control.holds()
+        at_boundary = {hold.place.path for hold in held if hold.may_be_sent}
         found = []
         for node in nodes_of(self._top.machine):
-            label, path = node.machine._current_label, node.path
-            if node.machine.is_running() and label is not None:
-                hold = held.get(path)
-                found.append(ActiveState(path, str(label), hold.held_by.value if hold else '',
-                                         hold is not None and hold.waits_for_confirmation))
-        return found
+            label = node.machine._current_label
+            if (node.machine.is_running() and label is not None
+                    and node.path not in at_boundary):
+                found.append(ActiveState(node.path, str(label), '', False))
+        return found + [ActiveState(hold.place.path, hold.place.state, hold.held_by.value,
+                                    hold.waits_for_confirmation) for hold in held]
 
     # -- words
 

@@ -135,7 +135,7 @@ class Control:
                 self._changed.wait(_LOOK_PERIOD_S)
 
     def _let_go(self, hold: Hold) -> Optional[LetGo]:
-        if hold.place.path in self._jumps:
+        if hold.may_be_sent and hold.place.path in self._jumps:
             return LetGo.SENT
         if hold.stepped:
             return LetGo.STEPPED

@@ -37,7 +37,7 @@ class Place(NamedTuple):
 class Hold:
     """One wait; `Control` alone writes to it."""
 
-    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped')
+    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent')
 
     def __init__(self, place: Place, held_by: HeldBy, confirms: bool) -> None:
         self.place = place
@@ -45,6 +45,7 @@ class Hold:
         self.confirms = confirms  # whether it waits for a confirmation
         self.confirmed = False
         self.stepped = False
+        self.may_be_sent = True  # whether the container can go to another state from here
 
     @property
     def waits_for_confirmation(self) -> bool:

@@ -6,10 +6,10 @@ import smach
 
 from ..control.hold import Hold, LetGo, Place
 from ..control.holding import Wait, wait_until_let_go
-from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
+from ..recovery.operator_wait import clocks_stand_still
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
 from .sending import make_jump
@@ -86,15 +86,9 @@ def _wait(node: TreeNode, hold: Hold) -> LetGo:
     lock.release()  # who asks for a preempt takes it
     try:
         return wait_until_let_go(node.tree.control, hold, Wait(
-            node, _clocks_stand_still(node), lambda: _ended_by(node)))
+            node, clocks_stand_still(node), lambda: _ended_by(node)))
     finally:
         lock.acquire()
-
-
-@contextlib.contextmanager
-def _clocks_stand_still(node: TreeNode) -> Iterator[None]:
-    with standing_still(node.runs_around), node.tree.budget.stands_still():
-        yield
 
 
 def _ended_by(node: TreeNode) -> Optional[LetGo]:
