@@ -80,6 +80,8 @@ class HandServer:
     def _on_event(self, event: Event) -> None:
         if event.kind in _CHANGES:
             self._status.changed()
+        else:
+            self._status.moved()
 
     def _hands(self) -> List[Tuple[str, OperatorHand]]:
         """The hands, by the paths of their machines."""

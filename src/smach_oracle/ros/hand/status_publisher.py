@@ -12,6 +12,7 @@ from ..connections import quiet_at_shutdown
 
 TOPIC = '~oracle/control'
 _PERIOD_S = 0.05  # at most 20 Hz
+_MOVES_PERIOD_S = 0.5  # how soon those who listen see which states are active
 
 Hands = Callable[[], Sequence[Tuple[str, OperatorHand]]]
 
@@ -22,6 +23,7 @@ class ControlPublisher:
     def __init__(self, hands: Hands) -> None:
         self._hands = hands
         self._changed = threading.Event()
+        self._has_moved = False
         self._topic = rospy.Publisher(TOPIC, ControlStatus, queue_size=1, latch=True)
         threading.Thread(target=self._run, name='operator status', daemon=True).start()
 
@@ -29,10 +31,17 @@ class ControlPublisher:
         """Publish soon."""
         self._changed.set()
 
+    def moved(self) -> None:
+        """Publish within half a second, if anybody listens: other states are active."""
+        self._has_moved = True
+
     def _run(self) -> None:
         while not rospy.is_shutdown():
-            self._changed.wait()
+            has_changed = self._changed.wait(_MOVES_PERIOD_S)
+            if not has_changed and not (self._has_moved and self._topic.get_num_connections()):
+                continue
             self._changed.clear()
+            self._has_moved = False
             with quiet_at_shutdown():
                 self._topic.publish(self._message())
             time.sleep(_PERIOD_S)
