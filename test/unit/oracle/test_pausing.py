@@ -117,7 +117,9 @@ def test_without_an_outcome_for_it_a_preempt_ends_in_a_failing_outcome_unrun() -
         assert (held.end(), first.runs) == ('aborted', 0)
 
 
-def test_the_author_s_clean_up_after_a_preempt_is_not_held() -> None:
+@pytest.mark.parametrize('by_operator', [True, False])
+def test_the_author_s_clean_up_is_left_out_while_the_pause_lasts(by_operator) -> None:
+    """An operator who preempts lifts the pause; who else preempts leaves it, and nothing moves."""
     gate, clean_up = Gate(), Scripted()
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
@@ -127,8 +129,28 @@ def test_the_author_s_clean_up_after_a_preempt_is_not_held() -> None:
     with Held(machine).begin() as held:
         assert gate.entered.wait(20)
         held.hand.pause()
+        if by_operator:
+            held.hand.preempt()
+        else:
+            held.machine.request_preempt()
+        assert (held.end(), clean_up.runs) == ('preempted', int(by_operator))
+    assert held.hand.status().paused is not by_operator
+    assert len(held.of(EventKind.PREEMPT)) == 1
+
+
+def test_a_machine_that_goes_on_after_a_preempt_is_held_again() -> None:
+    gate, other = Gate(), Scripted()
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('WORK', Scripted(gate), {'ok': 'done', 'preempted': 'OTHER'})
+        smach.StateMachine.add('OTHER', other, {'ok': 'done'})
+    with Held(machine, settings={'states': {'OTHER': {'autonomy': 'confirm'}}}).begin() as held:
+        assert gate.entered.wait(20)
         held.machine.request_preempt()
-        assert (held.end(), clean_up.runs) == ('preempted', 1)
+        held.waits_before('SM_ROOT/OTHER')
+        assert other.runs == 0
+        held.hand.confirm()
+        assert held.end() == 'done'
 
 
 def test_a_breakpoint_pauses_before_its_states_each_time() -> None:

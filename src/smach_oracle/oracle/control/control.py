@@ -45,7 +45,6 @@ class Control:
         self._jumps: Dict[str, Jump] = {}
         self._breakpoints: Dict[str, PathPattern] = {}
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
-        self._is_ending = False
         self.paused = False
         self.paused_by = ''
         self.is_set = False
@@ -54,9 +53,8 @@ class Control:
     # -- of the machines
 
     def begin_trial(self) -> None:
-        """A pause, breakpoints and levels stay from the trial before."""
+        """A pause, breakpoints and levels stay from the trial before; jumps do not."""
         with self._changed:
-            self._is_ending = False
             self._jumps.clear()
             self.in_trial = True
             self._note_change()
@@ -64,12 +62,6 @@ class Control:
     def end_trial(self) -> None:
         """Tell nothing more of this trial."""
         self.in_trial = False
-
-    def end_at_once(self) -> None:
-        """Hold nothing before the next trial: the top machine was asked to stop."""
-        with self._changed:
-            self._is_ending = True
-            self._changed.notify_all()
 
     def attend(self, engine: Engine) -> None:
         """Wake this machine from now on, and at once where something is set."""
@@ -95,8 +87,6 @@ class Control:
         :param breaks: whether breakpoints count.
         """
         with self._changed:
-            if self._is_ending:
-                return None
             if self.paused:
                 return Hold(place, HeldBy.PAUSE, confirms)
             if breaks and self._breaks_before(place):
@@ -127,19 +117,23 @@ class Control:
 
         :param ended_by: what else ends the wait, such as a preempt; asked 20 times a second.
         """
-        with self._changed:
-            while True:
-                let_go = ended_by() or self._let_go(hold)
-                if let_go is not None:
-                    return let_go
-                self._changed.wait(_LOOK_PERIOD_S)
+        while True:
+            let_go = ended_by()  # a user's machine has a say in it: not under the lock
+            if let_go is not None:
+                return let_go
+            with self._changed:
+                let_go = self._let_go(hold)
+                if let_go is None:
+                    self._changed.wait(_LOOK_PERIOD_S)
+            if let_go is not None:
+                return ended_by() or let_go  # a preempt that came before it goes before it
 
     def _let_go(self, hold: Hold) -> Optional[LetGo]:
         if hold.may_be_sent and hold.place.path in self._jumps:
             return LetGo.SENT
         if hold.stepped:
             return LetGo.STEPPED
-        if (self.paused and not self._is_ending) or hold.waits_for_confirmation:
+        if self.paused or hold.waits_for_confirmation:
             return None
         return LetGo.CONFIRMED if hold.confirmed else LetGo.RESUMED
 
@@ -167,7 +161,6 @@ class Control:
     def pause(self, by: str = '') -> None:
         """Hold every container of the tree at its next state boundary."""
         with self._changed:
-            self._is_ending = False
             if not self.paused:
                 self.paused, self.paused_by = True, by
                 self._note_change()

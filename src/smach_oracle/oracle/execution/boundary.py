@@ -22,13 +22,13 @@ class Stop(NamedTuple):
     outcome: Optional[str] = None
 
 
-def pass_boundary(node: TreeNode) -> Optional[Stop]:
+def pass_boundary(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     """Do before a state what an operator has asked for; None where the state is executed now.
 
-    The state may be one that is preempted already: then nothing is waited for.
+    :param was_preempted: whether there was a preempt request, which the last state may have obeyed.
     """
     with _locked(node):
-        return _pass(node)
+        return _pass(node, was_preempted)
 
 
 @contextlib.contextmanager
@@ -44,25 +44,25 @@ def _locked(node: TreeNode) -> Iterator[None]:
             lock.release()
 
 
-def _pass(node: TreeNode) -> Optional[Stop]:
+def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
-    is_preempted = machine.preempt_requested()
-    jump = None if is_preempted else control.take_jump(node.path)
+    stops = machine.preempt_requested() or _is_to_stop(node)
+    jump = None if stops else control.take_jump(node.path)
     if jump is not None and make_jump(node, jump):
         return Stop()  # to the next boundary, which is before that state
     place = Place(node.path, str(machine._current_label))
     level = control.level_of(place, node.record(place.state).settings.autonomy)
-    hold = control.hold_before(place, level == CONFIRM_FIRST, not is_preempted)
-    if hold is not None and is_preempted:
+    hold = control.hold_before(place, level == CONFIRM_FIRST, not stops)
+    if hold is not None and (stops or (was_preempted and control.paused)):
         return _end_preempted(node)
     if level == ANNOUNCE:
         _announce(node, place)
-    return None if hold is None or _is_to_stop(node) else _hold(node, hold)
+    return None if hold is None else _hold(node, hold)
 
 
 def _is_to_stop(node: TreeNode) -> bool:
     """Whether a machine around this one was asked to stop, though this one has obeyed already."""
-    while node.parent is not None and node.has_running_ancestor():
+    while node.parent is not None:
         node = node.parent
         if node.machine._is_running and node.machine.preempt_requested():
             return True
@@ -104,7 +104,6 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
 
     Then its state is executed under the request, as without an oracle.
     """
-    note_preempt(node)
     machine = node.machine
     registered = machine.get_registered_outcomes()
     failing = sorted(each for each in registered if each in node.in_force.failing)
@@ -112,15 +111,10 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
         return None
     outcome = PREEMPTED if PREEMPTED in registered else failing[0]
     label = str(machine._current_label)
-    node.tell_preempt()
+    if machine.preempt_requested():
+        node.tell_preempt()
     for state in (machine._preempted_state, machine._current_state):
         if state is not None:
             recall_preempts(state)
     machine.service_preempt()
     return Stop(terminate(node, label, outcome, outcome))
-
-
-def note_preempt(node: TreeNode) -> None:
-    """Hold nothing in the rest of the trial, where it is the whole tree that is to stop."""
-    if not node.has_running_ancestor():
-        node.tree.control.end_at_once()

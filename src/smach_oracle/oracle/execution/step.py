@@ -26,7 +26,7 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
-from .boundary import Stop, note_preempt, pass_boundary
+from .boundary import Stop, pass_boundary
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
@@ -47,11 +47,10 @@ def before_step(node: TreeNode) -> Optional[Stop]:
     if node.is_left_behind():
         stop_left_behind(node)
         return Stop()
-    if node.machine.preempt_requested():
+    was_preempted = node.machine.preempt_requested()
+    if was_preempted:
         _heed_preempt(node)
-        if not node.machine.preempt_requested():
-            note_preempt(node)  # the last state has obeyed: what the author does then is not held
-    return pass_boundary(node) if node.engine.attentive else None
+    return pass_boundary(node, was_preempted) if node.engine.attentive else None
 
 
 def stop_left_behind(node: TreeNode) -> None:
