@@ -94,7 +94,8 @@ class OracleContainer(smach.StateMachine):
             remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str,
                                                                                        Any]] = None,
             preconditions: Optional[List[Any]] = None, prior: Optional[float] = None,
-            time_limit_s: Optional[float] = None, on_retry: Optional[str] = None) -> smach.State:
+            time_limit_s: Optional[float] = None, on_retry: Optional[str] = None,
+            autonomy: Optional[str] = None) -> smach.State:
         """Add a state, with settings of its own, to the innermost open machine.
 
         The rest is as with `smach.StateMachine.add`.
@@ -105,7 +106,7 @@ class OracleContainer(smach.StateMachine):
             beside stays.
         """
         own = {'preconditions': preconditions, 'prior': prior, 'time_limit_s': time_limit_s,
-               'on_retry': on_retry}
+               'on_retry': on_retry, 'autonomy': autonomy}
         given = {key: value for key, value in own.items() if value is not None}
         machine = smach.StateMachine._currently_opened_container()
         if given and not isinstance(machine, OracleContainer):

@@ -3,6 +3,7 @@ import pytest
 from held_machines import Gate, Held
 from machines import Scripted, chain_of
 
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
@@ -22,6 +23,17 @@ def test_a_state_that_is_to_be_confirmed_waits_for_that_alone() -> None:
         assert held.hand.confirm('SM_ROOT', 'eva') == 'runs now: B in SM_ROOT'
         assert held.end() == 'done'
     assert held.told(EventKind.HOLD_END) == ['confirmed']
+
+
+def test_a_level_is_given_with_a_state() -> None:
+    machine = OracleContainer(outcomes=['ok', 'aborted', 'preempted'])
+    with machine:
+        OracleContainer.add('A', Scripted(), autonomy='confirm')
+    held = Held(machine)
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        held.hand.confirm()
+        assert held.end() == 'ok'
 
 
 def test_a_paused_machine_needs_both() -> None:
