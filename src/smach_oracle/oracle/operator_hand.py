@@ -256,15 +256,19 @@ class OperatorHand:
         top = self._top
         if not top.machine.is_running():
             return '{} does not run; it will wait before its first state'.format(top.path)
-        status = self._active()
-        waits = [_before(each) for each in status if each.held_by]
-        inside = {each.path for each in status}
-        runs = ['{} in {}'.format(each.state, each.path) for each in status
-                if not each.held_by and '{}/{}'.format(each.path, each.state) not in inside]
+        waits = [_in_words(each) for each in self._active() if each.held_by]
+        runs = self._what_runs()
         told = ['waits before ' + ', '.join(waits)] if waits else []
         if runs:
             told.append('runs to its end: ' + ', '.join(runs))
         return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
+
+    def _what_runs(self) -> List[str]:
+        """Return the states that run, in words, but for those within which others are active."""
+        active = self._active()
+        around = {each.path for each in active}
+        return [_in_words(each) for each in active
+                if not each.held_by and '{}/{}'.format(each.path, each.state) not in around]
 
     def _what_goes_on(self, held: Sequence[Hold]) -> str:
         top = self._top
@@ -276,6 +280,8 @@ class OperatorHand:
             text = '{} does not run; it will not wait'.format(top.path)
         else:
             text = '{} goes on; nothing has waited for that'.format(top.path)
+            runs = self._what_runs()
+            text += ', and this runs on: ' + ', '.join(runs) if runs else ''
         return text + ('; still to be confirmed: ' + ', '.join(asks) if asks else '')
 
     def _nothing_waits(self, path: str) -> str:
@@ -298,7 +304,7 @@ def _pattern(text: str) -> PathPattern:
         raise OperatorError(str(err)) from err
 
 
-def _before(active: ActiveState) -> str:
+def _in_words(active: ActiveState) -> str:
     return Place(active.path, active.state).in_words()
 
 

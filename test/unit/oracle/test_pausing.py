@@ -25,6 +25,18 @@ def test_a_pause_lets_the_state_end_and_holds_before_the_next() -> None:
     assert [event.seq for event in held.events] == list(range(len(held.events)))
 
 
+def test_a_resume_before_anything_waits_says_what_runs_on() -> None:
+    gate = Gate()
+    with Held(chain_of(Scripted(gate), Scripted())).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        assert held.hand.resume() == ('SM_ROOT goes on; nothing has waited for that, and this runs '
+                                      'on: A in SM_ROOT')
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert not held.of(EventKind.HOLD_START)
+
+
 def test_a_machine_that_is_paused_before_it_runs_waits_before_its_first_state() -> None:
     first = Scripted()
     held = Held(chain_of(first))
