@@ -122,11 +122,11 @@ def test_a_branch_that_its_concurrence_stops_does_not_wait_on() -> None:
 
 def test_a_time_limit_around_what_waits_stands_still() -> None:
     held = Held(nest(chain_of(Scripted(), Scripted()), Scripted()),
-                settings={'states': {'INNER': {'time_limit_s': 0.3}}})
+                settings={'states': {'INNER': {'time_limit_s': 1.0}}})
     held.hand.set_breakpoint('INNER/B')
     with held.begin():
         held.waits_before('SM_ROOT/INNER/B')
-        assert stays(lambda: held.held() == ['SM_ROOT/INNER/B'], 0.8)
+        assert stays(lambda: held.held() == ['SM_ROOT/INNER/B'], 1.5)
         held.hand.resume()
         assert held.end() == 'done'
     assert not held.of(EventKind.FAILURE)
@@ -135,7 +135,7 @@ def test_a_time_limit_around_what_waits_stands_still() -> None:
 def test_a_time_limit_runs_on_once_resumed() -> None:
     gate = Gate()
     held = Held(nest(chain_of(Scripted(gate)), Scripted()), recover=True,
-                settings={'states': {'INNER': {'time_limit_s': 0.3}}, 'max_recoveries': 0})
+                settings={'states': {'INNER': {'time_limit_s': 1.0}}, 'max_recoveries': 0})
     held.hand.set_breakpoint('INNER/A')
     with held.begin():
         held.waits_before('SM_ROOT/INNER/A')
@@ -148,11 +148,11 @@ def test_a_time_limit_runs_on_once_resumed() -> None:
 def test_the_minutes_of_the_trial_stand_still() -> None:
     gate = Gate()
     held = Held(chain_of(Scripted(), Scripted('aborted')),
-                settings={'budget': {'minutes': 0.4 / 60}, 'max_recoveries': 3})
+                settings={'budget': {'minutes': 1.0 / 60}, 'max_recoveries': 3})
     held.hand.set_breakpoint('B')
     with held.begin():
         held.waits_before('SM_ROOT/B')
-        assert stays(lambda: held.held() == ['SM_ROOT/B'], 0.8)
+        assert stays(lambda: held.held() == ['SM_ROOT/B'], 1.5)
         held.hand.remove_breakpoint('B')
         held.hand.resume()
         assert held.end() == 'done'  # there was time left to recover
