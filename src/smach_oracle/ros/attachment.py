@@ -33,6 +33,7 @@ from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
 from .goal_tracking import track_goals_from_the_start
+from .hand.hand_server import HandServer
 from .health.health_port import listen_to_health
 from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
@@ -78,6 +79,7 @@ class Attachments:
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
+        self._hand: Optional[HandServer] = None
         # bound once: a machine listens anew where it is given another one
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
@@ -126,6 +128,8 @@ class Attachments:
             self._on_ros.discard(machine)
             if self._rates is not None:
                 self._rates.forget(machine)
+            if self._hand is not None:
+                self._hand.forget(machine)
             path = oracle_of(machine).path
             shown = self._shown.get(path)
             if shown is not None and shown() is machine:
@@ -156,6 +160,7 @@ class Attachments:
         start_master_watch()
         self._events = EventPublisher()
         self._rates = RatesPublisher()
+        self._hand = HandServer()
 
     def _attach_to_node(self, machine: OracleContainer) -> None:
         introspect = private_flag('introspection', True)  # first, since it may raise
@@ -169,6 +174,8 @@ class Attachments:
             self._rates.watch(machine)
         if introspect and not has_introspection(machine):
             self._introspect(machine)
+        if self._hand is not None:
+            self._hand.watch(machine)
 
     def _introspect(self, machine: OracleContainer) -> None:
         """Show the machine in place of an earlier one of its name.

@@ -20,6 +20,7 @@ from smach_msgs.msg import (
 
 from .container_watch import ContainerTree, ContainerWatch
 from .plain_pickle import RefusedDataError, decode_userdata, encode_userdata
+from .viewer_jump import send_running, sender_of
 
 STATUS_TOPIC = '/smach/container_status'
 INIT_TOPIC = '/smach/container_init'
@@ -243,7 +244,7 @@ class IntrospectionServer(object):
         except RefusedDataError as err:
             smach.logerr("Initial state of '%s' not set: %s" % (command.path, err))
             return
-        if set_initial_states(watch, list(command.initial_states), data):
+        if set_initial_states(watch, list(command.initial_states), data, sender_of(command)):
             confirmation = self._current_status(command.path, watch, 'REMOTE_INIT')
             self._publish(self._status_pub, lambda: [confirmation])
 
@@ -258,17 +259,24 @@ def _waiting_bytes(topic: Optional[rospy.Publisher]) -> int:
         len(data) for connection in connections for data in list(getattr(connection, '_queue', ())))
 
 
-def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any]) -> bool:
-    """Let the container start in ``labels`` with ``data`` from now on.
+def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any],
+                       by: str = '') -> bool:
+    """Let the container start in ``labels`` with ``data`` from now on, as ``by`` has asked.
 
     Returns False, and logs why, where it has no such states or refuses them. A StateMachine that
-    runs now goes there at its next transition, as soon as its active state has ended.
+    runs now goes there at its next transition, as soon as its active state has ended; or as a
+    sender of viewer_jump sends it.
     """
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]
     if unknown:
         smach.logerr('Initial state %s not set: the container has only the states %s'
                      % (unknown, sorted(container.get_children())))
+        return False
+    goes_there = len(labels) == 1 and isinstance(
+        container, smach.StateMachine) and container.is_running()
+    is_sent = send_running(container, labels[0], data, by) if goes_there else None
+    if is_sent is False:
         return False
     userdata = smach.UserData()
     for key, value in data.items():
@@ -278,9 +286,9 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
     except smach.InvalidStateError as err:
         smach.logerr('Initial state %s not set: %s' % (labels, err))
         return False
-    if len(labels) == 1 and isinstance(container, smach.StateMachine) and container.is_running():
+    if goes_there:
         container.userdata.update(userdata)
-        watch.jump_to = labels[0]
+        watch.jump_to = None if is_sent else labels[0]
     return True
 
 
