@@ -244,6 +244,9 @@ class Step:
     def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
+        state = self._machine._states[record.label]
+        if isinstance(state, smach.Container):
+            recall_preempts(state)  # a Concurrence that has failed has preempted its branches
         context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)
