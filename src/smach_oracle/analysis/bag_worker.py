@@ -205,7 +205,7 @@ def _reply(request: BagRequest) -> str:
     except BagReadError as err:
         return _refusal(str(err), err.position)
     except MemoryError:
-        return _refusal('it takes more than {:.0f} MiB of memory'.format(
+        return _refusal('damaged, or too large: it takes more than {:.0f} MiB of memory'.format(
             request.memory_bytes / 2**20))
     except Exception as err:  # a damaged file can make rosbags raise anything
         return _refusal('damaged, or no bag: {!r}'.format(err))
