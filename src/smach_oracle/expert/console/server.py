@@ -140,7 +140,7 @@ class Console:
         if time.monotonic() - self._overview_s > OVERVIEW_PERIOD_S:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)
-            self._sections.put('trials', self._log.overview())
+            self._pages.write_trials()
 
 
 def _listen(settings: ConsoleSettings) -> List[socket.socket]:
