@@ -1,6 +1,7 @@
 """The world node: physics, controllers, camera, and the record of each trial's truth."""
 import sys
 import threading
+import time
 import traceback
 from typing import Optional
 
@@ -135,9 +136,11 @@ class WorldNode:
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
         self._finish_trial()
-        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
-        self._truth = TrialTruth(self._world.scene, self._world.time)
         self._loop.watch.restart()
+        began_s = time.monotonic()
+        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
+        self._loop.watch.add_time('reset')
+        self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
         causes = self._world.scene.causes
         self._cause.publish(
             TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
@@ -155,7 +158,8 @@ class WorldNode:
         sim_s = self._world.time
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent)
+        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent,
+                              self._loop.watch.used)
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
