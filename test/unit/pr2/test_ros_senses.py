@@ -21,8 +21,6 @@ COLOUR, DEPTH, INFO = ('head_camera/rgb/image_raw', 'head_camera/depth_registere
 class World:
     """Publishes a snapshot for each time it is asked, in vain on the topics that are `lost`."""
 
-    resolved_name = '/world/snapshot'
-
     def __init__(self):
         self.listeners = {}  # topic -> callback
         self.asked = []  # whether for a camera frame
@@ -35,8 +33,8 @@ class World:
         connection = SimpleNamespace(socket=object())
         return SimpleNamespace(impl=SimpleNamespace(connections=[connection]))
 
-    def wait_for_service(self, timeout):
-        """It is there."""
+    def close(self):
+        """The connection to its service."""
 
     def __call__(self, camera):
         self.asked.append(camera)
@@ -71,11 +69,13 @@ def world(monkeypatch):
     still = SimpleNamespace(transform=Transform())
     still.transform.rotation.w = 1.0
     monkeypatch.setattr(rospy, 'Subscriber', made.subscribe)
-    monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind: made)
+    monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind, persistent: made)
+    monkeypatch.setattr(rospy, 'wait_for_service', lambda name, timeout: None)
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     monkeypatch.setattr(ros_senses, 'tf2_ros', SimpleNamespace(
         Buffer=lambda *_: SimpleNamespace(lookup_transform=lambda *_: still),
-        TransformListener=lambda *_, **__: None, TransformException=LookupError))
+        TransformListener=lambda *_, **__: SimpleNamespace(tf_sub=SimpleNamespace(impl=None)),
+        TransformException=LookupError))
     monkeypatch.setattr(ros_senses, 'AGAIN_S', 0.05)
     monkeypatch.setattr(connections, 'GRACE_S', 0.0)
     return made

@@ -15,6 +15,7 @@ from std_msgs.msg import Header
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
 from smach_oracle.geometry.transforms import from_quaternion
+from smach_oracle.ros.connections import ConnectionGrace, live_connections
 from smach_oracle.ros.images import ImageError, cloud_message, colour_of, depth_of, intrinsics_of
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import Snapshot, SnapshotRequest
@@ -125,6 +126,7 @@ class _CameraSubscriptions:
             name: {}
             for name in topics
         }
+        self._grace = ConnectionGrace()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._transforms = tf2_ros.TransformListener(self._buffer)
         self._subscribers = [
@@ -138,12 +140,20 @@ class _CameraSubscriptions:
         self._transforms.unregister()
 
     def connected(self) -> bool:
-        trees = (self._transforms.tf_sub, self._transforms.tf_static_sub)
-        return not self.unpublished() and any(each.get_num_connections() for each in trees)
+        """Whether every topic has a publisher; waits until new ones send to this node."""
+        trees = [
+            each for tree in (self._transforms.tf_sub, self._transforms.tf_static_sub)
+            for each in live_connections(tree)
+        ]
+        cameras = [live_connections(each) for each in self._subscribers]
+        if not trees or not all(cameras):
+            return False
+        self._grace.wait(trees + [each for camera in cameras for each in camera])
+        return True
 
     def unpublished(self) -> List[str]:
         """Topics without a publisher."""
-        return [each.resolved_name for each in self._subscribers if not each.get_num_connections()]
+        return [each.resolved_name for each in self._subscribers if not live_connections(each)]
 
     def of_one_moment(self, stamp: Optional[rospy.Time]) -> List[CameraMessages]:
         """Colour images with their depth and a calibration, newest first.

@@ -45,7 +45,9 @@ from .state_publisher import StatePublisher, publish_description, ros_time
 from .truth import TrialTruth, append_line
 
 REST_S = 1.0  # after a trial, before it is judged
-LAST_WORDS_S = 1.5  # for the last trial's line, at the end
+# for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
+# sends a second signal; it takes a tenth of a second where nothing else is done
+LAST_WORDS_S = 12.0
 UNREGISTERING_S = 0.7  # for taking back some sixty topics from a master that may be busy, or gone
 SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
 
