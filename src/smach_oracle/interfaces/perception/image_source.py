@@ -24,7 +24,7 @@ SAME_MOMENT_S = 0.02  # between the stamps of colour and depth
 # wall time after which another snapshot is asked for: the first may have come before we listened
 ATTEMPT_S = 3.0
 POLL_S = 0.01
-CLOUD_STRIDE = 3
+CLOUD_COLUMNS = 213  # of the image that the cloud has points of, about
 NO_SNAPSHOT = 'none'
 KEPT = 5  # messages of a topic
 
@@ -219,10 +219,11 @@ def _camera_image(messages: CameraMessages, base_from_camera: np.ndarray) -> Cam
 
 
 def cloud_of(taken: TakenImage, base_frame: str) -> PointCloud2:
-    """An image as a coloured cloud in the frame of the base, of every CLOUD_STRIDE-th pixel."""
+    """An image as a coloured cloud in the frame of the base, of about CLOUD_COLUMNS columns."""
     image = taken.image
-    points = points_of(image.depth[::CLOUD_STRIDE, ::CLOUD_STRIDE], image.intrinsics,
-                       image.base_from_camera, stride=CLOUD_STRIDE)
+    stride = image.stride(CLOUD_COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics,
+                       image.base_from_camera, stride=stride)
     known = np.isfinite(points[..., 2])
     header = Header(stamp=taken.message.header.stamp, frame_id=base_frame)
-    return cloud_message(points[known], header, image.colour[::CLOUD_STRIDE, ::CLOUD_STRIDE][known])
+    return cloud_message(points[known], header, image.colour[::stride, ::stride][known])

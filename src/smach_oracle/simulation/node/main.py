@@ -63,7 +63,8 @@ class WorldNode:
         """
         self._settings = settings
         self.exit_code = 0  # of the process; 1 where the world failed
-        self._world = World(draw(settings.task, settings.seed, settings.benign))
+        self._world = World(draw(settings.task, settings.seed, settings.benign),
+                            settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
@@ -208,7 +209,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
-        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate; see '
+        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate, '
+        '~camera_binning; see '
         'doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:

@@ -39,8 +39,14 @@ class World:
     An arm or a body that is not there raises a ValueError.
     """
 
-    def __init__(self, scene: Scene = EMPTY) -> None:
+    def __init__(self, scene: Scene = EMPTY, binning: int = 1) -> None:
+        """Build a scene's world.
+
+        :param binning: columns and rows of the head camera's sensor that make one pixel of its
+            images, 1 or 2.
+        """
         self._client = -1
+        self.binning = binning
         self._periods_before = 0
         self.periods = 0  # control periods since the reset
         self.reset(scene)
