@@ -7,6 +7,8 @@ of a task, with the oracle and without it, one job after the other.
 It counts processor time, not the wall's, so that it says the same on a machine with other work. The
 start of the nodes is counted apart, from the trials that end at a reset. A share called `waiting`
 is that of the looks at the processes at which none of their threads ran or wanted to run.
+A core that others share with us takes more processor time for the same work, up to twice as much.
+So a loop of a fixed length is timed now and then: compare runs with the same time of the loop.
 --check fails where a trial takes more processor time than the goal leaves for it.
 """
 import argparse
@@ -16,6 +18,7 @@ import io
 import json
 import os
 import random
+import statistics
 import sys
 import tempfile
 import threading
@@ -31,6 +34,8 @@ from smach_oracle.experiment.launching import MARK
 GOALS = {'pick_and_place': (300, 6.0), 'drink_retrieval': (200, 12.0)}
 CORES = 2
 JOB_TRIALS = 150  # of a whole job, over which the start of its nodes is spread
+LOOP = 100000  # additions, of the loop that is timed
+LOOP_EVERY = 10  # looks
 LOOK_S = (0.1, 0.3)  # least and most wall s between two looks
 TICK_S = 1.0 / os.sysconf('SC_CLK_TCK')
 OWN = 'run_trials'
@@ -73,6 +78,7 @@ class Watch:
         self._not_ours: Set[int] = set()
         self._used: Dict[str, Dict[int, float]] = collections.defaultdict(dict)
         self.looks: Dict[str, List[Look]] = collections.defaultdict(list)
+        self.loops_s: List[float] = []  # processor s that a loop took
         self._stop = threading.Event()
         self._own_s = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -90,6 +96,9 @@ class Watch:
         while not self._stop.wait(chance.uniform(*LOOK_S)):
             self._own_s = time.thread_time()
             self._look()
+            looks = sum(map(len, self.looks.values()))
+            if looks % LOOP_EVERY == 0:
+                self.loops_s.append(loop_s())
 
     def _look(self) -> None:
         pids = [int(name) for name in os.listdir('/proc') if name.isdigit()]
@@ -123,6 +132,14 @@ class Watch:
             else:
                 self._job_of[pid] = os.fsdecode(job.partition(b'=')[2])
                 self._name_of[pid] = name_of(pid)
+
+
+def loop_s() -> float:
+    """Processor s that a loop of LOOP additions takes just now."""
+    began, total = time.thread_time(), 0
+    for number in range(LOOP):
+        total += number
+    return time.thread_time() - began
 
 
 def name_of(pid: int) -> str:
@@ -180,8 +197,9 @@ def cost_of(job: str, looks: List[Look]) -> Optional[JobCost]:
         sum(truth['sim_s'] for truth in counted) / trials)
 
 
-def measure(task: str, trials: int, seed: int, variants: str) -> Tuple[int, List[JobCost], str]:
-    """Run the trials; the exit code, what they cost, and what run_trials printed."""
+def measure(task: str, trials: int, seed: int,
+            variants: str) -> Tuple[int, List[JobCost], float, str]:
+    """Run the trials; the exit code, what they cost, s of a loop, and what run_trials printed."""
     with tempfile.TemporaryDirectory() as folder:
         output = os.path.realpath(folder) + '/trials'
         words = ['--task', task, '--trials', str(trials), '--seed', str(seed), '--jobs', '1',
@@ -190,7 +208,8 @@ def measure(task: str, trials: int, seed: int, variants: str) -> Tuple[int, List
             code = run_trials(words)
         costs = [cost_of(job, looks) for job, looks in sorted(watch.looks.items())
                  if (Path(job) / TRUTH_FILE).exists()]
-        return code, [cost for cost in costs if cost is not None], told.getvalue()
+        return (code, [cost for cost in costs if cost is not None],
+                statistics.median(watch.loops_s or [0.0]), told.getvalue())
 
 
 def report(task: str, costs: List[JobCost]) -> float:
@@ -249,11 +268,13 @@ def main() -> int:
     args = parser.parse_args()
     if args.trials < 3:
         parser.error('--trials must be 3 or more: the first and the last are not counted')
-    code, costs, told = measure(args.task, args.trials, args.seed, args.variants)
+    code, costs, loop, told = measure(args.task, args.trials, args.seed, args.variants)
     if code or not costs:
         sys.stderr.write(told)
         return code or 1
     whole = report(args.task, costs)
+    print('a loop of {} additions took {:.1f} ms in the median; here and now it takes {:.1f} at '
+          'the least'.format(LOOP, 1000 * loop, 1000 * min(loop_s() for _ in range(50))))
     if args.json:
         Path(args.json).write_text(json.dumps([cost._asdict() for cost in costs], indent=1))
     trials, minutes = GOALS[args.task]
