@@ -7,8 +7,8 @@ of a task, with the oracle and without it, one job after the other.
 It counts processor time, not the wall's, so that it says the same on a machine with other work. The
 start of the nodes is counted apart, from the trials that end at a reset. A share called `waiting`
 is that of the looks at the processes at which none of their threads ran or wanted to run.
-A core that others share with us takes more processor time for the same work, up to twice as much.
-So a loop of a fixed length is timed now and then: compare runs with the same time of the loop.
+A machine with other work takes more processor time for the same, up to twice as much. So steps of
+physics, of a world at rest, are timed now and then: compare runs in which a step takes as long.
 --check fails where a trial takes more processor time than the goal leaves for it.
 """
 import argparse
@@ -29,16 +29,19 @@ from typing import Dict, List, NamedTuple, Optional, Set, Tuple
 from smach_oracle.analysis.truth import TRUTH_FILE
 from smach_oracle.experiment.command import main as run_trials
 from smach_oracle.experiment.launching import MARK
+from smach_oracle.simulation.physics.pr2_body import SUBSTEPS
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.scenes.tasks import draw
 
 # task: trials, and minutes on two cores that they may take
 GOALS = {'pick_and_place': (300, 6.0), 'drink_retrieval': (200, 12.0)}
 CORES = 2
 JOB_TRIALS = 150  # of a whole job, over which the start of its nodes is spread
-LOOP = 100000  # additions, of the loop that is timed
-LOOP_EVERY = 10  # looks
+STEPS_EVERY = 10  # looks
+PERIODS = 15  # control periods of the world at rest that are timed
 LOOK_S = (0.1, 0.3)  # least and most wall s between two looks
 TICK_S = 1.0 / os.sysconf('SC_CLK_TCK')
-OWN = 'run_trials'
+OWN, LAUNCHER = 'run_trials', 'roslaunch'
 PLANNING = ('pr2_manipulation', 'pr2_perception')
 
 
@@ -78,7 +81,8 @@ class Watch:
         self._not_ours: Set[int] = set()
         self._used: Dict[str, Dict[int, float]] = collections.defaultdict(dict)
         self.looks: Dict[str, List[Look]] = collections.defaultdict(list)
-        self.loops_s: List[float] = []  # processor s that a loop took
+        self.steps_s: List[float] = []  # processor s that a step of physics took
+        self._world = World(draw('pick_and_place', 1, True))
         self._stop = threading.Event()
         self._own_s = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -97,13 +101,14 @@ class Watch:
             self._own_s = time.thread_time()
             self._look()
             looks = sum(map(len, self.looks.values()))
-            if looks % LOOP_EVERY == 0:
-                self.loops_s.append(loop_s())
+            if looks % STEPS_EVERY == 0:
+                self.steps_s.append(step_s(self._world))
 
     def _look(self) -> None:
         pids = [int(name) for name in os.listdir('/proc') if name.isdigit()]
         for pid in pids:
-            if pid not in self._job_of and pid not in self._not_ours:
+            # a process is met as its parent's copy at first, before it becomes what it is to be
+            if pid not in self._not_ours and self._name_of.get(pid, LAUNCHER) == LAUNCHER:
                 self._meet(pid)
         alive = [pid for pid in pids if pid in self._job_of]
         for job in {self._job_of[pid] for pid in alive}:
@@ -123,7 +128,7 @@ class Watch:
         return dict(used)
 
     def _meet(self, pid: int) -> None:
-        """Find out whether a new process is one of ours, once it has become what it is to be."""
+        """Find out whether a process is one of ours, and what it runs."""
         with contextlib.suppress(OSError):
             words = Path('/proc/{}/environ'.format(pid)).read_bytes().split(b'\0')
             job = next((word for word in words if word.startswith(self._mark)), None)
@@ -134,12 +139,11 @@ class Watch:
                 self._name_of[pid] = name_of(pid)
 
 
-def loop_s() -> float:
-    """Processor s that a loop of LOOP additions takes just now."""
-    began, total = time.thread_time(), 0
-    for number in range(LOOP):
-        total += number
-    return time.thread_time() - began
+def step_s(world: World) -> float:
+    """Processor s that a step of physics takes just now."""
+    began = time.thread_time()
+    world.step(PERIODS)
+    return (time.thread_time() - began) / (PERIODS * SUBSTEPS)
 
 
 def name_of(pid: int) -> str:
@@ -199,7 +203,7 @@ def cost_of(job: str, looks: List[Look]) -> Optional[JobCost]:
 
 def measure(task: str, trials: int, seed: int,
             variants: str) -> Tuple[int, List[JobCost], float, str]:
-    """Run the trials; the exit code, what they cost, s of a loop, and what run_trials printed."""
+    """Run the trials; the exit code, what they cost, s of a step, and what run_trials printed."""
     with tempfile.TemporaryDirectory() as folder:
         output = os.path.realpath(folder) + '/trials'
         words = ['--task', task, '--trials', str(trials), '--seed', str(seed), '--jobs', '1',
@@ -209,7 +213,7 @@ def measure(task: str, trials: int, seed: int,
         costs = [cost_of(job, looks) for job, looks in sorted(watch.looks.items())
                  if (Path(job) / TRUTH_FILE).exists()]
         return (code, [cost for cost in costs if cost is not None],
-                statistics.median(watch.loops_s or [0.0]), told.getvalue())
+                statistics.median(watch.steps_s or [0.0]), told.getvalue())
 
 
 def report(task: str, costs: List[JobCost]) -> float:
@@ -268,13 +272,12 @@ def main() -> int:
     args = parser.parse_args()
     if args.trials < 3:
         parser.error('--trials must be 3 or more: the first and the last are not counted')
-    code, costs, loop, told = measure(args.task, args.trials, args.seed, args.variants)
+    code, costs, step, told = measure(args.task, args.trials, args.seed, args.variants)
     if code or not costs:
         sys.stderr.write(told)
         return code or 1
     whole = report(args.task, costs)
-    print('a loop of {} additions took {:.1f} ms in the median; here and now it takes {:.1f} at '
-          'the least'.format(LOOP, 1000 * loop, 1000 * min(loop_s() for _ in range(50))))
+    print('a step of a world at rest took {:.0f} us in the median'.format(1e6 * step))
     if args.json:
         Path(args.json).write_text(json.dumps([cost._asdict() for cost in costs], indent=1))
     trials, minutes = GOALS[args.task]

@@ -44,6 +44,9 @@ from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
 from .truth import TrialTruth, append_line
 
+# simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
+# wakes every action server of every node.
+CLOCK_S = {False: 0.05, True: 0.2}
 REST_S = 1.0  # after a trial, before it is judged
 # for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
 # sends a second signal; it takes a tenth of a second where nothing else is done
@@ -67,7 +70,8 @@ class WorldNode:
                             settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
-        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
+        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
+                               CLOCK_S[settings.lock_step])
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
         self._state = StatePublisher(publish_description(), list(self._world.joints()),
