@@ -50,10 +50,10 @@ LAYERS: Dict[str, List[Layer]] = {
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
                                                  'hand'},
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
-        {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
+        {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
-        {'sendable_text', 'strict_json'}
+        {'sendable_text', 'strict_json', 'master_watch'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',
