@@ -31,13 +31,15 @@ class StateChoice(NamedTuple):
     # states done in this trial that would come again behind it, though they are not repeated by
     # themselves; its own label: going there repeats it
     repeats: Tuple[str, ...] = ()
+    # of a Concurrence: the labels of its branches, which all run again
+    runs_again: Tuple[str, ...] = ()
 
 
 class OutcomeChoice(NamedTuple):
     """An outcome with which the failed state may be superseded, and where it leads."""
 
     outcome: str
-    target: str
+    target: str  # a state or a container outcome; of a branch: words for people
 
 
 class PreconditionStatus(NamedTuple):

@@ -18,6 +18,7 @@ from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
 from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
+from .going_on import ask_to_go_on
 from .oracle_state import OracleState
 from .transitions import go_to, message_of, terminate
 
@@ -126,6 +127,7 @@ class OracleVisit:
             restore(self._machine.userdata._data, restores, verdict.written,
                     node.in_force.deep_copy_keys)
         leave_for(node, target)
+        ask_to_go_on(node, target)
         if missing:
             node.warn('jumping there without its input keys {}'.format(', '.join(missing)), target)
         self._note_entry(target)

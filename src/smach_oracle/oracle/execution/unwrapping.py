@@ -3,6 +3,7 @@ from typing import Any, cast
 
 import smach
 
+from ..branches.adopting import release_branches
 from ..errors import TrialError
 from ..machine.nesting import machines_below, nodes_of
 from ..machine.tree import Tree
@@ -40,6 +41,7 @@ def _strip(machine: WrappedMachine) -> None:
             _strip(wrapped)
         else:
             _stand_alone(wrapped)
+    release_branches(machine)
     machine._remove_oracle()
     stripped: Any = machine
     made_of = two_classes(type(machine))

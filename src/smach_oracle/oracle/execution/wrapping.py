@@ -3,6 +3,7 @@ from typing import Any, cast
 
 import smach
 
+from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
@@ -106,6 +107,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
         if made_of is not None and (container is machine or container._oracle.inherits):
             container._remove_oracle()
             unwrapped: Any = container
+            release_branches(container)
             unwrapped.__class__ = made_of[1]
             del unwrapped.__dict__['_oracle']
 
@@ -116,14 +118,12 @@ def adopt(machine: WrappedMachine) -> None:
     :raises SettingsError: for a machine whose class cannot be extended.
     """
     parent = machine._oracle
+    adopt_branches(parent, _put_below)
     for below, child in machines_below(machine):
         if isinstance(child, parent.tree.container_class):
             container = cast(WrappedMachine, child)
         elif parent.nested:
-            container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings,
-                                   '')
-            container._oracle.inherits = True
-            container._oracle.strict = parent.strict
+            container = _put_below(child, parent)
         else:
             continue
         node = container._oracle
@@ -131,6 +131,13 @@ def adopt(machine: WrappedMachine) -> None:
             _move_below(node, parent, below)
         node.nested = parent.nested
         adopt(container)
+
+
+def _put_below(child: smach.StateMachine, parent: TreeNode) -> WrappedMachine:
+    container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
+    container._oracle.inherits = True
+    container._oracle.strict = parent.strict
+    return container
 
 
 def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:

@@ -29,6 +29,12 @@ class WrappedMachine(Machine, Protocol):
     def _remove_oracle(self) -> None:
         """Take the ORACLE state out."""
 
+    def request_preempt(self) -> None:
+        """Ask it to stop."""
+
+    def _update_once(self) -> Optional[str]:
+        """Execute the current state and go on; return the container's outcome, None before it."""
+
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
 
@@ -38,14 +44,37 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
     return smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
 
 
+class BranchPort(Protocol):
+    """What a node asks where its machine is the hidden one of a branch (`branches.branch`)."""
+
+    label: str
+
+    def settings_here(self, settings: Settings) -> Settings:
+        """Return the settings of the whole machine as they are in force for the branch."""
+
+    def foresees(self, node: 'TreeNode', outcome: str) -> bool:
+        """Whether the author has said what is to happen at this failing outcome."""
+
+    def leads_to(self, outcome: str) -> str:
+        """Say where an outcome leads, for people."""
+
+    def goes_on_after(self, outcome: str) -> bool:
+        """Whether an outcome leads to the next item."""
+
+    def passes_over(self, outcome: str) -> str:
+        """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
     `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
     that lead here from the parent, those of a Concurrence or Iterator in between included.
     `in_force`: its settings. `records`: what it has learned and remembers. `engine`: how its engine
-    steps.
+    steps. `branch`: of a plain state of a Concurrence or an Iterator, else None.
     """
+
+    branch: Optional[BranchPort] = None
 
     def __init__(self, machine: WrappedMachine, tree: Tree, settings: Settings, name: str) -> None:
         self.machine = machine
@@ -142,7 +171,8 @@ class TreeNode:
 
     def configure(self, settings: Settings) -> None:
         """Go on under these settings with what was learned."""
-        self.in_force.use(settings)
+        self.in_force.use(settings if self.branch is None
+                          else self.branch.settings_here(settings))
         self.records.history.resize(settings.history_length)
         self.checked_states = -1
         for label, record in self.records.by_label.items():

@@ -9,6 +9,7 @@ from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from ..records.state_record import StateRecord
+from .branch_choices import outcomes_of_branch, running_again
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
 
@@ -35,7 +36,8 @@ def make_question(node: TreeNode, record: StateRecord, failure: Failure, account
         rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
         reason=account.reason, tried=account.tried, history=node.records.history.latest(),
         choices=tuple(_state_choices(node, account.written)),
-        supersede_outcomes=tuple(_supersede_outcomes(machine, record.label, state)),
+        supersede_outcomes=(outcomes_of_branch(node, state)
+                            or tuple(_supersede_outcomes(machine, record.label, state))),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
         give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
         interfaces=node.settings.offers_for(node.relative_path, record.label),
@@ -52,7 +54,8 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             label, 1.0 - record.rate, int(record.failure_class), record.visits,
             missing_keys(node.machine, label, keys_after_jump(node, label, written)),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed(node, label), repeated_by_going_to(node, label))
+            why_closed(node, label), repeated_by_going_to(node, label),
+            runs_again=running_again(node, label))
 
 
 def _supersede_outcomes(machine: Machine, label: str,

@@ -53,6 +53,7 @@ def _choices(goal: ExpertQueryGoal,
         'class': choice.failure_class, 'visits': choice.visits,
         'missing': list(choice.missing_keys), 'preconditions': list(choice.preconditions),
         'blocked': choice.blocked, 'repeats': list(choice.repeats),
+        'runs_again': list(choice.runs_again),
         'helped': list(recovery_counts(choice.state))
     } for choice in goal.choices]
 
