@@ -332,6 +332,18 @@ def test_a_precondition_of_an_item_is_a_function_or_a_state_and_its_check_runs()
         watched(iterator_over(Item()), preconditions={'ALL/EACH': ['ALL']})
 
 
+def test_labels_that_are_preconditions_of_another_state_of_this_label_are_no_matter():
+    each = Item(item2=['aborted'])
+    machine = inside(iterator_over(each), transitions={'done': 'EACH'})
+    with machine:
+        smach.StateMachine.add('EACH', Scripted('aborted'), {'ok': 'done'})
+        smach.StateMachine.add('HOME', Scripted(), {'ok': 'done'})
+    machine = Watched(machine, preconditions={'EACH': ['HOME']})
+    assert machine.run() == 'done'
+    assert [event.target for event in machine.of(EventKind.PRECONDITION_START)] == ['HOME']
+    assert each.tried == [1, 2, 2, 3, 4]
+
+
 def test_nobody_answers_and_the_item_ends_the_iteration_as_bare():
     each = Item(item2=['aborted'])
     machine = watched(iterator_over(each), settings=ASKS)

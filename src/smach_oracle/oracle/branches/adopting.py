@@ -52,7 +52,7 @@ def _take_notice(border: Border, parent: TreeNode, below: Labels, put_under: Put
     found: Dict[str, WrappedMachine] = {}
     for label, state in _plain_states(border):
         machine = border.machines.get(label)
-        if machine is None and parent.nested:
+        if machine is None and parent.wraps(below + (label,)):
             machine = _new_machine(border, label, state, parent, below, put_under)
         if machine is not None:
             found[label] = machine

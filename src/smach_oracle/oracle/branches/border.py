@@ -6,6 +6,7 @@ import smach
 
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..records.events import NO_OUTCOME, EventKind
+from ..records.facts import BRANCHES
 from ..settings.failing_outcomes import is_preempted
 from .branch import loops
 from .branch_machine import BranchMachine
@@ -47,7 +48,8 @@ class Border:
             self._renew(node)
             node.begin_execution()
         if nodes:
-            nodes[0].emit(EventKind.CONTAINER_START, state=', '.join(self.machines))
+            nodes[0].emit(EventKind.CONTAINER_START, state=', '.join(self.machines),
+                          data={BRANCHES: list(self.machines)})
         self._take_places()
         return True
 

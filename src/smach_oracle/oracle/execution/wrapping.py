@@ -10,12 +10,13 @@ from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.protocols import Labels
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..settings.patterns import Nested
 from ..settings.settings import Settings
-from .settings_check import check_preconditions, check_state_names
+from .settings_check import check_nested, check_preconditions, check_state_names
 from .wrapped_classes import change_class, two_classes
 
 
-def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: bool,
+def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: Nested,
                  name: str, strict: bool) -> WrappedMachine:
     """Wrap a machine and what is nested in it; see OracleContainer.wrap.
 
@@ -45,7 +46,8 @@ def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, sett
     return wrapped
 
 
-def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, strict: bool) -> None:
+def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
+                  strict: bool) -> None:
     top = machine._oracle
     top.strict = strict
     top.nested = nested
@@ -54,6 +56,7 @@ def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, str
     for node in nodes_of(machine):
         node.strict = strict
     check_state_names(top)
+    check_nested(top)
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -77,7 +80,7 @@ def _configure(machine: WrappedMachine, settings: Settings) -> None:
             node.configure(settings)
 
 
-def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: bool, name: str,
+def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: Nested, name: str,
                 strict: bool) -> WrappedMachine:
     top = machine._oracle
     before = top.settings
@@ -122,7 +125,7 @@ def adopt(machine: WrappedMachine) -> None:
     for below, child in machines_below(machine):
         if isinstance(child, parent.tree.container_class):
             container = cast(WrappedMachine, child)
-        elif parent.nested:
+        elif parent.wraps(below):
             container = _put_below(child, parent)
         else:
             continue

@@ -46,6 +46,20 @@ def _children(container: object) -> Mapping[str, smach.State]:
     return container.get_children() if isinstance(container, smach.Container) else {}
 
 
+def paths_below(container: object, above: Labels = ()) -> Iterator[str]:
+    """Yield the paths of what may have an oracle of its own, at any depth.
+
+    These are the machines in a container, and the plain states of its Concurrences and Iterators.
+    """
+    for label, state in list(_children(container).items()):
+        path = above + (label,)
+        is_branch = not isinstance(container, smach.StateMachine) and isinstance(
+            state, smach.State) and not isinstance(state, smach.Container)
+        if is_branch or isinstance(state, smach.StateMachine):
+            yield '/'.join(map(str, path))
+        yield from paths_below(state, path)
+
+
 def items_under_way(node: TreeNode) -> str:
     """Say which items of the Iterators around a container are under way, the innermost first."""
     found: List[str] = []

@@ -1,11 +1,13 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 import copy
+from dataclasses import replace
 from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Tuple
 
 import smach
 
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
+from ..settings.patterns import Nested, is_nested_at
 from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
@@ -47,7 +49,9 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
 class BranchPort(Protocol):
     """What a node asks where its machine is the hidden one of a branch (`branches.branch`)."""
 
-    label: str
+    @property
+    def container(self) -> smach.Container:
+        """The Concurrence or Iterator that holds it."""
 
     def settings_here(self, settings: Settings) -> Settings:
         """Return the settings of the whole machine as they are in force for the branch."""
@@ -83,7 +87,7 @@ class TreeNode:
         self.is_named = bool(name)
         self.name = name or DEFAULT_NAME
         self.strict = True
-        self.nested = True
+        self.nested: Nested = True
         self.inherits = False  # wrapped for being nested: under the settings of the top machine
         self.in_force = ContainerSettings(settings)
         self.records = ContainerRecords(settings.history_length)
@@ -162,6 +166,11 @@ class TreeNode:
             node = node.parent
         return tuple(found)
 
+    def wraps(self, below: Labels) -> bool:
+        """Whether what these labels below this container lead to has an oracle of its own."""
+        above = self.relative_path
+        return is_nested_at(self.nested, '/'.join(((above,) if above else ()) + below))
+
     # -- settings and states
 
     @property
@@ -180,7 +189,12 @@ class TreeNode:
 
     def settings_of(self, label: str) -> StateSettings:
         """Return the settings of a state."""
-        return self.in_force.of_state(self.relative_path, label)
+        settings = self.in_force.of_state(self.relative_path, label)
+        if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
+            return settings
+        # beside a branch is no state that could be run for it
+        return replace(settings, preconditions=tuple(
+            spec for spec in settings.preconditions if not spec.labels()))
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""
