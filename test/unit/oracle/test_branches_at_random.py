@@ -103,3 +103,44 @@ def test_without_a_failure_a_tree_runs_as_bare(seed):
     bare = run(seed, wrap=False)
     assert bare[1], 'something has run'
     assert run(seed, wrap=True) == bare
+
+
+class Fails(smach.State):
+    """Ends an item well after as many failures as were drawn for it; notes each try."""
+
+    def __init__(self, failures, tried):
+        smach.State.__init__(self, ['ok', 'aborted', 'stuck', 'preempted'], input_keys=['item'],
+                             io_keys=['done'])
+        self._left, self._tried = dict(failures), tried
+
+    def execute(self, ud):
+        self._tried.append(ud.item)
+        if self._left[ud.item]:
+            return self._left[ud.item].pop()
+        ud.done = ud.done + [ud.item]
+        return 'ok'
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_each_item_is_finished_once_in_its_turn_whatever_fails(seed):
+    draw = random.Random(seed)
+    count, tried = draw.randint(1, 6), []
+    # an abort is its own oracle's affair, stuck that of the oracle of the machine around
+    failures = {item: [draw.choice(['aborted', 'stuck']) for _ in range(draw.choice([0, 0, 1, 2]))]
+                for item in range(count)}
+    planned = {item: len(each) + 1 for item, each in failures.items()}
+    items = draw.choice([list, tuple, iter, lambda given: lambda: list(given)])(range(count))
+    iterator = smach.Iterator(['done', 'aborted', 'preempted'], ['done'], ['done'], it=items,
+                              it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', Fails(failures, tried), loop_outcomes=['ok'],
+                                           final_outcome_map={'stuck': 'aborted'})
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('ALL', iterator)
+    OracleContainer.wrap(machine, settings={
+        'max_recoveries': 100, 'memory': 1000, 'userdata': draw.choice(['restore', 'keep'])})
+    assert machine.execute() == 'done'
+    assert machine.userdata.done == list(range(count))
+    assert tried == [item for item in range(count) for _ in range(planned[item])]
