@@ -15,15 +15,15 @@ def machines_below(
     plain state of those it yields the hidden machine, if it has one, with the labels of the
     Concurrence or Iterator.
     """
+    border = getattr(container, '_oracle_border', None)
+    if border is not None:
+        yield from ((below, machine) for machine in list(border.machines.values()))
     for label, state in list(_children(container).items()):
         path = below + (label,)
         if isinstance(state, smach.StateMachine):
             yield path, state
         elif isinstance(state, smach.Container):
             yield from machines_below(state, path)
-            border = getattr(state, '_oracle_border', None)
-            if border is not None:
-                yield from ((path, machine) for machine in list(border.machines.values()))
 
 
 def borders_below(
