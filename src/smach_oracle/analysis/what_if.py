@@ -27,7 +27,7 @@ from smach_oracle.oracle.decision.policy import (
 )
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import Decider, decided_by, is_counted
+from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by, is_counted
 from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
@@ -77,7 +77,8 @@ class Replay:
         self._policy = policy_named(settings['policy'])
         self._conditioned = conditioned
         self._states: Dict[Key, _LearnedState] = {}
-        self._histories: Dict[str, History] = {}
+        self._histories: Dict[Key, History] = {}
+        self._branches: Dict[str, Tuple[str, ...]] = {}  # states that are on their own, by path
 
     def take(self, event: Event) -> Optional[str]:
         """Follow one event; returns the action at a DECISION ('not known' included), else None."""
@@ -85,7 +86,7 @@ class Replay:
             for history in self._histories.values():
                 history.begin_trial()
         elif event.kind == EventKind.CONTAINER_START:
-            self._history(event.path).begin_execution()
+            self._begin_execution(event)
         elif event.kind == EventKind.FAILURE:
             self._failed(event)
         elif event.kind == EventKind.TRANSITION:
@@ -109,11 +110,20 @@ class Replay:
             self._states[key] = _LearnedState(self._settings)
         return self._states[key]
 
-    def _history(self, path: str) -> History:
-        return self._histories.setdefault(path, History(ENOUGH_VISITS))
+    def _begin_execution(self, event: Event) -> None:
+        branches = branches_of(event)
+        self._branches[event.path] = branches
+        for key in [(event.path, state) for state in branches] or [(event.path, '')]:
+            self._histories.setdefault(key, History(ENOUGH_VISITS)).begin_execution()
+
+    def _history(self, event: Event) -> History:
+        """Return the chain of the event's container, or of its state where that is on its own."""
+        alone = event.state in self._branches.get(event.path, ())
+        key = (event.path, event.state if alone else '')
+        return self._histories.setdefault(key, History(ENOUGH_VISITS))
 
     def _failed(self, event: Event) -> None:
-        state, history = self._state(event), self._history(event.path)
+        state, history = self._state(event), self._history(event)
         successes = state.estimator.successes
         state.context = history.failure_context(event.state, '', successes)
         state.preconditions = []
@@ -126,7 +136,7 @@ class Replay:
             self._visited(event, VisitResult.SUPERSEDED)
             return
         self._state(event).estimator.take_back_failure()
-        self._history(event.path).supersede(event.outcome)
+        self._history(event).supersede(event.outcome)
 
     def _left(self, event: Event) -> None:
         state = self._state(event)
@@ -138,7 +148,7 @@ class Replay:
             self._visited(event, VisitResult.SUCCESS)
 
     def _visited(self, event: Event, result: VisitResult) -> None:
-        self._history(event.path).visited(Visit(event.state, event.outcome, result),
+        self._history(event).visited(Visit(event.state, event.outcome, result),
                                           self._conditioned.get((event.path, event.state), False))
 
     def begin_visit(self, event: Event) -> None:

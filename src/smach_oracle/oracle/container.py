@@ -23,6 +23,7 @@ from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
 from .records.rates_file import read_rates, write_rates
 from .settings.health import HealthFunction
+from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
 
 EDGE_TO_ORACLE = 'failure'
@@ -68,7 +69,7 @@ class OracleContainer(smach.StateMachine):
 
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
-             settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
+             settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
              expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
              health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put `machine` under an oracle and return it.
@@ -76,7 +77,8 @@ class OracleContainer(smach.StateMachine):
         It stays the same object; its class is made of this one and its own.
 
         With `nested` (default: the setting of this name) every StateMachine inside it, at any
-        depth, is wrapped too. With `recover=False` it is only observed. Wrapping again gives new
+        depth, is wrapped too, or those at the paths of a list.
+        With `recover=False` it is only observed. Wrapping again gives new
         settings.
 
         :raises SettingsError: naming key, value and what is allowed.
@@ -84,7 +86,8 @@ class OracleContainer(smach.StateMachine):
         checked = as_settings(settings, preconditions)
         tree = Tree(OracleContainer, recover, expert, health)
         wrapped = wrap_machine(cls, machine, tree, checked,
-                                                checked.nested if nested is None else nested, name,
+                                                checked.nested if nested is None
+                               else checked_nested('nested', nested), name,
                                                 strict)
         return cast(OracleContainer, wrapped)
 

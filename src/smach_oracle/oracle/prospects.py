@@ -39,11 +39,13 @@ class StateProspect(NamedTuple):
 class ContainerProspect(NamedTuple):
     """One wrapped container; `initial` is '' where it has no state.
 
-    `guarded`: the states at or below it that the oracle repeats by no decision of its own.
+    `guarded`: the states at or below it that the oracle repeats by no decision of its own. A
+    Concurrence or an Iterator whose plain states have oracles `has_branches`: it is no wrapped
+    container, and the oracle of each state knows that state alone.
     """
 
     path: str
-    machine: smach.StateMachine
+    machine: smach.Container
     initial: str
     outcomes: Tuple[str, ...]
     settings: Settings
@@ -51,13 +53,26 @@ class ContainerProspect(NamedTuple):
     recovers: bool
     states: Tuple[StateProspect, ...]
     guarded: Tuple[str, ...] = ()
+    has_branches: bool = False
 
 
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
     nodes = list(nodes_of(cast(WrappedMachine, machine)))
     decides = nodes[0].settings.budget.recoveries != 0  # the budget is that of the top
-    return [_container(node, decides) for node in nodes]
+    found: List[ContainerProspect] = []
+    for node in nodes:
+        prospect = _container(node, decides)
+        if prospect.has_branches and found and found[-1].machine is prospect.machine:
+            prospect = _joined(found.pop(), prospect)
+        found.append(prospect)
+    return found
+
+
+def _joined(one: ContainerProspect, other: ContainerProspect) -> ContainerProspect:
+    """Return the branches of one container as one."""
+    return one._replace(initial='{}, {}'.format(one.initial, other.initial),
+                        states=one.states + other.states, guarded=one.guarded + other.guarded)
 
 
 def good_outcome(container: smach.Container, settings: Settings) -> Optional[str]:
@@ -74,10 +89,13 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
 def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     machine: Any = node.machine
     initial = machine._initial_state_label or next(iter(node.labels()), '')
+    if node.branch is not None:
+        machine = node.branch.container
     return ContainerProspect(
         node.path, machine, initial, tuple(sorted(machine.get_registered_outcomes(), key=str)),
         node.settings, node.parent is None, node.tree.recover,
-        tuple(_state(node, label, decides) for label in node.labels()), tuple(_guarded(node)))
+        tuple(_state(node, label, decides) for label in node.labels()), tuple(_guarded(node)),
+        node.branch is not None)
 
 
 def _guarded(node: TreeNode) -> Iterator[str]:
@@ -101,6 +119,13 @@ def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
     route = route_of(node.machine, label, outcome)
     kind = failure_kind(outcome, route, settings.failure_outcomes, node.in_force.failing)
+    branch = node.branch
+    if branch is not None:
+        return OutcomeProspect(
+            outcome, Route(branch.leads_to(outcome), True),
+            kind is not FailureKind.NOT_A_FAILURE,
+            kind is not FailureKind.NOT_A_FAILURE and settings.author_recoveries != 'override'
+            and branch.foresees(node, outcome))
     return OutcomeProspect(
         outcome, route, kind is not FailureKind.NOT_A_FAILURE,
         author_recovers(outcome, route, kind, settings.failure_outcomes,

@@ -19,6 +19,7 @@ from smach_oracle.oracle.container import OracleContainer as BareContainer
 from smach_oracle.oracle.container import SettingsLike
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.health import HealthFunction
+from smach_oracle.oracle.settings.patterns import Nested
 from smach_oracle.oracle.settings.settings import Settings
 
 from .attachment import attachments
@@ -35,7 +36,7 @@ class _GivenSettings(NamedTuple):
 
     settings: Optional[Mapping[str, Any]]
     preconditions: PreconditionLists
-    nested: Optional[bool]
+    nested: Optional[Nested]
 
 
 _told: Set[str] = set()  # a script may build a machine for each trial
@@ -65,7 +66,7 @@ class OracleContainer(BareContainer):
 
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
-             settings: SettingsLike = None, nested: Optional[bool] = None, name: str = '',
+             settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
              expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
              health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put a machine under an oracle and return it: the same object.
@@ -126,7 +127,7 @@ def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> 
 
 
 def _remember(machine: BareContainer, settings: SettingsLike, preconditions: PreconditionLists,
-              nested: Optional[bool]) -> None:
+              nested: Optional[Nested]) -> None:
     if isinstance(settings, Settings):
         _given.pop(machine, None)
     else:

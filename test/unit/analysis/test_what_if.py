@@ -75,6 +75,35 @@ def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
         'not known'] == 0, 'preconditions that were not run are needed by nobody here'
 
 
+def test_so_it_is_of_the_branches_of_concurrences_and_iterators():
+    # each draws by itself, since the branches of a Concurrence run at once
+    left, right, each = (Chance(random.Random(seed), 0.5) for seed in (1, 2, 3))
+    concurrence = smach.Concurrence(['succeeded', 'aborted'], 'aborted', outcome_map={
+        'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
+    with concurrence:
+        smach.Concurrence.add('LEFT', left)
+        smach.Concurrence.add('RIGHT', right)
+    iterator = smach.Iterator(['succeeded', 'aborted'], [], [], it=[1, 2, 3], it_label='item',
+                              exhausted_outcome='succeeded')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', each, loop_outcomes=['succeeded'])
+    machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+    with machine:
+        smach.StateMachine.add('BOTH', concurrence, {'succeeded': 'ALL'})
+        smach.StateMachine.add('ALL', iterator)
+    OracleContainer.wrap(machine, name='TOP', expert=Hand(random.Random(4)),
+                         settings=dict(KEPT, prior=0.3))
+    events = []
+    machine.events.observers.append(events.append)
+    for _ in range(40):
+        machine.execute()
+    ids = list(dict.fromkeys(event.trial_id for event in events))
+    tried = what_if.compare([[event for event in events if event.trial_id == trial_id]
+                             for trial_id in ids], {})
+    assert sum(tried.counts.values()) > 20
+    assert tried.counts['same'] == sum(tried.counts.values())
+
+
 @pytest.mark.parametrize('settings', [
     {'on_retry': 'confirm'}, {'states': {'PICK': {'on_retry': 'never'}}},
     {'budget': {'recoveries': 1}}, {'budget': {'recoveries': 2, 'questions': 1}}])

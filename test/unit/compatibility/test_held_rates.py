@@ -28,7 +28,13 @@ def test_every_file_is_read():
 
 @pytest.mark.parametrize('number', range(len(HELD)), ids=NAMES)
 def test_a_file_gives_the_rates_that_it_gave(number):
-    assert not list(lacking(HELD[number], readings.rates(*readings.RATES_CASES[number])))
+    read = readings.rates(*readings.RATES_CASES[number])
+    # plain states of Concurrences have had rates only since: the file does not speak of them
+    held = [(state['path'], state['state']) for state in HELD[number]['states']]
+    since = [state for state in read['states'] if (state['path'], state['state']) not in held]
+    assert not any(state['failures'] or state['successes'] for state in since)
+    read['states'] = [state for state in read['states'] if state not in since]
+    assert not list(lacking(HELD[number], read))
 
 
 @pytest.mark.parametrize('case', HELD, ids=NAMES)

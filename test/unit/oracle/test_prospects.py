@@ -94,3 +94,31 @@ def test_a_good_outcome_is_no_failure_and_a_preempt_only_where_there_is_no_other
     assert good('aborted', 'preempted', 'some_failed', 'through') == 'through'
     assert good('aborted', 'preempted') == 'preempted'
     assert good('aborted', 'failed') is None
+
+
+def test_branches_are_told_with_where_their_outcomes_lead():
+    tour = smach.Iterator(OUTCOMES, [], [], it=[1, 2], it_label='item',
+                          exhausted_outcome='succeeded')
+    with tour:
+        smach.Iterator.set_contained_state('VISIT', Never(), loop_outcomes=['succeeded'])
+    both = smach.Concurrence(OUTCOMES, 'succeeded', outcome_map={
+        'aborted': {'LEFT': 'aborted'}, 'succeeded': {'RIGHT': 'aborted'}})
+    with both:
+        smach.Concurrence.add('LEFT', Never())
+        smach.Concurrence.add('RIGHT', Never())
+    top = smach.StateMachine(OUTCOMES)
+    with top:
+        smach.StateMachine.add('TOUR', tour, {'succeeded': 'BOTH'})
+        smach.StateMachine.add('BOTH', both)
+    settings = {'states': {'TOUR/*': {'memory': 3}, 'RIGHT': {'author_recoveries': 'keep'}}}
+    containers = prospects_of(OracleContainer.wrap(top, settings=settings, name='TOP'))
+    assert [(each.path, each.initial, each.has_branches, each.machine) for each in containers] == [
+        ('TOP', 'TOUR', False, top), ('TOP/TOUR', 'VISIT', True, tour),
+        ('TOP/BOTH', 'LEFT, RIGHT', True, both)]
+    states = {state.label: state for each in containers for state in each.states}
+    assert states['VISIT'].settings.memory == 3
+    assert outcome(states['VISIT'], 'succeeded').route.target == 'the next item'
+    assert outcome(states['VISIT'], 'aborted')[1:] == (
+        ('the end of the iteration, with aborted', True), True, False)
+    assert not outcome(states['LEFT'], 'aborted').author_recovers
+    assert outcome(states['RIGHT'], 'aborted').author_recovers, 'the map has foreseen it'

@@ -232,6 +232,26 @@ def test_a_signal_ends_the_check_of_a_script_that_sleeps(tmp_path, begin, number
     assert report.endswith('The check was ended by {}.\n'.format(number.name))
 
 
+def test_what_the_oracle_may_do_in_branches_is_told(check):
+    code, report, errors = check('''
+        top, tour = smach.StateMachine(['succeeded', 'aborted']), smach.Iterator(
+            ['succeeded', 'aborted'], [], [], it=[1, 2], it_label='item',
+            exhausted_outcome='succeeded')
+        with tour:
+            smach.Iterator.set_contained_state('VISIT', Runs(), loop_outcomes=['succeeded'])
+        with top:
+            smach.StateMachine.add('TOUR', tour)
+        top.execute()
+    ''', '{states: {TOUR/*: {memory: 3}}, nested: [TOUR/**], escalate: false}')
+    assert code == 0, errors
+    lines = [' '.join(line.split()) for line in report.splitlines()]
+    for line in ('TASK/TOUR begins at VISIT; ends in aborted, succeeded',
+                 'succeeded to the next item',
+                 'policy prose; each state is on its own, so that a step back is a retry',
+                 'set memory 3'):
+        assert line in lines, report
+
+
 def test_what_contains_machines_or_serves_them_is_not_executed_either(check):
     code, report, errors = check('''
         both = smach.Concurrence(['succeeded', 'aborted'], 'aborted')

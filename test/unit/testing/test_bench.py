@@ -209,8 +209,16 @@ def test_a_trial_that_does_not_end_says_how_far_it_came(for_good):
     assert not machine.is_running()
 
 
-def test_states_beside_each_other_are_seen_though_no_event_tells_of_them():
+def test_a_state_beside_another_recovers_by_itself():
     with Bench(concurrence_machine(), [crash('BOTH/PICK', visit=1)]) as bench:
+        trial = bench.run().assert_recovered('BOTH/PICK').assert_failed('BOTH/PICK', times=1)
+    assert trial.visits().count('BOTH/LOOK') == 1, 'the other one does not run again'
+    assert 'FAILS: exception (RuntimeError: a fault of this test)' in str(trial)
+
+
+def test_states_without_an_oracle_are_seen_though_no_event_tells_of_them():
+    with Bench(concurrence_machine(), [crash('BOTH/PICK', visit=1)],
+               settings={'nested': False}) as bench:
         trial = bench.run().assert_recovered('BOTH').assert_failed('BOTH/PICK', times=1)
     assert trial.visits().count('BOTH/LOOK') == 2
     assert 'raises RuntimeError: a fault of this test' in str(trial)

@@ -133,6 +133,8 @@ def _arrival(choice: StateChoice) -> Text:
         parts.append(Text('blocked: ' + clean(choice.blocked), 'bold #cc3333'))
     if choice.repeats:
         parts.append(Text('repeats: ' + _list(choice.repeats), 'bold #c77700'))
+    if choice.runs_again:
+        parts.append(Text('runs again: ' + _list(choice.runs_again), '#c77700'))
     if choice.missing_keys:
         parts.append(Text('missing: ' + _list(choice.missing_keys), 'bold #c77700'))
     if choice.preconditions:

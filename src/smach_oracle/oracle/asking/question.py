@@ -32,13 +32,15 @@ class StateChoice(NamedTuple):
     # themselves; its own label: going there repeats it
     repeats: Tuple[str, ...] = ()
     container: str = ''  # path of its container; '': that of the failed state
+    # of a Concurrence: the labels of its branches, which all run again
+    runs_again: Tuple[str, ...] = ()
 
 
 class OutcomeChoice(NamedTuple):
     """An outcome with which the failed state may be superseded, and where it leads."""
 
     outcome: str
-    target: str
+    target: str  # a state or a container outcome; of a branch: words for people
 
 
 class LevelOutcome(NamedTuple):

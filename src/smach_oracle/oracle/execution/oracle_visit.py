@@ -20,6 +20,7 @@ from ..recovery.recovery import Recovery
 from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
 from .departure import depart, leaving_outcome
+from .going_on import ask_to_go_on
 from .oracle_state import OracleState
 from .transitions import go_to, message_of, terminate
 
@@ -151,6 +152,7 @@ class OracleVisit:
             restore(self._machine.userdata._data, restores, verdict.written,
                     node.in_force.deep_copy_keys)
         leave_for(node, target, way.down[1:])
+        ask_to_go_on(node, target)
         if missing:
             place = way.down[-1]
             place.node.warn('jumping there without its input keys {}'.format(', '.join(missing)),

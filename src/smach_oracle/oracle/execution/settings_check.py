@@ -4,8 +4,10 @@ from typing import List, Set, Tuple
 import smach
 
 from ..errors import SettingsError
-from ..machine.nesting import nodes_of
+from ..machine.nesting import nodes_of, paths_below
 from ..machine.tree_node import TreeNode
+from ..settings.patterns import matches
+from ..settings.preconditions import PreconditionSpec
 
 
 def check_state_names(top: TreeNode) -> None:
@@ -15,9 +17,24 @@ def check_state_names(top: TreeNode) -> None:
     """
     known = _known_names(top)
     for key, name in _named_states(top):
-        if name not in known:
+        if name not in known and not any(matches(name, each) for each in known):
             _refuse(top, SettingsError(
                 key, name, 'the states of the machine: ' + ', '.join(sorted(known))))
+
+
+def check_nested(top: TreeNode) -> None:
+    """Check that each path or pattern of `nested` stands for something.
+
+    :raises SettingsError: where one does not; it is logged instead where the node is not strict.
+    """
+    if isinstance(top.nested, bool):
+        return
+    known = sorted(set(paths_below(top.machine)))
+    for name in top.nested:
+        if not any(matches(name, path) for path in known):
+            _refuse(top, SettingsError(
+                'nested', name, 'a path or a pattern of the machines in {}, and of the states of '
+                'its Concurrences and Iterators: {}'.format(top.path, ', '.join(known) or 'none')))
 
 
 def _known_names(top: TreeNode) -> Set[str]:
@@ -42,7 +59,7 @@ def check_preconditions(node: TreeNode) -> None:
     :raises SettingsError: where one does not; it is logged instead where the node is not strict.
     """
     for label in node.labels():
-        for spec in node.settings_of(label).preconditions:
+        for spec in _preconditions_of(node, label):
             for named in spec.labels():
                 if (named not in node.machine._states or named == label
                         or node.is_oracle(named)):
@@ -50,6 +67,15 @@ def check_preconditions(node: TreeNode) -> None:
                     _refuse(node, SettingsError(
                         'states.{}.preconditions'.format(label), named,
                         'the labels of the other states of {}: {}'.format(node.path, others)))
+
+
+def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:
+    if node.branch is None:
+        return node.settings_of(label).preconditions
+    # labels given for all states of this label are meant for others: none is beside a branch
+    path = '{}/{}'.format(node.relative_path, label)
+    given = node.settings.states.get(path, {}).get('preconditions')
+    return tuple(given or ())
 
 
 def _refuse(node: TreeNode, err: SettingsError) -> None:

@@ -30,6 +30,7 @@ from .arriving_visit import ArrivingVisit
 from .boundary import Stop, pass_boundary
 from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
+from .passed_over import tell_passed_over
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
@@ -257,6 +258,7 @@ class Step:
         record.learn(True)
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
+            tell_passed_over(node, failure)
             return self._end_unrecovered(self._natural_ending(failure), failure)
         if is_settled(node, record.label):
             return self._end_settled(failure)
@@ -284,6 +286,10 @@ class Step:
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings
+        branch = self._node.branch
+        if branch is not None:
+            return (failure.route is not None and settings.author_recoveries != 'override'
+                    and branch.foresees(self._node, failure.outcome))
         return failure.route is not None and author_recovers(
             failure.outcome, failure.route, failure.kind, settings.failure_outcomes,
             settings.author_recoveries)

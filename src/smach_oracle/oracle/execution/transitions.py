@@ -26,7 +26,8 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
             machine._preempted_state is not None or container_outcome == PREEMPTED):
         machine.service_preempt()
     machine._set_current_state(None)
-    smach.loginfo("State machine terminating '{}':'{}':'{}'".format(
-        label, outcome, container_outcome))
+    if node.branch is None:  # else its container tells
+        smach.loginfo("State machine terminating '{}':'{}':'{}'".format(
+            label, outcome, container_outcome))
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome

@@ -3,6 +3,7 @@ from typing import Any, cast
 
 import smach
 
+from ..branches.adopting import release_branches
 from ..errors import TrialError
 from ..machine.nesting import machines_below, nodes_of
 from ..machine.tree import Tree
@@ -41,6 +42,7 @@ def _strip(machine: WrappedMachine) -> None:
             _strip(wrapped)
         else:
             _stand_alone(wrapped)
+    release_branches(machine)
     machine._remove_oracle()
     remove_gates(cast(smach.StateMachine, machine))
     stripped: Any = machine

@@ -3,19 +3,21 @@ from typing import Any, cast
 
 import smach
 
+from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.protocols import Labels
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..settings.patterns import Nested
 from ..settings.settings import Settings
 from .item_gates import place_gates, remove_gates
-from .settings_check import check_preconditions, check_state_names
+from .settings_check import check_nested, check_preconditions, check_state_names
 from .wrapped_classes import change_class, two_classes
 
 
-def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: bool,
+def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: Nested,
                  name: str, strict: bool) -> WrappedMachine:
     """Wrap a machine and what is nested in it; see OracleContainer.wrap.
 
@@ -45,7 +47,8 @@ def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, sett
     return wrapped
 
 
-def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, strict: bool) -> None:
+def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
+                  strict: bool) -> None:
     top = machine._oracle
     top.strict = strict
     top.nested = nested
@@ -54,6 +57,7 @@ def _put_in_order(machine: WrappedMachine, settings: Settings, nested: bool, str
     for node in nodes_of(machine):
         node.strict = strict
     check_state_names(top)
+    check_nested(top)
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -78,7 +82,7 @@ def _configure(machine: WrappedMachine, settings: Settings) -> None:
             node.configure(settings)
 
 
-def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: bool, name: str,
+def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: Nested, name: str,
                 strict: bool) -> WrappedMachine:
     top = machine._oracle
     before = top.settings
@@ -109,6 +113,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
             container._remove_oracle()
             remove_gates(cast(smach.StateMachine, container))
             unwrapped: Any = container
+            release_branches(container)
             unwrapped.__class__ = made_of[1]
             del unwrapped.__dict__['_oracle']
 
@@ -119,14 +124,12 @@ def adopt(machine: WrappedMachine) -> None:
     :raises SettingsError: for a machine whose class cannot be extended.
     """
     parent = machine._oracle
+    adopt_branches(parent, _put_below)
     for below, child in machines_below(machine):
         if isinstance(child, parent.tree.container_class):
             container = cast(WrappedMachine, child)
-        elif parent.nested:
-            container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings,
-                                   '')
-            container._oracle.inherits = True
-            container._oracle.strict = parent.strict
+        elif parent.wraps(below):
+            container = _put_below(child, parent)
         else:
             continue
         node = container._oracle
@@ -134,6 +137,13 @@ def adopt(machine: WrappedMachine) -> None:
             _move_below(node, parent, below)
         node.nested = parent.nested
         adopt(container)
+
+
+def _put_below(child: smach.StateMachine, parent: TreeNode) -> WrappedMachine:
+    container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
+    container._oracle.inherits = True
+    container._oracle.strict = parent.strict
+    return container
 
 
 def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:

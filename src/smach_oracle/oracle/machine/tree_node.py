@@ -1,11 +1,13 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 import copy
+from dataclasses import replace
 from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, Tuple
 
 import smach
 
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
+from ..settings.patterns import Nested, is_nested_at
 from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
@@ -29,6 +31,12 @@ class WrappedMachine(Machine, Protocol):
     def _remove_oracle(self) -> None:
         """Take the ORACLE state out."""
 
+    def request_preempt(self) -> None:
+        """Ask it to stop."""
+
+    def _update_once(self) -> Optional[str]:
+        """Execute the current state and go on; return the container's outcome, None before it."""
+
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
 
@@ -41,14 +49,39 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
     return smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
 
 
+class BranchPort(Protocol):
+    """What a node asks where its machine is the hidden one of a branch (`branches.branch`)."""
+
+    @property
+    def container(self) -> smach.Container:
+        """The Concurrence or Iterator that holds it."""
+
+    def settings_here(self, settings: Settings) -> Settings:
+        """Return the settings of the whole machine as they are in force for the branch."""
+
+    def foresees(self, node: 'TreeNode', outcome: str) -> bool:
+        """Whether the author has said what is to happen at this failing outcome."""
+
+    def leads_to(self, outcome: str) -> str:
+        """Say where an outcome leads, for people."""
+
+    def goes_on_after(self, outcome: str) -> bool:
+        """Whether an outcome leads to the next item."""
+
+    def passes_over(self, outcome: str) -> str:
+        """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
     `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
     that lead here from the parent, those of a Concurrence or Iterator in between included.
     `in_force`: its settings. `records`: what it has learned and remembers. `engine`: how its engine
-    steps.
+    steps. `branch`: of a plain state of a Concurrence or an Iterator, else None.
     """
+
+    branch: Optional[BranchPort] = None
 
     def __init__(self, machine: WrappedMachine, tree: Tree, settings: Settings, name: str) -> None:
         self.machine = machine
@@ -57,7 +90,7 @@ class TreeNode:
         self.is_named = bool(name)
         self.name = name or DEFAULT_NAME
         self.strict = True
-        self.nested = True
+        self.nested: Nested = True
         self.inherits = False  # wrapped for being nested: under the settings of the top machine
         self.in_force = ContainerSettings(settings)
         self.records = ContainerRecords(settings.history_length)
@@ -140,6 +173,11 @@ class TreeNode:
             node = node.parent
         return tuple(found)
 
+    def wraps(self, below: Labels) -> bool:
+        """Whether what these labels below this container lead to has an oracle of its own."""
+        above = self.relative_path
+        return is_nested_at(self.nested, '/'.join(((above,) if above else ()) + below))
+
     # -- settings and states
 
     @property
@@ -149,7 +187,8 @@ class TreeNode:
 
     def configure(self, settings: Settings) -> None:
         """Go on under these settings with what was learned."""
-        self.in_force.use(settings)
+        self.in_force.use(settings if self.branch is None
+                          else self.branch.settings_here(settings))
         self.records.history.resize(settings.history_length)
         self.checked_states = -1
         for label, record in self.records.by_label.items():
@@ -157,7 +196,12 @@ class TreeNode:
 
     def settings_of(self, label: str) -> StateSettings:
         """Return the settings of a state."""
-        return self.in_force.of_state(self.relative_path, label)
+        settings = self.in_force.of_state(self.relative_path, label)
+        if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
+            return settings
+        # beside a branch is no state that could be run for it
+        return replace(settings, preconditions=tuple(
+            spec for spec in settings.preconditions if not spec.labels()))
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""

@@ -1,5 +1,5 @@
 """What a state reads and writes: the container's userdata by the state's own key names."""
-from typing import Any, Collection, Iterable, Mapping, Tuple
+from typing import Any, Collection, Iterable, Mapping, Tuple, cast
 
 import smach
 
@@ -28,6 +28,8 @@ def view_of(machine: Machine, label: str, state: smach.State,
 
     `label` is '' for a state that is not in the machine.
     """
+    if label and getattr(machine, 'hands_on_userdata', False):
+        return cast(smach.Remapper, userdata)  # as an Iterator does
     remapping = machine._remappings.get(label) or {} if label else {}
     return smach.Remapper(userdata, state.get_registered_input_keys(),
                           state.get_registered_output_keys(), remapping)
@@ -66,7 +68,8 @@ class StateView:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
         self.state = None  # what no state is: made for one visit
-        if _KEEPS_KEY_SETS and _has_plain_keys(state):
+        if (_KEEPS_KEY_SETS and _has_plain_keys(state)
+                and not getattr(machine, 'hands_on_userdata', False)):
             self.state = state
             self.input_keys, self.output_keys = state._input_keys, state._output_keys
             self.remapper = smach.Remapper(machine.userdata, self.input_keys, self.output_keys,

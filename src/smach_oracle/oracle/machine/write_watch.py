@@ -51,6 +51,9 @@ class WriteWatch:
         Objects that were changed inside stay changed, but for the deep-copied keys.
         """
         data = self._machine.userdata._data
+        if getattr(self._machine, 'shares_userdata', False):
+            self._take_back_own(begun)
+            return
         for key, value in begun.data.items():
             if key in begun.prints and fingerprint(value) != begun.prints[key]:
                 if self._before.get(key) is value and self._prints.get(key) == begun.prints[key]:
@@ -59,6 +62,16 @@ class WriteWatch:
             data[key] = value
         for key in set(data).difference(begun.data):
             del data[key]
+        self.gate.written.intersection_update(begun.written)
+
+    def _take_back_own(self, begun: UserdataMark) -> None:
+        """Take back what passed the gate alone: others write the userdata at the same time."""
+        data = self._machine.userdata._data
+        for key in self.gate.written.difference(begun.written):
+            if key in begun.data:
+                data[key] = begun.data[key]
+            else:
+                data.pop(key, None)
         self.gate.written.intersection_update(begun.written)
 
     def written(self) -> Set[str]:

@@ -26,7 +26,7 @@ def _executes(above: TreeNode, child: TreeNode) -> bool:
 
 def is_direct(node: TreeNode) -> bool:
     """Whether nothing lies between a container and the wrapped one above it."""
-    return node.parent is not None and len(node.below) == 1
+    return node.parent is not None and len(node.below) == 1 and node.branch is None
 
 
 def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:

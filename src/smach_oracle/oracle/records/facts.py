@@ -4,12 +4,13 @@ Bags that were recorded before events carried them tell the same by the words of
 are known here and nowhere else. Pure; no smach.
 """
 from enum import Enum
-from typing import Any, Mapping, Optional
+from typing import Any, Mapping, Optional, Tuple
 
 from .events import NO_OUTCOME, Event
 
 DECIDED_BY = 'decided_by'  # key in the data of DECISION
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
+BRANCHES = 'branches'  # key in the data of CONTAINER_START: states that have oracles of their own
 # key in the data of TRANSITION: true where it says nothing of how good the state is
 NOT_COUNTED = 'not_counted'
 # fields of such a TRANSITION: the author's own, from a failure while the robot was not well
@@ -66,6 +67,12 @@ def ended_by(event: Event, entered_a_state: bool) -> TrialEnd:
     if event.text == NO_OUTCOME:
         return TrialEnd.SHUTDOWN if entered_a_state else TrialEnd.INCONSISTENT
     return TrialEnd.OUTCOME if event.outcome else TrialEnd.ERROR
+
+
+def branches_of(event: Event) -> Tuple[str, ...]:
+    """Return the states of a container that just began, where each has an oracle of its own."""
+    stated = _stated(event, BRANCHES)
+    return tuple(map(str, stated)) if isinstance(stated, (list, tuple)) else ()
 
 
 def is_counted(event: Event) -> bool:

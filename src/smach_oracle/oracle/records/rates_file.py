@@ -41,7 +41,10 @@ class Learner(Protocol):
 
 def learned_by(containers: Iterable[Learner]) -> Dict[str, Dict[str, Any]]:
     """Return what was learned, as the "containers" of a rates file."""
-    return {container.relative_path: container.learned_rates() for container in containers}
+    learned: Dict[str, Dict[str, Any]] = {}
+    for container in containers:  # the branches of a Concurrence have one path, each a state of it
+        learned.setdefault(container.relative_path, {}).update(container.learned_rates())
+    return learned
 
 
 def write_rates(path: str, learners: Iterable[Learner]) -> None:

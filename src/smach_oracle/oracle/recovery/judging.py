@@ -4,6 +4,7 @@ from typing import Any, NamedTuple, Optional, Union
 
 import smach
 
+from ..machine.nesting import items_under_way
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..records.state_record import StateRecord
@@ -34,6 +35,15 @@ class HeldBack(NamedTuple):
 def judge(node: TreeNode, record: StateRecord, outcome: Any,
           error: Optional[Exception]) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
+    judged = _judge(node, record, outcome, error)
+    if isinstance(judged, Route):
+        return judged
+    items = items_under_way(node)
+    return judged._replace(text='; '.join(filter(None, (judged.text, items)))) if items else judged
+
+
+def _judge(node: TreeNode, record: StateRecord, outcome: Any,
+           error: Optional[Exception]) -> Union[Route, Failure]:
     machine = node.machine
     label, state = record.label, machine._states[record.label]
     if error is not None:
@@ -46,6 +56,10 @@ def judge(node: TreeNode, record: StateRecord, outcome: Any,
         return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
     if outcome not in state.get_registered_outcomes():
         text = unregistered_text(label, state, outcome)
+        if node.branch is not None and isinstance(outcome, str):
+            # Concurrences and Iterators go on with such an outcome
+            return Failure(label, FailureKind.UNREGISTERED_OUTCOME, outcome, text,
+                           Route(outcome, False))
         return Failure(label, FailureKind.UNREGISTERED_OUTCOME,
                        outcome if isinstance(outcome, str) else '', text, None,
                        partial(smach.InvalidTransitionError, text))

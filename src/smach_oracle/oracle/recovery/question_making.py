@@ -11,6 +11,7 @@ from ..places.levels import levels_above
 from ..places.place import places_of
 from ..places.way import Way, missing_on, repeated_on, way_to, why_closed_on
 from ..records.state_record import StateRecord
+from .branch_choices import outcomes_of_branch, running_again
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
 
@@ -37,7 +38,8 @@ def make_question(node: TreeNode, record: StateRecord, failure: Failure, account
         rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
         reason=account.reason, tried=account.tried, history=node.records.history.latest(),
         choices=tuple(_state_choices(node, account.written)),
-        supersede_outcomes=tuple(_supersede_outcomes(machine, record.label, state)),
+        supersede_outcomes=(outcomes_of_branch(node, state)
+                            or tuple(_supersede_outcomes(machine, record.label, state))),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
         give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
         interfaces=node.settings.offers_for(node.relative_path, record.label),
@@ -73,7 +75,8 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             label, 1.0 - record.rate, int(record.failure_class), record.visits,
             missing_on(way, () if way.left else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed_on(way), repeated_on(way), container)
+            why_closed_on(way), repeated_on(way), container,
+            running_again(way.down[-1].node, label))
 
 
 def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:

@@ -16,6 +16,7 @@ from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
+from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
@@ -74,7 +75,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
                                    _MAX_HISTORY),
     'rates_file': values.file,
     'oracle_label': values.label,
-    'nested': values.flag,
+    'nested': checked_nested,
     'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
 }
 
@@ -83,7 +84,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
 class Settings:
     """Settings of a wrapped machine.
 
-    `states` holds what is set for single states, by LABEL or PATH/LABEL.
+    `states` holds what is set for single states, by LABEL or PATH/LABEL, or by a pattern of them.
     """
 
     defaults: StateSettings = StateSettings()
@@ -99,7 +100,8 @@ class Settings:
     history_length: int = 50  # visits
     rates_file: str = ''
     oracle_label: str = 'ORACLE'
-    nested: bool = True
+    # whether, or at which paths (patterns), containers and branches have oracles of their own
+    nested: Nested = True
     # offer, states it serves ((): all)
     interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()
     states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -138,11 +140,13 @@ class Settings:
     def for_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state.
 
-        `path`: of its container, relative to the top machine, '' for that itself.
+        `path`: of its container, relative to the top machine, '' for that itself. Where several
+        names of `states` stand for it, the most exact one wins.
         """
-        merged: Dict[str, Any] = dict(self.states.get(label, {}))
-        if path:
-            merged.update(self.states.get('{}/{}'.format(path, label), {}))
+        full = '{}/{}'.format(path, label) if path else label
+        merged: Dict[str, Any] = {}
+        for name in sorted((name for name in self.states if matches(name, full)), key=exactness):
+            merged.update(self.states[name])
         return replace(self.defaults, **merged) if merged else self.defaults
 
     def with_states(self, states: Mapping[str, Mapping[str, Any]],
@@ -159,9 +163,9 @@ class Settings:
 
     def offers_for(self, path: str, label: str) -> Tuple[InterfaceOffer, ...]:
         """Return the shared-autonomy interfaces on offer for a state."""
-        names = (label, '{}/{}'.format(path, label) if path else label)
+        full = '{}/{}'.format(path, label) if path else label
         return tuple(offer for offer, states in self.interfaces
-                     if not states or any(name in states for name in names))
+                     if not states or any(matches(name, full) for name in states))
 
 
 def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
@@ -180,7 +184,7 @@ def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:
 
 def _checked_state(name: str, overrides: object, defaults: StateSettings,
                    resolver: Optional[Resolver]) -> Dict[str, Any]:
-    prefix = 'states.{}.'.format(name)
+    prefix = 'states.{}.'.format(check_name('states', name))
     overrides = values.mapping(prefix[:-1], overrides)
     _refuse_unknown(prefix, overrides, sorted(list(_STATE_CHECKS) + ['preconditions']))
     checked = {

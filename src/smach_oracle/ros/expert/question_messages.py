@@ -43,7 +43,7 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
                 StateChoice(choice.state, choice.predicted_success,
                             int(choice.failure_class), choice.visits, list(choice.missing_keys),
                             list(choice.preconditions), choice.blocked, list(choice.repeats),
-                            choice.container)
+                            choice.container, list(choice.runs_again))
                 for choice in question.choices
             ], supersede_outcomes=[
                 OutcomeChoice(choice.outcome, choice.target)

@@ -54,8 +54,10 @@ def _heading(container: ContainerProspect) -> List[str]:
     if not container.is_top and settings.escalate:
         lines += wrapped('To ask means: the oracle of the machine around it takes over.', 2)
         return lines
-    lines += _entry('policy', '{}; a step back leads to an earlier state, to {} where none has '
-                    'succeeded'.format(settings.policy, container.initial), 2)
+    back = ('each state is on its own, so that a step back is a retry' if container.has_branches
+            else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
+                container.initial))
+    lines += _entry('policy', '{}; {}'.format(settings.policy, back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
     lines += _entry('set', ', '.join(_changed(settings, Settings(), _PARTS) +

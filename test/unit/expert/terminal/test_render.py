@@ -32,8 +32,10 @@ def shown(renderable, width=100, colours=False):
 
 def test_what_would_come_again_is_shown_with_the_choice():
     text = shown(render.question(goal(choices=(
-        StateChoice('DETECT', 0.5, 1, 0, (), (), repeats=('POUR', 'ARM/CUT')),)), 1.0))
+        StateChoice('DETECT', 0.5, 1, 0, (), (), repeats=('POUR', 'ARM/CUT'),
+                    runs_again=('LEFT', 'RIGHT')),)), 1.0))
     assert 'repeats: POUR, ARM/CUT' in text
+    assert 'runs again: LEFT, RIGHT' in text
 
 
 @pytest.mark.parametrize('width', [80, 140])

@@ -56,6 +56,7 @@ def _choices(goal: ExpertQueryGoal,
         'class': choice.failure_class, 'visits': choice.visits,
         'missing': list(choice.missing_keys), 'preconditions': list(choice.preconditions),
         'blocked': choice.blocked, 'repeats': list(choice.repeats),
+        'runs_again': list(choice.runs_again),
         'helped': [0, 0] if choice.container else list(recovery_counts(choice.state))
     } for choice in goal.choices]
 

@@ -48,9 +48,11 @@ def test_a_question_is_told_whole():
 
 
 def test_a_question_says_what_would_come_again_and_that_nothing_failed():
-    choices = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT')),)
+    choices = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT'),
+                           runs_again=('LEFT',)),)
     held_back = view(failure_kind=FailureKind.HELD_BACK, choices=choices)
     assert held_back['choices'][0]['repeats'] == ['POUR', 'ARM/CUT']
+    assert held_back['choices'][0]['runs_again'] == ['LEFT']
     assert (held_back['stands'], held_back['what']) == ('is held back', 'was not executed')
     assert view()['stands'] == 'failed' and view()['choices'][0]['repeats'] == []
 

@@ -111,6 +111,7 @@ export interface StateChoice {
   preconditions: string[];
   blocked: string; // why; '' where it is not
   repeats: string[]; // states that are not repeated by themselves
+  runs_again: string[]; // branches of a Concurrence, which all run again
   helped: [helped: number, tried: number]; // how often going there helped
 }
 

@@ -60,12 +60,15 @@ function successBar(success) {
  */
 function stateChips(choice, failed) {
   const { class: rank, blocked, repeats, missing, visits, helped: [helped, tried] } = choice;
+  const again = choice.runs_again;
   const words = FAILURE_CLASSES[rank];
   return [
     words && chip(words, 'class-' + rank),
     blocked && chip('blocked: ' + blocked, 'bad'),
     repeats.length > 0 && chip('repeats: ' + repeats.join(', '), 'warn',
       'Done in this trial, and not repeated by itself'),
+    again.length > 0 && chip('runs again: ' + again.join(', '), 'warn',
+      'All branches of a Concurrence run again'),
     missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
       'Userdata that it needs and would not have'),
     visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),

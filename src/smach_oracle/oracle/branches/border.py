@@ -1,0 +1,264 @@
+"""Concurrences and Iterators of a wrapped tree: their branches, and where an Iterator goes on."""
+import threading
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, cast
+
+import smach
+
+from ..machine.tree_node import TreeNode, WrappedMachine
+from ..records.events import NO_OUTCOME, EventKind
+from ..records.facts import BRANCHES
+from ..settings.failing_outcomes import is_preempted
+from .branch import loops
+from .branch_machine import BranchMachine
+from .items import TrackedItems
+from .stand_in import StandIn, real
+
+
+class Border:
+    """What is kept beside a Concurrence or an Iterator of a wrapped tree.
+
+    `machines`: the hidden machines of its branches, by label. It takes their states' places while
+    the container executes, once at a time.
+    """
+
+    def __init__(self, container: smach.Container) -> None:
+        self.container: Any = container
+        self.machines: Dict[str, WrappedMachine] = {}
+        self.top: Optional[TreeNode] = None  # the node of the wrapped machine around it
+        self.below: Tuple[str, ...] = ()  # labels that lead to it from there
+        self._lock = threading.Lock()
+        self._is_in_use = False
+
+    def in_words(self) -> str:
+        """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
+        return ''
+
+    def nodes(self) -> List[TreeNode]:
+        """Return the nodes of its branches."""
+        return [machine._oracle for machine in self.machines.values()]
+
+    def enter(self) -> bool:
+        """Put the branches in their places; False where that cannot be, so that it runs bare."""
+        with self._lock:
+            nodes = self.nodes()
+            if self._is_in_use or not self._runs_in_tree():
+                return False
+            self._is_in_use = True
+        for node in nodes:
+            self._renew(node)
+            node.begin_execution()
+        if nodes:
+            nodes[0].emit(EventKind.CONTAINER_START, state=', '.join(self.machines),
+                          data={BRANCHES: list(self.machines)})
+        self._take_places()
+        return True
+
+    def _runs_in_tree(self) -> bool:
+        top = self.top
+        return top is not None and (top.machine._is_running or top.has_running_ancestor())
+
+    def _renew(self, node: TreeNode) -> None:
+        machine = cast(BranchMachine, node.machine)
+        label = machine._branch_label
+        machine.take(self._state_of(label), self.container.userdata, self._remapping_of(label))
+
+    def ended(self, outcome: object, error: Optional[BaseException]) -> None:
+        """Tell that the container has ended, with an outcome or an error."""
+        nodes = self.nodes()
+        if nodes:
+            why = ('{}: {}'.format(type(error).__name__, error) if error is not None
+                   else NO_OUTCOME if outcome is None else '')
+            nodes[0].emit(EventKind.CONTAINER_END, text=why,
+                          outcome=outcome if isinstance(outcome, str) else '')
+
+    def leave(self) -> None:
+        """Give the states their places back."""
+        self._give_places_back()
+        with self._lock:
+            self._is_in_use = False
+
+    def states(self) -> Iterator[Tuple[str, smach.State]]:
+        """Yield the user's states by label."""
+        children: Mapping[str, Optional[smach.State]] = self.container.get_children()
+        yield from ((label, state) for label, state in list(children.items()) if state is not None)
+
+    def _state_of(self, label: str) -> smach.State:
+        return dict(self.states())[label]
+
+    def _remapping_of(self, label: str) -> Mapping[str, str]:
+        raise NotImplementedError
+
+    def _take_places(self) -> None:
+        raise NotImplementedError
+
+    def _give_places_back(self) -> None:
+        raise NotImplementedError
+
+    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
+        """Return the attributes of its container for a copy, as they are while it is at rest."""
+        raise NotImplementedError
+
+    def __getstate__(self) -> Dict[str, Any]:
+        state = dict(self.__dict__, _is_in_use=False)
+        del state['_lock']
+        return state
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.Lock()
+
+
+class ConcurrenceBorder(Border):
+    """Beside a Concurrence."""
+
+    _own: Optional[Dict[str, Any]] = None  # its table of states, while another has its place
+
+    def _remapping_of(self, label: str) -> Mapping[str, str]:
+        return self.container._remappings[label]
+
+    def _take_places(self) -> None:
+        own = self._own = self.container._states
+        self.container._states = {
+            label: StandIn(state, self.machines[label], _forget) if label in self.machines
+            else state for label, state in own.items()}
+
+    def _give_places_back(self) -> None:
+        self.container._states, self._own = self._own, None
+
+    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
+        """Return the attributes of its container for a copy, as they are while it is at rest."""
+        return attributes if self._own is None else dict(attributes, _states=self._own)
+
+    def __getstate__(self) -> Dict[str, Any]:
+        return dict(super().__getstate__(), _own=None)
+
+
+class IteratorBorder(Border):
+    """Beside an Iterator."""
+
+    def __init__(self, container: smach.Container) -> None:
+        super().__init__(container)
+        self._items: Optional[TrackedItems] = None
+        self._trial_id = ''  # that of `_items`
+        self._begun: Dict[str, Any] = {}  # what its io keys were when it began
+        self._ended_with: Optional[str] = None  # None: an error, or it was left
+        self._is_asked_to_go_on = False
+        self.goes_on = False
+
+    def in_words(self) -> str:
+        """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
+        return self._items.in_words() if self._is_in_use and self._items is not None else ''
+
+    # -- going on
+
+    def ask_to_go_on(self, go_on: bool) -> None:
+        """Let the next execution go on where the one before has stopped, or begin anew."""
+        self._is_asked_to_go_on = go_on
+
+    def outcome_before(self) -> Optional[str]:
+        """Return how the execution before has ended; None: by an error, or it was left."""
+        return self._ended_with
+
+    def _remapping_of(self, label: str) -> Mapping[str, str]:
+        return {}
+
+    def _take_places(self) -> None:
+        iterator = self.container
+        items, trial_id = self._items, self._trial_now()
+        may = (self._is_asked_to_go_on and items is not None and items.given is iterator._items
+               and trial_id == self._trial_id)
+        self._is_asked_to_go_on = False
+        if items is None or items.given is not iterator._items:
+            items = TrackedItems(iterator._items, self._tell)
+        self.goes_on = items.goes_on = may and items.has_rest()
+        if self.goes_on:
+            self._pass_on(dict(self.states()))
+        self._items, self._trial_id, self._ended_with = items, trial_id, None
+        iterator._items = items
+        state = iterator._state
+        if state is not None:
+            iterator._state = StandIn(state, self.machines.get(iterator._state_label),
+                                      self._note_outcome)
+
+    def _pass_on(self, states: Mapping[str, smach.State]) -> None:
+        """Let an Iterator directly inside go on too: its items belong to the unfinished one."""
+        for state in states.values():
+            inner = border_of(state)
+            if isinstance(inner, IteratorBorder) and self._items is not None:
+                inner.ask_to_go_on(not self._items.is_finished)
+
+    def _trial_now(self) -> str:
+        return self.top.tree.trial_id if self.top is not None else ''
+
+    def _tell(self, text: str) -> None:
+        label = self.container._state_label
+        if self.top is None:
+            smach.logwarn('{}: {}'.format(label, text))
+        else:
+            smach.logwarn('{}/{}: {}'.format(self.top.path, '/'.join(self.below), text))
+
+    def _note_outcome(self, outcome: object) -> None:
+        if self._items is not None and isinstance(outcome, str):
+            self._items.is_finished = (loops(self.container, outcome)
+                                       and not is_preempted(outcome))
+
+    def ended(self, outcome: object, error: Optional[BaseException]) -> None:
+        """Tell that the container has ended, with an outcome or an error."""
+        self._ended_with = outcome if isinstance(outcome, str) else None
+        super().ended(outcome, error)
+
+    def _give_places_back(self) -> None:
+        iterator = self.container
+        if iterator._items is self._items and self._items is not None:
+            iterator._items = self._items.given
+        iterator._state = real(iterator._state)
+
+    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
+        """Return the attributes of its container for a copy, as they are while it is at rest."""
+        items = attributes.get('_items')
+        return dict(attributes, _state=real(attributes.get('_state')),
+                    _items=items.given if isinstance(items, TrackedItems) else items)
+
+    def __getstate__(self) -> Dict[str, Any]:
+        return dict(super().__getstate__(), _items=None, _begun={}, _ended_with=None,
+                    _is_asked_to_go_on=False)
+
+    # -- userdata
+
+    def keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
+        """Return what finished items have left under keys that are inputs and outputs.
+
+        Where it goes on, and the container above has the value again with which it began, what
+        finished items made of it stays. `userdata`: what its inputs are copied from.
+        """
+        iterator = self.container
+        both = set(iterator.get_registered_input_keys()).intersection(
+            iterator.get_registered_output_keys())
+        given = {key: userdata[key] for key in both if key in userdata} if (
+            userdata is not None) else {}
+        own = iterator.userdata._data
+        if self.goes_on:
+            return {key: own[key] for key, value in given.items()
+                    if key in own and key in self._begun and _same(self._begun[key], value)}
+        self._begun = given
+        return {}
+
+
+def border_of(state: object) -> Optional[Border]:
+    """Return what is kept beside a Concurrence or an Iterator; None for anything else."""
+    border = getattr(state, '_oracle_border', None)
+    return border if isinstance(border, Border) else None
+
+
+def _same(one: object, other: object) -> bool:
+    if one is other:
+        return True
+    try:
+        return type(one) is type(other) and bool(one == other)
+    except Exception:  # whatever a user's object raises, or an array that is no truth
+        return False
+
+
+def _forget(outcome: object) -> None:
+    """Nobody needs to know with what a branch has ended."""
+

@@ -1,0 +1,136 @@
+"""What an Iterator goes through, with a memory of how far it has come."""
+from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
+
+Tell = Callable[[str], None]
+Items = Union[Iterable[object], Callable[[], Iterable[object]]]
+
+
+class TrackedItems:
+    """Stands in for what an Iterator was given, while it executes.
+
+    An Iterator asks it for an iterator when it begins, and for one item after the other. With
+    `goes_on` set, the next time it goes on with the item that was not finished. To whoever looks at
+    it otherwise it is what the Iterator was given.
+    """
+
+    def __init__(self, given: Items, tell: Tell) -> None:
+        """`given`: an iterable, or a callable that returns one; `tell` takes words for the log."""
+        self.given = given
+        self.goes_on = False
+        self.number = 0  # of the item under way, from 1; 0: none
+        self.is_finished = True  # the item under way
+        self.is_exhausted = False
+        self._tell = tell
+        self._count: Optional[int] = None
+        self._items: Optional[Iterator[object]] = None
+        self._item: object = None
+        self._error: Optional[Exception] = None
+        self._is_pending = False  # whether the item under way is handed out once more
+
+    def has_rest(self) -> bool:
+        """Whether it has begun and items may be left, the unfinished one among them."""
+        return bool(self.number) and not self.is_exhausted
+
+    def in_words(self) -> str:
+        """Return 'item 2 of 4', without the count where nobody knows it; '' before the first."""
+        if not self.number:
+            return ''
+        count = self._count
+        if count is None or count < self.number:
+            return 'item {}'.format(self.number)
+        return 'item {} of {}'.format(self.number, count)
+
+    def __iter__(self) -> 'TrackedItems':
+        if self.goes_on and self.has_rest():
+            self._go_on()
+        else:
+            self._begin()
+        self.goes_on = False
+        return self
+
+    def _begin(self) -> None:
+        source = self._source()
+        had_begun = self._items is not None
+        self._items = iter(source)
+        if had_begun and self._items is source:
+            self._tell('what it goes through can be iterated only once, and that was begun before; '
+                       'it goes on where that has ended')
+        self._count = len(source) if isinstance(source, Sized) else None
+        self.number, self.is_finished, self.is_exhausted = 0, True, False
+        self._is_pending, self._error = False, None
+
+    def _source(self) -> Iterable[object]:
+        return self.given() if callable(self.given) else self.given
+
+    def _go_on(self) -> None:
+        """Hand out the unfinished item once more, and those that have not come yet after it."""
+        self._look_for_changes()
+        if self._error is not None:
+            self._begin_behind_finished()
+        self._is_pending = not self.is_finished
+        self._tell('goes on {} {}'.format('behind' if self.is_finished else 'with',
+                                          self.in_words()))
+
+    def _look_for_changes(self) -> None:
+        if callable(self.given) or not isinstance(self.given, Sized):
+            return
+        count = len(self.given)
+        if count != self._count:
+            self._tell('what it goes through has changed: it had {} items, and has {}'.format(
+                self._count, count))
+            self._count = count
+
+    def _begin_behind_finished(self) -> None:
+        """After an error in getting an item: get the items anew, and pass over those handed out.
+
+        :raises Exception: the same error, where they can be got only once.
+        """
+        source = self._source()
+        items = iter(source)
+        if items is source:
+            self._tell('what it goes through can be iterated only once, and has raised an error')
+            raise cast(Exception, self._error)
+        self._items, self._error = items, None
+        for _ in range(self.number):
+            next(self._items, None)
+
+    def __next__(self) -> object:
+        if self._is_pending:
+            self._is_pending = False
+            return self._item
+        try:
+            item = next(cast(Iterator[object], self._items))
+        except StopIteration:
+            self.is_exhausted = True
+            raise
+        except Exception as err:
+            self._error = err
+            self.is_finished = True  # the one before
+            self._tell('cannot get the item behind {}: {!r}'.format(
+                self.in_words() or 'the beginning', err))
+            raise
+        self._item, self.is_finished = item, False
+        self.number += 1
+        return item
+
+    # -- to others it is what was given
+
+    def __len__(self) -> int:
+        return len(cast(Sized, self.given))
+
+    def __getitem__(self, index: Any) -> Any:
+        return cast(Any, self.given)[index]
+
+    def __bool__(self) -> bool:
+        return bool(self.given)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith('_') or name == 'given':
+            raise AttributeError(name)
+        return getattr(self.given, name)
+
+    def __repr__(self) -> str:
+        return repr(self.given)
+
+    def __str__(self) -> str:
+        return str(self.given)

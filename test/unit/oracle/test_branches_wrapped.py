@@ -1,0 +1,202 @@
+"""Concurrences and Iterators of a wrapped tree stay what their user holds."""
+import copy
+import pickle
+
+import pytest
+from branch_machines import Item, both, inside, iterator_over
+from machines import FakeExpert, Scripted, Watched, goto
+
+import smach
+from smach_oracle.oracle import OracleContainer, unwrap
+from smach_oracle.oracle.records.events import EventKind
+
+ASKS = {'max_recoveries': 0, 'escalate': False}
+
+
+class Held(smach.State):
+    """A state with an attribute of its own, which can be pickled."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['ok', 'aborted', 'preempted'])
+        self.answer = 42
+        self.runs = 0
+
+    def execute(self, ud):
+        self.runs += 1
+        return 'aborted' if self.runs == 1 else 'ok'
+
+
+class MyConcurrence(smach.Concurrence):
+    """A class of a user's."""
+
+    def hello(self):
+        return sorted(self._states)
+
+
+def test_the_handles_stay_the_users_objects_at_rest_and_while_it_runs():
+    seen = []
+    held = Held()
+
+    def looks(state, ud):
+        seen.append((concurrence['LEFT'], concurrence.get_children()['LEFT'],
+                     concurrence.get_active_states(), concurrence.get_initial_states()))
+        seen.append(isinstance(concurrence._states['LEFT'], Held))
+        seen.append(concurrence._states['LEFT'].answer)
+        return 'ok'
+    concurrence = both(held, Scripted(looks))
+    machine = Watched(inside(concurrence))
+    assert isinstance(concurrence, smach.Concurrence)
+    assert type(concurrence).__name__ == 'Concurrence'
+    assert concurrence['LEFT'] is held and concurrence.get_children() is concurrence._states
+    assert machine.run() == 'done'
+    (item, child, active, initial), is_held, answer = seen
+    assert item is held and child is held and is_held and answer == 42
+    assert 'RIGHT' in active and set(initial) == {'LEFT', 'RIGHT'}
+    assert concurrence._states['LEFT'] is held and type(held) is Held
+
+
+def test_the_handles_of_an_iterator_stay_too():
+    seen = []
+
+    def looks(state, ud):
+        seen.append((iterator['EACH'], iterator.get_children(), iterator.get_active_states(),
+                     list(iterator._items), len(iterator._items)))
+        return 'ok'
+    each = Item(item1=[looks])
+    items = [1, 2]
+    iterator = iterator_over(each, items=items)
+    machine = Watched(inside(iterator))
+    assert machine.run() == 'done'
+    assert seen == [(each, {'EACH': each}, ['EACH'], [1, 2], 2)]
+    assert iterator._items is items and iterator._state is each
+
+
+def test_a_class_of_the_users_keeps_its_methods():
+    concurrence = MyConcurrence(outcomes=['done', 'aborted'], default_outcome='done')
+    left = Scripted('aborted')
+    with concurrence:
+        smach.Concurrence.add('LEFT', left)
+    machine = Watched(inside(concurrence))
+    assert concurrence.hello() == ['LEFT'] and isinstance(concurrence, MyConcurrence)
+    assert machine.run() == 'done' and left.runs == 2
+
+
+@pytest.mark.parametrize('make', [
+    lambda left: both(left, Scripted()), lambda left: iterator_over(left, items=[1, 2])],
+    ids=['concurrence', 'iterator'])
+def test_unwrapped_it_is_as_before(make):
+    left = Scripted('aborted', 'aborted')
+    container = make(left)
+    before = type(container)
+    attributes = set(vars(container))
+    machine = inside(container)
+    OracleContainer.wrap(machine)
+    assert type(container) is not before
+    unwrap(machine)
+    assert type(container) is before and set(vars(container)) == attributes
+    assert machine.execute() == 'aborted' and left.runs == 1
+
+
+def test_a_wrap_that_is_refused_leaves_it_as_before():
+    concurrence = both(Scripted(), Scripted())
+    machine = inside(concurrence)
+    with pytest.raises(Exception, match='LEFTT'):
+        OracleContainer.wrap(machine, settings={'states': {'LEFTT': {'prior': 0.5}}})
+    assert type(concurrence) is smach.Concurrence and '_oracle_border' not in vars(concurrence)
+
+
+def test_wrapping_again_gives_new_settings_and_keeps_what_was_learned():
+    left = Scripted('aborted', 'ok', 'aborted')
+    machine = Watched(inside(both(left, Scripted())), name='TOP')
+    assert machine.run() == 'done' and left.runs == 2
+    OracleContainer.wrap(machine.machine, settings=ASKS, expert=FakeExpert(goto('LEFT')))
+    assert machine.run() == 'done' and left.runs == 4
+    assert [event.state for event in machine.of(EventKind.QUERY_ANSWERED)] == ['LEFT']
+    assert machine.rate('LEFT').failures == 2
+
+
+def test_states_added_replaced_and_removed_later_are_noticed_at_the_next_run():
+    first = Scripted('aborted')
+    concurrence = both(first, Scripted())
+    machine = Watched(inside(concurrence), name='TOP')
+    new = Scripted('aborted')
+    with concurrence:
+        smach.Concurrence.add('NEW', new)
+    replaced = Scripted('aborted')
+    concurrence._states['LEFT'] = replaced
+    assert machine.run() == 'done'
+    assert (first.runs, new.runs, replaced.runs) == (0, 2, 2)
+    del concurrence._states['NEW']
+    assert machine.run() == 'done' and new.runs == 2
+    assert 'NEW' not in {row.state for row in machine.machine.rates()}
+
+
+def test_outcomes_registered_later_are_known():
+    late = Scripted('aborted', 'extra')
+    machine = Watched(inside(both(late, Scripted(), default_outcome='done', outcome_map={})))
+    late.register_outcomes(['extra'])
+    assert machine.run() == 'done'
+    assert [event.outcome for event in machine.of(EventKind.FAILURE)] == ['aborted']
+
+
+def test_only_what_runs_in_the_tree_has_oracles():
+    left = Scripted('aborted', 'aborted')
+    concurrence = both(left, Scripted())
+    machine = Watched(inside(concurrence))
+    assert concurrence.execute() == 'aborted' and left.runs == 1
+    assert not machine.events
+    machine = Watched(inside(both(left, Scripted())), nested=False, settings={'max_recoveries': 0})
+    assert machine.run() == 'aborted' and left.runs == 2
+
+
+def _can_be_pickled(container):
+    try:
+        pickle.dumps(container)
+    except TypeError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize('copied', [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))],
+                         ids=['deep copy', 'pickle'])
+@pytest.mark.parametrize('make', [
+    lambda: both(Held(), Held()),
+    lambda: iterator_over(Held(), items=[1, 2])], ids=['concurrence', 'iterator'])
+def test_a_copy_recovers_inside_its_own_branches(copied, make):
+    if not _can_be_pickled(inside(make())):
+        pytest.skip('this engine cannot copy a machine')
+    machine = OracleContainer.wrap(inside(make()), name='TOP')
+    other = copied(machine)
+    events = []
+    other.events.observers.append(events.append)
+    assert other.execute() == 'done'
+    assert [event.path for event in events if event.kind is EventKind.FAILURE][0] == 'TOP/ALL'
+    mine, its = (each.get_children()['ALL'] for each in (machine, other))
+    assert mine is not its and isinstance(its, type(make()))
+    assert next(iter(mine.get_children().values())).runs == 0
+
+
+def test_copied_while_it_runs_it_is_as_at_rest():
+    taken = []
+
+    class Takes(smach.State):
+        def __init__(self):
+            smach.State.__init__(self, ['ok'])
+
+        def execute(self, ud):
+            taken.append(copy.copy(iterator))
+            return 'ok'
+    iterator = iterator_over(Takes(), items=[1, 2])
+    assert Watched(inside(iterator)).run() == 'done'
+    assert isinstance(taken[0]._state, Takes) and taken[0]._items == [1, 2]
+    assert type(taken[0]._items) is list
+
+
+def test_rates_of_the_branches_of_one_concurrence_are_kept_in_one_file(tmp_path):
+    file = str(tmp_path / 'rates.json')
+    machine = Watched(inside(both(Scripted('aborted'), Scripted('aborted', 'aborted'))),
+                      settings={'rates_file': file}, name='TOP')
+    assert machine.run() == 'done'
+    other = Watched(inside(both(Scripted(), Scripted())), settings={'rates_file': file}, name='TOP')
+    assert other.run() == 'done'
+    assert (other.rate('LEFT').failures, other.rate('RIGHT').failures) == (1, 2)
