@@ -118,6 +118,7 @@ export class MarkingCanvas {
   }
 
   paint() {
+    this.hint.hidden = Boolean(this.keys.cross); // it would cover what is drawn
     const context = this.root.getContext('2d');
     if (!context) return;
     context.clearRect(0, 0, this.root.width, this.root.height);
