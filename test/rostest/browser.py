@@ -16,6 +16,7 @@ from selenium.common.exceptions import (
 )
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from urllib3.exceptions import MaxRetryError
 from waiting import wait_for
@@ -98,6 +99,17 @@ class Browser:
 
     def _refused(self):
         return self.run('return document.body.dataset.refused')
+
+    def press(self, key):
+        """A key, to whatever has the focus, once the page takes it as meant."""
+        def pressed():
+            before = self._refused()
+            ActionChains(self.driver, duration=0).send_keys(key).perform()
+            return self._refused() == before
+        if not wait_for(pressed):
+            raise AssertionError('{!r} is refused; the page says:\n{}'.format(
+                key,
+                self.text()[:2000]))
 
     def tap(self, selector):
         """With a finger, in the middle of what is there and shown, once the page takes it as

@@ -104,7 +104,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.click('.follow-up [data-action=back]')
         browser.find(QUESTION)
         browser.run('document.activeElement.blur()')
-        browser.find('body').send_keys('n')
+        browser.press('n')
         self.assertTrue(browser.says(YOURS), 'by keyboard, too')
         browser.find('input.why').send_keys('typed before')
         type(self).console.stop()
@@ -228,15 +228,17 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.driver.switch_to.window(second)
         self.assertTrue(browser.says('bob (viewer)'),
                         'the other page is signed in, too, once it is looked at')
+        self.assert_accessible('a viewer')
         browser.click('#person')
         browser.click('dialog button')
         for page in (second, first):
             browser.driver.switch_to.window(page)
-            self.assertTrue(browser.says('Sign in', 'h1'),
+            self.assertTrue(browser.says('Sign in', 'form h2'),
                             'to sign out ends all pages of this browser')
             self.assertTrue(
                 browser.says('You have signed out' +
                              (' on another page' if page == first else '.')))
+            self.assert_accessible('the sign-in')
             self.assertEqual(browser.text('#nav'), '',
                              'nothing leads back to what was shown before')
         self.sign_in(self.token_of('viewer', tokens))

@@ -85,6 +85,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('hand_is_free holds', PICK),
                         'what changes is told while the question is open')
         self.assertIn('as of', browser.text(PICK))
+        self.assert_accessible('preconditions')
         self.assertEqual(rospy.get_param('/alpha/looked_at_the_door'), 1,
                          'what hangs is not called again')
 
@@ -145,6 +146,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         browser.click('.broken-bags summary')
         self.assertTrue(browser.says('torn.bag: damaged, or ', '.broken-bags li'))
         self.assertIn('Trials in the bags', browser.text('.panel.trials .table-frame'))
+        self.assert_accessible('trials of bags')
         slider = browser.find('.replay [role=slider]')
         self.assertEqual(slider.get_attribute('aria-label'), 'Time in the trial')
         slider.send_keys(Keys.HOME)
@@ -161,6 +163,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
         self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-images .shown canvas')),
                         'what was seen then')
+        self.assert_accessible('a replay')
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Answer of operator: supersede succeeded', '.replay-question'))
         slider.send_keys(Keys.ARROW_LEFT)

@@ -88,12 +88,41 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before),
                         'a key turns it')
 
+    def cross_to(self, point):
+        """With the arrow keys, to a pixel of the image; 'It begins at' and the like tell where."""
+        for axis, keys in enumerate(((Keys.ARROW_LEFT, Keys.ARROW_RIGHT), (Keys.ARROW_UP,
+                                                                           Keys.ARROW_DOWN))):
+            steps = int(point[axis] - self.cross[axis])
+            ActionChains(self.browser.driver, duration=0).key_down(
+                Keys.SHIFT).send_keys(*[keys[steps > 0]] * abs(steps)).key_up(Keys.SHIFT).perform()
+        self.cross = [int(each) for each in point]
+
+    def assert_a_region_is_marked_by_keys(self):
+        browser, marked = self.browser, len(self.told('mark'))
+        first, last = self.around_the_can()
+        browser.run('document.querySelector(".perception .drawing").focus()')
+        self.cross = [320, 240]
+        self.cross_to(first)
+        ActionChains(browser.driver, duration=0).send_keys(Keys.ENTER).perform()
+        told = 'return document.getElementById("announcer").textContent'
+        self.assertIn('It begins at {}, {} of 640 by 480'.format(*self.cross), browser.run(told))
+        ActionChains(browser.driver, duration=0).send_keys(Keys.ESCAPE).perform()
+        self.assertTrue(browser.find('.perception'), 'the line is taken back, not the question')
+        ActionChains(browser.driver, duration=0).send_keys(' ').perform()
+        self.cross_to(last)
+        ActionChains(browser.driver, duration=0).send_keys(Keys.ENTER).perform()
+        browser.find('[data-fact=size]')
+        self.assertTrue(
+            wait_for(lambda: [told.ok for told in self.told('mark')[marked:]] == [True]),
+            'cut out once')
+
     def test_1_an_object_is_marked_in_the_frame_and_the_machine_goes_on_with_it(self):
         browser = self.browser
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=perception]')
         browser.find('.perception.shown', 30.0)
         self.assertFalse(browser.find('.perception .accept').is_enabled(), 'nothing is marked yet')
+        self.assert_accessible('an image to mark')
         self.drag(*self.around_the_can())
         browser.find('[data-fact=size]')
         middle = np.array(self.around_the_can(), float).mean(axis=0)
@@ -105,6 +134,7 @@ class Marking(ConsolePage, unittest.TestCase):
         print('from the end of the drawing to the mask on the screen: {} ms'.format(
             browser.run('return document.querySelector(".perception").dataset.shownAfter')))
         self.assert_the_object_is_drawn_in_3d('.object-view .cloud')
+        self.assert_accessible('a marked object')
         browser.click('[data-tool=background]')
         left_top, right_bottom = self.around_the_can()
         self.drag(left_top, (right_bottom[0], left_top[1]))
@@ -129,6 +159,7 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=perception]')
         browser.find('.perception.shown', 30.0)
+        self.assert_a_region_is_marked_by_keys()
         browser.click('.perception .quit')
         self.assertTrue(browser.says('It asks again', '.follow-up', 30.0))
         self.assertTrue(wait_for(lambda: not browser.text('.perception')),
@@ -169,6 +200,7 @@ class Marking(ConsolePage, unittest.TestCase):
             cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8)))
         browser.click('[data-topic="/joint_states"]')
         self.assertTrue(browser.says('1.250', '.joints-view'))
+        self.assert_accessible('joints')
         browser.click('[data-topic="/points"]')
         self.assertTrue(browser.says('20000 of 50000 points', '.cloud-view'))
         self.assertGreater(browser.run(PICTURE, '.cloud-view .cloud')[1], 1000)
@@ -181,6 +213,7 @@ class Marking(ConsolePage, unittest.TestCase):
                 canvas, 'points') == 20000),
             (self.drawn(canvas, 'triangles'), self.drawn(canvas,
                                                          'points'), browser.text('.cloud-view')))
+        self.assert_accessible('a cloud and its robot')
         before = browser.run(PICTURE, canvas)[0]
         self.joints.publish(
             JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))

@@ -151,7 +151,7 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertTrue(stays(lambda: not browser.run('return document.querySelector(".detail")'),
                               0.5))
         browser.click('#keys')
-        self.press('n')
+        browser.press('n')
         browser.find('.detail')
         self.assertEqual(browser.errors(), [])
 

@@ -70,3 +70,8 @@ class ConsolePage:
     def page_is_served(cls):
         with socket.socket() as probe:
             return probe.connect_ex(('127.0.0.1', cls.port)) == 0
+
+    def assert_accessible(self, view):
+        """axe-core finds nothing wrong with what the page shows now, in any of its colours."""
+        from accessibility import violations
+        self.assertEqual([view] + violations(self.browser), [view])

@@ -22,10 +22,20 @@ from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState
 if WITH_BROWSER:
     from browser import Browser
     from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
 HERE = os.path.dirname(os.path.abspath(__file__))
 STOPS_WITHIN_S = 0.1
 QUEUED = 2  # commands that the console's publisher may hold
 QUESTION = '.question-row[data-key^="/alpha/"]'
+# a button that has just moved, held by a key
+HELD_AT_ONCE = '''
+const pad = document.querySelector(".pad[data-move=up]");
+const box = document.createElement("div");
+box.style.height = "60px";
+pad.parentElement.before(box);
+const key = { key: " ", code: "Space", bubbles: true, cancelable: true };
+pad.dispatchEvent(new KeyboardEvent("keydown", key));
+box.remove();'''
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -94,9 +104,11 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('was started for this question', '.output'),
                         'its output is there')
         self.assertFalse(browser.find('.pad[data-move=up]').is_enabled(), 'nobody drives yet')
+        self.assert_accessible('a hand that somebody may drive')
         browser.click('.wheel')
         self.assertTrue(browser.says('You drive.', '.driver'))
         browser.click('[data-frame=base]')
+        self.assert_accessible('a hand that is driven')
 
     def test_2_a_held_key_moves_the_hand_and_one_that_is_let_go_stops_it(self):
         before = self.height()
@@ -137,6 +149,26 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         pad = self.browser.find('.pad[data-move={}]'.format(move))
         self.assertTrue(wait_for(lambda: self.browser.settled(pad)))
         return pad
+
+    def test_2_a_button_takes_enter_and_space_and_stops_with_either_or_without_the_focus(self):
+        browser = self.browser
+        chain = partial(ActionChains, browser.driver, duration=0)
+
+        def press(key, move):
+            browser.run('arguments[0].focus()', self.settled_pad(move))
+            chain().key_down(key).perform()
+            self.assertTrue(self.moves())
+        before = self.height()
+        self.assert_stops(partial(press, ' ', 'up'), lambda: chain().key_up(' ').perform())
+        self.assertGreater(self.height(), before)
+        self.assert_stops(partial(press, Keys.ENTER, 'down'),
+                          lambda: chain().key_up(Keys.ENTER).perform())
+        other = 'document.querySelector("[data-frame=base]").focus()'
+        self.assert_stops(partial(press, ' ', 'down'), partial(browser.run, other),
+                          lambda: chain().key_up(' ').perform())
+        self.assertTrue(self.browser.says('You drive.', '.driver'), 'nothing else was pressed')
+        self.assert_moves_nothing(lambda: browser.run(HELD_AT_ONCE))
+        self.assertGreater(int(browser.run('return document.body.dataset.refused || 0')), 0)
 
     def test_2_whoever_presses_stop_stops_it_though_the_key_is_held_on(self):
         press = 'document.querySelector("[data-action=stop-hand]").click()'

@@ -4,6 +4,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from .outer_points import outer_points
 from .transforms import from_rpy
 
 # a footprint whose tightest rectangle has more than this share of the widest one's area has no
@@ -66,6 +67,7 @@ def _heading(flat: np.ndarray) -> float:
 
     :returns: rad; 0 for something round.
     """
+    flat = outer_points(flat)
     try:
         hull = flat[ConvexHull(flat).vertices] if len(flat) > 3 else flat
     except QhullError:  # all on one line

@@ -5,6 +5,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import ConvexHull, QhullError
 
+from .outer_points import outer_points
 from .plane import Plane
 
 PATCH_CELL = 0.02  # m, of the grid in which a surface is connected
@@ -79,6 +80,6 @@ def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: flo
 def _edges(patch: np.ndarray) -> Optional[np.ndarray]:
     """(n, 3): lines around a patch seen from above, as normal (outwards) and offset."""
     try:
-        return ConvexHull(patch[:, :2]).equations
+        return ConvexHull(outer_points(patch[:, :2])).equations
     except (QhullError, ValueError):
         return None

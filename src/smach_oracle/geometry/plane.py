@@ -14,7 +14,7 @@ class Plane(NamedTuple):
 
     def height(self, points: np.ndarray) -> np.ndarray:
         """Signed distance (m) of points (..., 3) above it."""
-        return (points - self.point) @ self.normal
+        return points @ self.normal - self.point @ self.normal
 
     def z_at(self, x: float, y: float) -> float:
         """Its z (m) at a place."""

@@ -64,7 +64,7 @@ LAYERS: Dict[str, List[Layer]] = {
         'server', 'page_socket', {'answering', 'robots'}, 'trials', 'sensors',
         {'graphs', 'feeds', 'commands', 'web'}
     ],
-    'interfaces': [{'perception', 'manipulation'}, 'interface_goal'],
+    'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'pr2': [
         'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
         {'model', 'robot', 'kitchen'}

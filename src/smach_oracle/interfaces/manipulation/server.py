@@ -20,6 +20,7 @@ from smach_oracle.ros.userdata_codec import UserdataCodecError, decode_all
 from smach_oracle.srv import Snapshot
 
 from ..interface_goal import NO_GOAL, FinishServices, InterfaceGoal
+from ..priority import take_priority
 from .cartesian_drive import no_motion
 from .command_inbox import ArrivedCommand, CommandInbox
 from .dead_man_switch import DeadManSwitch
@@ -308,10 +309,12 @@ class TeleoperationServer:
 def main() -> None:
     """Entry point of the node `manipulation_interface`."""
     parameters_only('Node: a person drives the robot\'s arms in place of a failed state. '
-                    'Parameters: ~arms, ~states, ~limits and more; see doc/shared_autonomy.md.')
+                    'Parameters: ~arms, ~states, ~limits, ~nice and more; see '
+                    'doc/shared_autonomy.md.')
     rospy.init_node('manipulation_interface')
     start_master_watch()
     try:
+        take_priority()
         settings = TeleoperationSettings.from_parameters()
         arms, surroundings = settings.build()
     except (SettingsError, ValueError) as err:

@@ -28,6 +28,7 @@ from smach_oracle.srv import (
 )
 
 from ..interface_goal import NO_GOAL, FinishServices, InterfaceGoal
+from ..priority import take_priority
 from .image_source import NO_SNAPSHOT, ImageSource, ImageSourceError, TakenImage, cloud_of
 from .marking import ObjectMarking, OutputMessage, output_messages
 from .output_templates import templates_from
@@ -161,10 +162,11 @@ def main() -> None:
     parameters_only(
         'Node: a person marks objects in camera images in place of a failed detection. '
         'Parameters: ~rgb, ~depth, ~camera_info, ~snapshot, ~base_frame, ~frame_limit_s, '
-        '~states; see doc/perception.md.')
+        '~states, ~nice; see doc/perception.md.')
     rospy.init_node('perception_interface')
     start_master_watch()
     try:
+        take_priority()
         server = SegmentationServer(rospy.get_param('~states', {}), _source())
     except SettingsError as err:
         rospy.logfatal('perception_interface: %s', err)

@@ -2,6 +2,7 @@
 // Everything that may be answered, each a button: one press sends it, but for giving up. Keys: 1 to
 // 9 a state, s the first supersede, i the first interface, g asks whether to give up.
 import { h, setText } from '../page/dom.js';
+import { focusIsFree, moveFocus } from '../page/focus.js';
 import { whenLetGo } from '../page/redraw.js';
 import { GiveUp } from './give_up.js';
 import { outputFields, readOutputs } from './output_field.js';
@@ -38,6 +39,8 @@ export class AnswerForm {
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outputs = outputFields(question, () => setText(this.problem, ''));
     this.on = false;
+    /** @type {HTMLButtonElement | undefined} */
+    this.sentFrom = undefined; // what was pressed last
     this.giveUp = this.makeGiveUp();
     this.root = h('div', { class: 'answer-form' }, this.goTo(), this.interfaces(), this.supersede(),
       this.giveUp.root, this.problem, this.why);
@@ -80,8 +83,24 @@ export class AnswerForm {
    * @param {string} [container] of a state or an outcome that is another container's
    */
   send(kind, name, container = '') {
+    this.sentFrom = this.buttonOf(kind, name, container);
     const outputs = readOutputs(kind === 'supersede' ? this.outputs : [], this.problem);
     if (outputs) this.onAnswer({ kind, name, container, outputs, why: this.why.value });
+  }
+
+  /**
+   * @param {AnswerKind} kind
+   * @param {string} name
+   * @param {string} container
+   */
+  buttonOf(kind, name, container) {
+    return this.buttons.find(({ dataset }) => (dataset['kind'] === kind
+      && dataset['name'] === name && (dataset['container'] || '') === container));
+  }
+
+  /** It was not taken: a button that is disabled meanwhile has lost the focus. */
+  takeFocusBack() {
+    if (this.sentFrom && focusIsFree(this.root)) moveFocus(this.sentFrom);
   }
 
   /**

@@ -1,6 +1,7 @@
 // @ts-check
 // What the robot does after an answer: until its trial ends, or it asks again.
 import { h, setText } from '../page/dom.js';
+import { focusIsFree, moveFocus } from '../page/focus.js';
 import { added } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
@@ -37,16 +38,18 @@ export class FollowUp {
     /** @type {TrialEvent | null} */
     this.last = null; // with which it is over: the trial's end, or the next question
     this.since = 0; // ms, since the answer; 0 before
+    /** @type {HTMLElement[]} */
+    this.given = []; // what this has put the focus on: it may take it on from there
     this.waits = false; // it does nothing new: the state runs on
     this.earlier = h('p', { class: 'dim' });
     this.steps = h('ol', { class: 'steps' });
     this.hint = h('p', { class: 'hint-of-steps' });
-    this.title = h('h3', { class: 'done' });
+    this.title = h('h3', { class: 'done', tabindex: -1 });
     this.next = h('div', { class: 'row next-question' });
+    this.back = h('button', { 'data-action': 'back', onclick: ways.leave }, 'Back to the list');
     this.root = h('div', { class: 'follow-up', role: 'status' }, this.title, this.earlier,
       this.steps, this.hint, this.next,
-      h('div', { class: 'row' },
-        h('button', { 'data-action': 'back', onclick: ways.leave }, 'Back to the list')));
+      h('div', { class: 'row' }, this.back));
     this.stop = app.store.onEvents((slice) => this.take(slice));
   }
 
@@ -123,11 +126,22 @@ export class FollowUp {
 
   showNext() {
     const next = this.nextQuestion();
+    const free = focusIsFree(this.title, this.next, ...this.given);
     this.next.hidden = !next;
     redraw(this.next, next && h('button', { class: 'primary', key: next.key,
       'data-action': 'next-question', 'data-deliberate': 'choose ' + next.key,
       onclick: () => this.ways.choose(next.key) },
     'Next question: ' + next.state + ' of ' + next.robot));
+    if (free && this.last && this.app.current === 'questions') this.focusNext();
+  }
+
+  /** What the robot did is over: the next thing to do is the next question, or to go back. */
+  focusNext() {
+    const wanted = this.next.querySelector('button') || this.back;
+    const shown = this.root.isConnected && !document.querySelector('dialog[open]');
+    if (!shown || document.activeElement === wanted) return;
+    this.given = [wanted];
+    moveFocus(wanted);
   }
 
   update() {

@@ -1,7 +1,8 @@
 // @ts-check
 // Giving up ends the task: it is asked for, confirmed, and can be undone for some seconds before it
 // is sent.
-import { dropFocus, h, replace, setText } from '../page/dom.js';
+import { h, replace, setText } from '../page/dom.js';
+import { focusIsFree, moveFocus } from '../page/focus.js';
 
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Question} Question */
@@ -118,12 +119,20 @@ export class GiveUp {
   cancel() {
     const { counting } = this;
     const asked = !this.asking.hidden;
+    const free = asked && focusIsFree(this.asking);
     clearInterval(this.timer);
     this.left = 0;
     this.turn(false);
-    if (asked) dropFocus();
     if (counting) this.use.changed();
+    if (free) this.focusChoice();
     return asked;
+  }
+
+  /** Back to what was pressed first. */
+  focusChoice() {
+    const choices = /** @type {HTMLElement[]} */ ([...this.choices.querySelectorAll('button')]);
+    const pressed = choices.find((choice) => choice.dataset['name'] === this.outcome);
+    if (pressed) moveFocus(pressed);
   }
 
   /** @param {boolean} asking */

@@ -1,11 +1,12 @@
 // @ts-check
-// What a person holds: buttons by mouse and touch, keys, a gamepad. Everything is let go where it
-// cannot be seen to be held.
+// What a person holds: buttons by mouse, touch, Enter and Space, keys, a gamepad. Everything is let
+// go where it cannot be seen to be held.
 import { vector } from '../drawing/transforms.js';
 import { modified, typing } from '../page/dom.js';
 import { keysOn } from '../page/shortcuts.js';
 import { MOTIONS, MOVE_OF_KEY } from './drive_moves.js';
 import { GamepadInput } from './gamepad.js';
+import { holdByKey } from './held_by_key.js';
 
 /** @typedef {import('../server').DriveWish} DriveWish */
 /** @typedef {import('./drive_moves.js').Move} Move */
@@ -87,6 +88,9 @@ export class DriveInput {
     for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) {
       element.addEventListener(type, () => this.release(id), options);
     }
+    const byKey = Symbol(move); // a finger that is lifted does not let go what a key holds
+    holdByKey(element, { press: () => { if (this.active) this.press(byKey, move); },
+      release: () => this.release(byKey) }, options);
   }
 
   /**

@@ -33,7 +33,7 @@ export class InterfacePanel {
     this.manipulation = null;
     this.printed = ''; // what is shown of the output
     this.title = h('span', { class: 'dim' });
-    this.lines = h('pre', { class: 'output-lines' });
+    this.lines = h('pre', { class: 'output-lines', tabindex: 0 });
     this.output = h('details', { class: 'card output', hidden: true },
       h('summary', {}, h('strong', {}, 'Interface ', name), ' ', this.title), this.lines);
     this.problem = h('p', { class: 'problem', role: 'alert' });

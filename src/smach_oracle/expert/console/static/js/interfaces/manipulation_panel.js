@@ -3,7 +3,7 @@
 // the robot has a watchdog.
 import { vector } from '../drawing/transforms.js';
 import { unlessLost } from '../page/connection.js';
-import { dropFocus, h, setText } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
 import { DriveCamera } from './drive_camera.js';
@@ -25,7 +25,8 @@ const IDLE_MS = 500; // how often a page that holds the wheel says so while noth
 const FRAMES = { tool: 'Tool', base: 'Base', camera: 'Camera' };
 const TITLES = { linear: 'Move', angular: 'Turn' };
 const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
-const HOLD = 'Hold to move, let go to stop. ';
+const HOLD = 'Hold to move, let go to stop: with mouse or finger, with Enter or Space, or with the '
+  + 'key that stands there. ';
 const PAD = 'A gamepad moves while a shoulder button is held.';
 /** @type {DriveWish} */
 const NOTHING = { held: false, linear: [0, 0, 0], angular: [0, 0, 0], gripper: '' };
@@ -159,7 +160,6 @@ export class ManipulationPanel {
       unlessLost(err);
       this.wheel = null;
     }
-    dropFocus();
     this.update();
   }
 
@@ -174,7 +174,6 @@ export class ManipulationPanel {
       unlessLost(err);
       setText(this.problem, CANNOT_STOP);
     }
-    dropFocus();
   }
 
   /**
@@ -186,7 +185,6 @@ export class ManipulationPanel {
     for (const button of Object.values(this.frames)) {
       button.setAttribute('aria-pressed', String(button === this.frames[frame]));
     }
-    dropFocus(); // keys drive, they press no buttons
     return frame;
   }
 
@@ -194,7 +192,6 @@ export class ManipulationPanel {
   chooseArm(arm) {
     this.input.releaseAll();
     this.arm = arm;
-    dropFocus();
     this.update();
   }
 

@@ -2,7 +2,8 @@
 // The canvas over an image, on which a person marks an object.
 import { h } from '../page/dom.js';
 import { Marking, isBrush } from './marking.js';
-import { drawMarking } from './marking_drawing.js';
+import { drawCross, drawMarking } from './marking_drawing.js';
+import { MARKING_KEYS, MarkingKeys } from './marking_keys.js';
 
 /** @typedef {import('../server').Point} Point */
 /** @typedef {import('./marking.js').Tool} Tool */
@@ -27,11 +28,29 @@ export class MarkingCanvas {
     this.outlines = []; // of what was cut out
     /** @type {Tool} */
     this.tool = 'rectangle';
-    this.root = h('canvas', { class: 'drawing', width: 4, height: 3 });
+    this.root = h('canvas', { class: 'drawing', width: 4, height: 3, tabindex: 0,
+      role: 'application', 'aria-roledescription': 'drawing', 'aria-label': 'Mark the object here',
+      'aria-describedby': 'marking-keys' });
+    this.hint = h('p', { class: 'keys-hint', id: 'marking-keys' }, MARKING_KEYS);
+    this.keys = this.makeKeys();
     this.root.addEventListener('pointerdown', (event) => this.begin(event));
     this.root.addEventListener('pointermove', (event) => this.move(event));
     this.root.addEventListener('pointerup', () => this.end());
     this.root.addEventListener('pointercancel', () => this.cancel());
+  }
+
+  makeKeys() {
+    return new MarkingKeys(this.root, {
+      size: () => [this.root.width, this.root.height],
+      scale: () => this.scale,
+      may: () => this.use.may(),
+      drawing: () => Boolean(this.marking.line),
+      begin: (point) => this.beginAt(point),
+      move: (point) => this.marking.move(point),
+      end: () => this.end(),
+      cancel: () => this.cancel(),
+      moved: () => this.paint(),
+    });
   }
 
   /**
@@ -45,13 +64,18 @@ export class MarkingCanvas {
     if (!this.use.may() || !event.isPrimary || event.button) return;
     event.preventDefault();
     this.root.setPointerCapture(event.pointerId);
+    this.beginAt(this.at(event));
+  }
+
+  /** @param {Point} point */
+  beginAt(point) {
     const correcting = isBrush(this.tool);
     if (correcting && !this.marking.region) {
       this.use.refused();
       return;
     }
     const width = Math.max(THINNEST, Math.round(BRUSH * this.scale));
-    this.marking.begin(this.tool, this.at(event), width);
+    this.marking.begin(this.tool, point, width);
     if (!correcting) this.use.begun();
     this.paint();
   }
@@ -94,9 +118,11 @@ export class MarkingCanvas {
   }
 
   paint() {
+    this.hint.hidden = Boolean(this.keys.cross); // it would cover what is drawn
     const context = this.root.getContext('2d');
     if (!context) return;
     context.clearRect(0, 0, this.root.width, this.root.height);
     drawMarking(context, this.marking, this.outlines, this.scale);
+    if (this.keys.cross) drawCross(context, this.keys.cross, this.scale);
   }
 }

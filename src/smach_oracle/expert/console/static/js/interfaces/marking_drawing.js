@@ -5,6 +5,7 @@
 /** @typedef {import('../server').Stroke} Stroke */
 /** @typedef {import('./marking.js').Marking} Marking */
 
+const ARM = 14; // px of the screen, of the cross
 const COLOURS = { region: '#2f6bff', under: '#ffffffd0', mask: '#5b8cff66', edge: '#7fb0ff',
   object: '#3ddc84cc', background: '#ff5a52cc' };
 
@@ -62,6 +63,27 @@ function drawStroke(context, { foreground, width, points }) {
   context.strokeStyle = foreground ? COLOURS.object : COLOURS.background;
   if (points.length === 1) context.lineTo(points[0][0] + 0.6, points[0][1] + 0.5);
   context.stroke();
+}
+
+/**
+ * Where the keyboard draws.
+ * @param {CanvasRenderingContext2D} context
+ * @param {Point} point
+ * @param {number} scale px of the image for one of the screen
+ */
+export function drawCross(context, [x, y], scale) {
+  const arm = ARM * scale;
+  context.beginPath();
+  context.moveTo(x + 0.5 - arm, y + 0.5);
+  context.lineTo(x + 0.5 + arm, y + 0.5);
+  context.moveTo(x + 0.5, y + 0.5 - arm);
+  context.lineTo(x + 0.5, y + 0.5 + arm);
+  for (const { width, colour } of [{ width: 4, colour: COLOURS.under },
+    { width: 2, colour: COLOURS.region }]) {
+    context.lineWidth = width * scale;
+    context.strokeStyle = colour;
+    context.stroke();
+  }
 }
 
 /**

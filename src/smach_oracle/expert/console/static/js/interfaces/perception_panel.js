@@ -51,7 +51,7 @@ export class PerceptionPanel {
     this.marked = null;
     this.warning = '';
     this.resultKey = ''; // of what is shown of it
-    this.image = h('canvas', { class: 'image', width: 4, height: 3,
+    this.image = h('canvas', { class: 'image', width: 4, height: 3, role: 'img',
       'aria-label': 'The image to draw on' });
     this.canvas = this.makeCanvas();
     this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the image…');
@@ -100,7 +100,8 @@ export class PerceptionPanel {
         h('h3', {}, 'Mark the object for ', this.question.state),
         h('span', { class: 'spacer' }), failed, fresh),
       h('div', { class: 'perception-body' },
-        h('div', { class: 'screen' }, this.image, this.canvas.root, this.note), this.object.root,
+        h('div', { class: 'screen' }, this.image, this.canvas.root, this.canvas.hint,
+          this.note), this.object.root,
         h('div', { class: 'perception-side' }, this.buildSide())));
   }
 
@@ -108,7 +109,8 @@ export class PerceptionPanel {
   buildSide() {
     const { undo, clear, accept, quit } = this.buttons;
     const several = this.question.supersede.length > 1;
-    return [h('div', { class: 'tool-row', role: 'toolbar' }, [...this.tools.values()]),
+    const tools = { class: 'tool-row', role: 'toolbar', 'aria-label': 'Tools' };
+    return [h('div', tools, [...this.tools.values()]),
       h('div', { class: 'tool-row' }, undo, clear), this.result, this.problem,
       h('span', { class: 'spacer' }),
       h('div', { class: 'perception-end' }, several && outcomeRow(this.outcome), accept, quit)];

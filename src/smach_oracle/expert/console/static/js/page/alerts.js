@@ -1,6 +1,9 @@
 // @ts-check
-// What calls a person who looks elsewhere: the title, a sound, a notification.
+// What calls a person who looks elsewhere, or does not see: the title, a sound, a notification, a
+// live region.
+import { announce } from './announce.js';
 import { h } from './dom.js';
+import { counted } from './format.js';
 import { remember, remembered } from './preferences.js';
 
 /** @typedef {import('../server').Question} Question */
@@ -41,6 +44,7 @@ export class Alerts {
     if (fresh.length) {
       if (this.sound && !this.first) this.ring();
       this.notify(fresh[0]);
+      announce(newsOf(fresh, pending.length));
     }
     this.first = false;
   }
@@ -98,4 +102,15 @@ export class Alerts {
     button.textContent = this.sound ? 'Sound on' : 'Sound off';
     button.setAttribute('aria-pressed', String(this.sound));
   }
+}
+
+/**
+ * @param {Question[]} fresh
+ * @param {number} waiting how many wait in all
+ */
+function newsOf(fresh, waiting) {
+  const { state, stands, robot } = fresh[0];
+  const others = fresh.length > 1 ? ', and ' + counted(fresh.length - 1, 'other') : '';
+  return 'New question: ' + state + ' ' + stands + ', ' + robot + others + '. '
+    + counted(waiting, 'question waits', 'questions wait') + '.';
 }

@@ -71,7 +71,7 @@ export class App {
     const theme = remembered('theme', 'auto');
     this.setTheme(theme === 'light' || theme === 'dark' ? theme : 'auto');
     replace(part('top'), h('img', { src: 'static/icon.svg', alt: '', class: 'logo' }),
-      h('strong', { class: 'brand' }, 'Operator console'), this.status,
+      h('h1', { class: 'brand' }, 'Operator console'), this.status,
       h('span', { class: 'spacer' }), this.alerts.buttons(), keysButton(),
       this.themeButton, this.person);
   }

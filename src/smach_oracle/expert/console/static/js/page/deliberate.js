@@ -1,12 +1,14 @@
 // @ts-check
 // What starts or ends something is sent only where it was meant. An element with `data-deliberate`
 // is settled once it has lain still, enabled and uncovered, for a while; before that, a click on it
-// is refused. The second tap of a double tap thus never reaches what the first one has brought.
+// is refused. The second tap of a double tap thus never reaches what the first one has brought. So
+// is a key that presses what has the focus, where the page has just put the focus there.
 //
 // The attribute's value says what a click would do: where it changes, the element is another one.
 // What is held begins with `hold`, and is refused as it is pressed. What stops or lets go never has
 // the attribute.
 import { toast } from './dom.js';
+import { justGiven } from './focus.js';
 
 /**
  * @typedef {object} Place
@@ -15,10 +17,11 @@ import { toast } from './dom.js';
  */
 /** @typedef {{ place: Place, sinceMs: number }} Rest */
 
-const SETTLING_MS = 700;
-const PERIOD_MS = 100;
+export const SETTLING_MS = 700;
+export const PERIOD_MS = 100;
 const SELECTOR = '[data-deliberate]';
 const HELD = /^hold /;
+const HOLDING = new Set(['Enter', ' ']); // the keys that press what has the focus
 const STILL = 4; // px by which an element may move and yet lie under the same finger
 const TOO_SOON = 'Not sent: the page had just changed there. Press again.';
 
@@ -31,6 +34,7 @@ let pressed = null;
 export function watchOverClicks() {
   window.addEventListener('pointerdown', (event) => press(event), true);
   window.addEventListener('click', (event) => judge(event), true);
+  window.addEventListener('keydown', (event) => holdByKey(event), true);
   document.addEventListener('visibilitychange', () => {
     if (!document.hidden) rests.clear(); // what lay there before is not remembered
   });
@@ -50,7 +54,7 @@ function settled(element) {
 }
 
 /** Say that a press was refused, for that it came too soon. */
-function sayTooSoon() {
+export function sayTooSoon() {
   const { dataset } = document.body;
   dataset['refused'] = String(Number(dataset['refused'] || 0) + 1);
   toast(TOO_SOON, 'warn');
@@ -116,7 +120,23 @@ function elementOf({ target }) {
 function press(event) {
   const element = elementOf(event);
   pressed = element && { element, meaning: meaningOf(element), settled: settled(element) };
-  if (!pressed || pressed.settled || !HELD.test(pressed.meaning)) return;
+  if (pressed && !pressed.settled && HELD.test(pressed.meaning)) refuse(event);
+}
+
+/** @param {KeyboardEvent} event */
+function holdByKey(event) {
+  const element = HOLDING.has(event.key) && !event.repeat ? elementOf(event) : null;
+  if (element && HELD.test(meaningOf(element)) && !settledForKeys(element)) refuse(event);
+}
+
+/**
+ * Whether a key that presses what has the focus, or one of the element's own, is meant.
+ * @param {HTMLElement} element
+ */
+function settledForKeys(element) { return settled(element) && !justGiven(element, SETTLING_MS); }
+
+/** @param {Event} event */
+function refuse(event) {
   event.preventDefault();
   event.stopImmediatePropagation();
   sayTooSoon();
@@ -131,9 +151,6 @@ function judge(event) {
   // a key that presses a button, or a script, has no pointer that went down before
   const ofPointer = event.detail > 0 && before && before.element === element;
   const meant = ofPointer ? before.settled && before.meaning === meaningOf(element)
-    : settled(element);
-  if (meant) return;
-  event.preventDefault();
-  event.stopImmediatePropagation();
-  sayTooSoon();
+    : settledForKeys(element);
+  if (!meant) refuse(event);
 }

@@ -132,8 +132,10 @@ export function part(id) {
  * @param {string} kind
  */
 export function toast(text, kind) {
+  const toasts = part('toasts');
+  for (const before of [...toasts.children]) if (before.textContent === text) before.remove();
   const shown = h('div', { class: 'toast ' + kind }, text);
-  part('toasts').append(shown);
+  toasts.append(shown);
   setTimeout(() => shown.remove(), TOAST_MS);
 }
 
@@ -149,7 +151,3 @@ export function typing(target) {
 /** Whether a key is pressed together with another one that gives it a meaning of its own.
  * @param {KeyboardEvent} event */
 export function modified(event) { return event.ctrlKey || event.metaKey || event.altKey; }
-
-export function dropFocus() {
-  if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
-}

@@ -30,7 +30,7 @@ export function askToken(connection, note) {
     setText(problem, WORDS[status] ?? 'Refused (' + status + ').');
   };
   replace(part('main'), h('form', { class: 'card sign-in', onsubmit },
-    h('h1', {}, 'Sign in'), note && h('p', { role: 'status' }, note),
+    h('h2', {}, 'Sign in'), note && h('p', { role: 'status' }, note),
     h('p', { class: 'dim' }, ABOUT_TOKENS), h('label', { for: 'token' }, 'Token'), token, problem,
     h('button', { class: 'primary', id: 'sign-in' }, 'Sign in')));
   token.focus();
@@ -49,9 +49,10 @@ export function askName(connection, signOut) {
   const onsubmit = () => { if (!fixed) rename(connection, name.value.trim()); };
   const out = () => { dialog.close(); signOut(); };
   /** @type {HTMLDialogElement} */
-  const dialog = h('dialog', { class: 'card', onclose: () => dialog.remove() },
+  const dialog = h('dialog', { class: 'card', 'aria-labelledby': 'name-title',
+    onclose: () => dialog.remove() },
     h('form', { method: 'dialog', onsubmit },
-      h('h2', {}, 'Your name'),
+      h('h2', { id: 'name-title' }, h('label', { for: 'expert' }, 'Your name')),
       h('p', { class: 'dim' }, fixed ? 'It goes with your token.' : ABOUT_NAMES), name,
       h('p', { class: 'dim' }, 'Role: ' + session.role),
       h('div', { class: 'row' },

@@ -6,6 +6,7 @@ import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
 import { unlessLost } from '../page/connection.js';
 import { h, replace, setText } from '../page/dom.js';
+import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { ClaimBar } from './claim_bar.js';
@@ -55,6 +56,7 @@ export class QuestionDetail {
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'),
       this.form.root);
+    this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
     this.root = this.build();
     this.machine.show(question.robot, question.path);
     this.show();
@@ -72,12 +74,11 @@ export class QuestionDetail {
   }
 
   head() {
-    const { state, stands, robot, path } = this.question;
+    const { robot, path } = this.question;
     return h('header', { class: 'detail-head' },
       h('button', { class: 'back', 'aria-label': 'Back to the list',
         onclick: this.ways.leave }, '‹'),
-      h('div', {}, h('h2', {}, state, ' ', stands),
-        h('p', { class: 'dim' }, robot, ' · ', path)),
+      h('div', {}, this.title, h('p', { class: 'dim' }, robot, ' · ', path)),
       h('span', { class: 'spacer' }), this.time);
   }
 
@@ -158,6 +159,7 @@ export class QuestionDetail {
     }
     this.sending = false;
     this.show();
+    if (!this.settled) this.form.takeFocusBack();
   }
 
   /** Take back what is not sent yet; whether there was any such thing. */
@@ -216,7 +218,9 @@ export class QuestionDetail {
     this.settled = true;
     this.followUp = followUp;
     followUp.begin(answer);
+    const free = focusIsFree(this.root); // a person may be at work elsewhere
     replace(this.answers, followUp.root);
+    if (free && this.app.current === 'questions') moveFocus(followUp.title);
     this.root.classList.add('answered');
     this.root.scrollIntoView({ block: 'start' });
   }

@@ -2,8 +2,10 @@
 // The queue of all robots' open questions, and the one that is worked on.
 import { NO_EMERGENCY_STOP } from '../interfaces/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
+import { moveFocus } from '../page/focus.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
+import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
 
@@ -30,11 +32,22 @@ class QuestionPanel {
     this.root = h('div', { class: 'panel questions' },
       h('aside', { class: 'queue-side' }, this.queue, this.servers,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
+    this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
     this.showStage();
   }
 
   get open() { return this.app.store.questions; }
+
+  /** What `n` would open: the oldest question that nobody works on. */
+  get next() {
+    if (!this.takesKeys || !keysOn()) return undefined;
+    return this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
+  }
+
+  get takesKeys() {
+    return this.app.current === 'questions' && !document.querySelector('dialog[open]');
+  }
 
   badge() { return this.open.filter((each) => each.status === 'pending').length; }
 
@@ -114,10 +127,18 @@ class QuestionPanel {
     if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
     this.close();
     this.detail = new QuestionDetail(this.app, question,
-      { leave: () => this.close(), choose: (next) => this.choose(next) });
+      { leave: () => this.leave(), choose: (next) => this.choose(next) });
     this.showStage();
     this.showQueue();
     this.detail.begin();
+    moveFocus(this.detail.title);
+  }
+
+  /** Back to the list, as a person wants it: the focus goes to its first question. */
+  leave() {
+    this.close();
+    const first = this.queue.querySelector('.question-row') || this.stage.querySelector('h2');
+    if (first instanceof HTMLElement) moveFocus(first);
   }
 
   close() {
@@ -143,18 +164,17 @@ class QuestionPanel {
     const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
       : 'each of the ' + this.open.length + ' open questions.');
     const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
-    replace(this.stage, h('div', { class: 'empty' }, h('h2', {}, title), hint));
+    replace(this.stage, h('div', { class: 'empty' }, h('h2', { tabindex: -1 }, title), hint));
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    if (this.app.current !== 'questions' || modified(event) || typing(event.target)
-      || document.querySelector('dialog[open]') || event.repeat || turnedOff(event)) return;
+    if (!this.takesKeys || modified(event) || typing(event.target) || event.repeat
+      || turnedOff(event)) return;
     if (event.key === 'n') {
-      const next = this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
-      if (next) this.choose(next.key);
+      if (this.next && this.nextKey.pressed) this.choose(this.next.key);
     } else if (event.key === 'Escape') {
-      if (!this.detail || !this.detail.cancel()) this.close();
+      if (this.detail && !this.detail.cancel()) this.leave();
     } else if (this.detail) {
       this.detail.press(event.key);
     }

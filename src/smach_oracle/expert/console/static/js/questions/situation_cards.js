@@ -21,7 +21,8 @@ const CONTINUOUS = 'It failed again without a success in between';
 export function failureCard(question) {
   const { state, what, text } = question;
   return h('section', { class: 'card failure' },
-    h('p', { class: 'what' }, state, ' ', what, '.'), text && h('pre', { class: 'text' }, text),
+    h('p', { class: 'what' }, state, ' ', what, '.'),
+    text && h('pre', { class: 'text', tabindex: 0 }, text),
     h('dl', {}, failureFacts(question)));
 }
 
@@ -80,7 +81,7 @@ function valueOf({ type, value, note }) {
   const notes = note && h('span', { class: 'dim' }, ' ' + note);
   if (value.length > LONG) {
     return [h('details', {}, h('summary', {}, type || value.slice(0, BEGINNING) + '…'),
-      h('pre', {}, value)), notes];
+      h('pre', { tabindex: 0 }, value)), notes];
   }
   return [value && h('code', {}, value), ' ', type && h('span', { class: 'dim' }, type), notes];
 }

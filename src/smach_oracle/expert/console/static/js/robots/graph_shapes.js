@@ -150,6 +150,16 @@ export function outcomeShape(label, [x, y, width, height], id) {
 }
 
 /**
+ * @param {KeyboardEvent} event
+ * @param {() => void} open
+ */
+function openByKey(event, open) {
+  if (event.key !== 'Enter' && event.key !== ' ') return;
+  event.preventDefault(); // Space would scroll
+  open();
+}
+
+/**
  * @param {string} label
  * @param {Place} place
  * @param {string} id
@@ -161,7 +171,7 @@ export function stateShape(label, [x, y, width, height], id, open) {
   const title = svg('title', {}, label);
   const box = { width, height, rx: 10 };
   const group = svg('g', { class: 'state' + (open ? ' nested' : ''), id, transform: translate(x, y),
-    onclick: open, onkeydown: open && ((event) => { if (event.key === 'Enter') open(); }),
+    onclick: open, onkeydown: open && ((event) => openByKey(event, open)),
     tabindex: open ? '0' : null, role: open ? 'button' : null },
   title, open && svg('rect', { class: 'behind', x: -width / 2 + 4, y: -height / 2 + 5, ...box }),
   svg('rect', { class: 'box', x: -width / 2, y: -height / 2, ...box }),

@@ -7,6 +7,7 @@ import { whenLetGo } from '../page/redraw.js';
 import {
   arrowHeads, edgeShape, measured, oracleLines, oracleShape, outcomeShape, stateShape,
 } from './graph_shapes.js';
+import { takeGraphKeys } from './graph_keys.js';
 import { GraphViewport } from './graph_viewport.js';
 
 /** @typedef {import('../server').Graph} Graph */
@@ -24,7 +25,7 @@ export class GraphView {
   constructor(onOpen) {
     this.onOpen = onOpen;
     this.layer = svg('g', {});
-    this.drawing = svg('svg', { class: 'graph', role: 'img', tabindex: '0' }, arrowHeads(),
+    this.drawing = svg('svg', { class: 'graph', role: 'group', tabindex: '0' }, arrowHeads(),
       this.layer);
     this.followButton = h('button', { class: 'tool', title: 'Keep what is active in view',
       onclick: () => this.viewport.setFollow(!this.viewport.follow) }, 'Follow');
@@ -44,6 +45,7 @@ export class GraphView {
     this.viewport = new GraphViewport(this.drawing, this.root, () => this.focus,
       (on) => this.followButton.setAttribute('aria-pressed', String(on)));
     this.viewport.setFollow(true);
+    takeGraphKeys(this.drawing, this.viewport);
   }
 
   tools() {

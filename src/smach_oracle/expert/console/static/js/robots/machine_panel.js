@@ -3,6 +3,7 @@
 import { h, setText } from '../page/dom.js';
 import { remember, remembered } from '../page/preferences.js';
 import { arrange, redraw } from '../page/redraw.js';
+import { takeArrowKeys } from '../page/tree_keys.js';
 import { MachineView, machinesNow } from './machine_view.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -35,6 +36,7 @@ class MachinePanel {
     this.view.prefersList = remembered(PREFERENCE, 'no') === 'yes';
     this.picker = h('div', { class: 'picker', role: 'tree',
       'aria-label': 'Robots and their machines' });
+    takeArrowKeys(this.picker);
     this.pickerKey = ''; // of what it shows
     this.title = h('h2', { class: 'ellipsis' });
     this.state = h('span', { class: 'dim ellipsis' });
@@ -111,7 +113,7 @@ class MachinePanel {
     if (key === this.pickerKey) return;
     this.pickerKey = key;
     redraw(this.picker, groups.map(({ robot, alive, rows }) => (
-      h('div', { key: robot, class: 'group' },
+      h('div', { key: robot, class: 'group', role: 'group', 'aria-label': robot },
         h('div', { class: 'robot' + (alive ? '' : ' gone') }, h('span', { class: 'dot' }), robot),
         rows.map((row) => this.pickerButton(robot, row))))));
   }
@@ -139,7 +141,8 @@ class MachinePanel {
     const names = path.split('/');
     return h('button', { key: path,
       class: 'path' + (active ? ' active' : '') + (failed ? ' failed' : ''), role: 'treeitem',
-      'aria-selected': current, '--depth': names.length - 1,
+      'aria-selected': current, 'aria-level': names.length, tabindex: current ? 0 : -1,
+      '--depth': names.length - 1,
       onclick: () => this.open(robot, path), title: path }, names[names.length - 1]);
   }
 }

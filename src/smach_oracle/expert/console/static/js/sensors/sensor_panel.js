@@ -79,7 +79,7 @@ class SensorPanel {
     const { topic, type } = sensor;
     const name = nameOf(sensor);
     return h('button', { key: name, class: 'path', title: topic + ', ' + type, 'data-topic': topic,
-      'aria-selected': this.wanted.includes(name), onclick: () => this.toggle(sensor) },
+      'aria-pressed': this.wanted.includes(name), onclick: () => this.toggle(sensor) },
     breakable(topic.replace(/^\//, ''), '/'));
   }
 

@@ -12,7 +12,8 @@ export class EventLog {
   /** @param {(seq: number) => void} onPick an event was chosen */
   constructor(onPick) {
     this.onPick = onPick;
-    this.root = h('ol', { class: 'event-log', 'aria-label': 'Events, newest first' });
+    this.root = h('ol', { class: 'event-log', tabindex: 0,
+      'aria-label': 'Events, newest first' });
     this.shown = 0; // events of the trial
     /** @type {HTMLElement | null} */
     this.marked = null;

@@ -69,7 +69,7 @@ export class TrialList {
     const heard = wanted.filter((trial) => !isOfBag(trial));
     const days = groupedByDay(wanted.filter(isOfBag));
     redraw(this.list, heard.map((trial) => this.row(trial, chosen)),
-      days.map(({ day, trials }) => [h('h4', { class: 'trial-day' }, 'Bags of ', day),
+      days.map(({ day, trials }) => [h('h2', { class: 'trial-day' }, 'Bags of ', day),
         trials.map((trial) => this.row(trial, chosen))]),
       !wanted.length && h('p', { class: 'dim' }, 'None.'));
   }

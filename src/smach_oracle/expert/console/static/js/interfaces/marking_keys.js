@@ -1,0 +1,109 @@
+// @ts-check
+// Marking by keyboard: the arrow keys move a cross over the image, Enter or Space begins and ends
+// what is drawn, Escape takes the line back.
+import { announce } from '../page/announce.js';
+import { modified } from '../page/dom.js';
+
+/** @typedef {import('../server').Point} Point */
+/**
+ * @typedef {object} Use
+ * @property {() => Point} size of the image, px
+ * @property {() => number} scale px of the image for one of the screen
+ * @property {() => boolean} may whether somebody may draw now
+ * @property {() => boolean} drawing whether a line has begun
+ * @property {(point: Point) => void} begin
+ * @property {(point: Point) => void} move
+ * @property {() => void} end
+ * @property {() => void} cancel
+ * @property {() => void} moved the cross has moved, come or gone
+ */
+
+export const MARKING_KEYS = 'Arrow keys move the cross (with Shift by one pixel), Enter begins and '
+  + 'ends what is drawn, Escape takes the line back.';
+const STEP = 10; // px of the screen
+const QUIET_MS = 400; // without a key: then the cross's place is said
+/** @type {{ [key: string]: Point | undefined }} */
+const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+export class MarkingKeys {
+  /**
+   * @param {HTMLElement} canvas
+   * @param {Use} use
+   */
+  constructor(canvas, use) {
+    this.use = use;
+    /** @type {Point | null} */
+    this.cross = null; // null: it is not shown
+    this.timer = 0;
+    canvas.addEventListener('keydown', (event) => this.key(event));
+    canvas.addEventListener('pointerdown', () => this.hide());
+    canvas.addEventListener('blur', () => this.leave());
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const step = STEPS[event.key];
+    const sets = event.key === 'Enter' || event.key === ' ';
+    const takesBack = event.key === 'Escape' && this.use.drawing();
+    if (modified(event) || !(step || sets || takesBack) || !this.use.may()) return;
+    event.preventDefault();
+    event.stopPropagation(); // these keys mean something else elsewhere on the page
+    if (step) this.step(step, event.shiftKey);
+    else if (takesBack) this.use.cancel();
+    else if (!event.repeat) this.set();
+  }
+
+  /** Where the cross is: at first in the middle. */
+  get place() {
+    const [width, height] = this.use.size();
+    const [x, y] = this.cross || [width / 2, height / 2];
+    return /** @type {Point} */ ([within(x, width), within(y, height)]);
+  }
+
+  /**
+   * @param {Point} step
+   * @param {boolean} finely
+   */
+  step([dx, dy], finely) {
+    const by = finely ? 1 : Math.max(1, Math.round(STEP * this.use.scale()));
+    const [x, y] = this.place;
+    this.cross = [x + dx * by, y + dy * by];
+    this.cross = this.place;
+    if (this.use.drawing()) this.use.move(this.cross);
+    this.use.moved();
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => announce(this.words()), QUIET_MS);
+  }
+
+  /** Begin what is drawn at the cross, or end it there. */
+  set() {
+    this.cross = this.place;
+    if (this.use.drawing()) this.use.end();
+    else this.use.begin(this.cross);
+    this.use.moved();
+    announce((this.use.drawing() ? 'It begins at ' : 'It ends at ') + this.words());
+  }
+
+  words() {
+    const [x, y] = this.place;
+    return x + ', ' + y + ' of ' + this.use.size().join(' by ');
+  }
+
+  hide() {
+    clearTimeout(this.timer);
+    this.cross = null;
+    this.use.moved();
+  }
+
+  /** The focus goes: what was begun by keys is not ended by them any more. */
+  leave() {
+    if (this.cross && this.use.drawing()) this.use.cancel();
+    this.hide();
+  }
+}
+
+/**
+ * @param {number} value
+ * @param {number} size px
+ */
+function within(value, size) { return Math.round(Math.min(Math.max(value, 0), size - 1)); }
