@@ -20,8 +20,8 @@ class AccessControl:
         self.audit = audit
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
-        # a page has some 80; a browser may open many pages
-        self.files = ClientRateLimits(rate=100.0, burst=1500.0, for_all=5.0)
+        # a page has some 100; a browser may open many pages
+        self.files = ClientRateLimits(rate=100.0, burst=2000.0, for_all=5.0)
         self.sign_ins = ClientRateLimits(rate=0.2, burst=5.0, for_all=4.0)
         # id of a session -> when, s; of those whose cookie might still be good
         self._ended: Dict[str, float] = {}

@@ -99,6 +99,8 @@ export class FollowUp {
 
   /** @param {TrialEvent[]} steps */
   hintOf(steps) {
+    const gone = this.last ? '' : this.app.liveness.gone(this.question);
+    if (gone) return gone;
     if (!this.last && steps.length) return 'It goes on…';
     if (!this.last) {
       return this.waits
@@ -132,7 +134,9 @@ export class FollowUp {
   update() {
     if (!this.since) return;
     this.showNext();
-    if (!this.waits && !this.steps.childElementCount
+    const gone = this.last ? '' : this.app.liveness.gone(this.question);
+    if (gone) setText(this.hint, gone);
+    else if (!this.waits && !this.steps.childElementCount
         && Date.now() - this.since > SILENCE_MS) {
       setText(this.hint, 'What it does next is not known: nothing is heard on '
         + this.question.robot + '/oracle/events.');

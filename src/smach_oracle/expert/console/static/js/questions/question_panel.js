@@ -76,7 +76,8 @@ class QuestionPanel {
   /** @param {Question} question */
   row(question) {
     const { key, status, state, robot, path, rate } = question;
-    return h('button', { key, class: 'question-row ' + status, 'data-key': key,
+    const silent = this.app.liveness.whoIsSilent(question) ? ' silent' : '';
+    return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
       'data-deliberate': 'choose ' + key, 'aria-current': this.isChosen(key),
       onclick: () => this.choose(key) },
     h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
@@ -89,12 +90,13 @@ class QuestionPanel {
   }
 
   /** @param {Question} question */
-  statusChip({ status, holder, interface: name }) {
+  statusChip(question) {
+    const { status, holder, interface: name } = question;
     if (status === 'interface') {
       return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
     }
     if (!holder) return chip('waiting', 'bad');
-    return holder === this.app.expert ? chip('yours', 'good') : chip(holder, 'warn');
+    return this.app.isMine(question) ? chip('yours', 'good') : chip(holder, 'warn');
   }
 
   /** @param {Question} question */
