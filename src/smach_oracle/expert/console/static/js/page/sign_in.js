@@ -10,7 +10,7 @@ const WORDS = { 0: 'The console does not answer.', 200: '', 401: 'There is no su
   429: 'Too many tries; wait a little.' };
 const ABOUT_TOKENS = 'This console takes commands to robots. Its token is in the file that it was '
   + 'started with.';
-const ABOUT_NAMES = 'As robots, other experts and the records of trials have it.';
+const ABOUT_NAMES = 'Your name, as robots, other experts and the records of trials have it.';
 
 /**
  * Put the form that takes a token in the place of the panels.

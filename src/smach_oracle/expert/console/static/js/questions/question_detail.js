@@ -304,7 +304,7 @@ export class QuestionDetail {
     this.robotGone = now ? '' : this.robotGone || liveness.gone(this.question);
     this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
       gone: this.robotGone });
-    this.root.classList.toggle('silent', silent);
+    this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
     this.form.enable(mine && !sending && !settled && !silent);
     this.showTime();
   }

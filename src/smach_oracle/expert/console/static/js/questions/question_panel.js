@@ -27,8 +27,9 @@ class QuestionPanel {
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
+    this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.servers,
+      h('aside', { class: 'queue-side' }, this.queue, this.servers, this.ages,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     window.addEventListener('keydown', (event) => this.key(event));
     this.showStage();
@@ -47,6 +48,7 @@ class QuestionPanel {
 
   tick() {
     this.showQueue();
+    setText(this.ages, 'Heard: ' + this.app.liveness.ages() + ' ago');
     if (this.detail) this.detail.tick();
   }
 
