@@ -250,6 +250,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         name = identity.name or command.arguments['expert']
         self._person = Person(self.request.remote_ip or '', session.short, identity.role, name)
         self._pages.sockets.add(self)
+        self._pages.onlookers.rename(self._number, self._person)
         self._note(command, CommandReply(True))
         return CommandReply(True, name, {'browser': session.short})
 

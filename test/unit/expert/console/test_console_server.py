@@ -282,9 +282,8 @@ class TestPeople(console_case.ConsoleCase):
     async def nameless(self, expert=''):
         answer = await self.http_client.fetch(self.get_url('/session'))
         socket = await self.connect(answer.headers['Set-Cookie'].split(';')[0])
-        reply = await self.say(socket, do='hello', xsrf=json.loads(answer.body)['xsrf'],
-                               expert=expert)
-        return socket, reply
+        self.xsrf = json.loads(answer.body)['xsrf']
+        return socket, await self.say(socket, do='hello', xsrf=self.xsrf, expert=expert)
 
     @tornado.testing.gen_test
     async def test_who_has_said_no_name_looks_and_stops_and_does_nothing_else(self):
@@ -306,7 +305,9 @@ class TestPeople(console_case.ConsoleCase):
             await self.say(page, 7, do='look', question='q')
         assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann', '']
         assert self.sections.get('onlookers')['q'][0]['session'] == hello['data']['browser']
-        await self.say(other, 8, do='look', question='')
+        await self.say(other, 8, do='hello', xsrf=self.xsrf, expert='bob')
+        assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann', 'bob']
+        await self.say(other, 9, do='look', question='')
         assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann']
         socket.close()
         await self.until(lambda: self.sections.get('onlookers') == {})

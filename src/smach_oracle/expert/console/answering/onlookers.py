@@ -29,6 +29,11 @@ class Onlookers:
         else:
             self.leave(page)
 
+    def rename(self, page: int, person: Person) -> None:
+        """The person at a page has said a name."""
+        if page in self._by_page:
+            self.look(page, self._by_page[page].question, person)
+
     def leave(self, page: int) -> None:
         """A page is gone, or shows no question."""
         if self._by_page.pop(page, None) is not None:

@@ -102,7 +102,8 @@ export class QuestionDetail {
     this.showPerception();
     this.showInterface();
     this.onlookers.look();
-    if (this.app.mayAnswer && this.question.status === 'pending') this.claim('claim');
+    const free = this.question.status === 'pending' || this.mine; // by a page of before: keep it
+    if (this.app.mayAnswer && free) this.claim('claim');
     this.show();
   }
 

@@ -15,7 +15,7 @@ export class SilenceBar {
     this.liveness = liveness;
     this.question = question;
     this.words = h('span', { role: 'alert' });
-    this.root = h('div', { class: 'claim-bar warn silence-bar', hidden: true }, this.words);
+    this.root = h('div', { class: 'silence-bar', hidden: true }, this.words);
     this.age = h('span', { class: 'dim last-word' });
   }
 
