@@ -47,7 +47,7 @@ class Cameras(ConsolePage, unittest.TestCase):
         while not rospy.is_shutdown():
             for publisher in (cls.foreign, cls.own):
                 publisher.publish(picture(rospy.Time.now()))
-            rospy.rostime.wallsleep(0.2)
+            rospy.rostime.wallsleep(0.2)  # five pictures a second
 
     def shown(self):
         return set(self.browser.run(TOPICS))
