@@ -6,6 +6,10 @@ import { h, setText } from '../page/dom.js';
 /** @typedef {import('../server').Onlooker} Onlooker */
 /** @typedef {import('../server').Question} Question */
 
+const PAUSE_MS = 1000; // whoever turns the pages fast uses up no limit on commands
+let wanted = ''; // the question that this page shows
+let timer = 0;
+
 export class Onlookers {
   /**
    * @param {App} app
@@ -23,7 +27,13 @@ export class Onlookers {
   leave() { this.tell(''); }
 
   /** @param {string} question */
-  tell(question) { this.app.connection.request('look', { question }).catch(() => {}); }
+  tell(question) {
+    wanted = question;
+    timer = timer || setTimeout(() => {
+      timer = 0;
+      this.app.connection.request('look', { question: wanted }).catch(() => {});
+    }, PAUSE_MS);
+  }
 
   show() {
     const names = namesOf(this.app, this.key);
