@@ -21,7 +21,7 @@ from std_msgs.msg import Header
 from control_msgs.msg import PointHeadAction, PointHeadGoal
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import Node
+from console_page import ConsolePage, Node
 from thin_line import ThinLine
 from waiting import wait_for
 
@@ -101,6 +101,7 @@ class Drive(unittest.TestCase):
         cls.robot = Robot()
         port = free_port()
         cls.line = ThinLine(port)
+        rospy.set_param('/expert_console/cameras', {'/alpha': ['/head_camera']})
         cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
                            '__name:=expert_console')
         cls.machine = Node(sys.executable, os.path.join(HERE, 'console_drive_pr2_robot.py'),
@@ -108,6 +109,7 @@ class Drive(unittest.TestCase):
         cls.browser = Browser(1360, 1000)
         cls.robot.look_at_the_table()
         assert wait_for(cls.page_is_served, 40.0)
+        ConsolePage.remember_name(cls.browser, 'operator')
 
     @classmethod
     def tearDownClass(cls):

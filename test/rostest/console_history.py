@@ -57,6 +57,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         cls.browser = Browser(1360, 1000)
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get('http://localhost:{}/'.format(cls.port))
+        cls.remember_name(cls.browser, 'operator')
 
     @classmethod
     def tearDownClass(cls):

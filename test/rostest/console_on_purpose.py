@@ -46,9 +46,9 @@ document.querySelector(selector).click();
 box.remove();'''
 # somebody takes a question over; the list that tells of it comes later than the reply
 TAKEN = '''
-const paths = ["questions/question_detail.js", "page/store.js"];
+const paths = ["questions/question_detail.js", "page/store.js", "page/liveness.js"];
 return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
-  [{ QuestionDetail }, { Store }]) => {
+  [{ QuestionDetail }, { Store }, { Liveness }]) => {
   const store = new Store();
   const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
     state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
@@ -57,11 +57,13 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
     give_up: [], interfaces: [], userdata: [] };
   const request = async () => ({ ok: true, message: "" });
   const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
-    connection: { connected: true, request } };
+    connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
+    isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
   const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
   store.onChange((names) => detail.update(names));
   const said = (holder) => {
-    store.receive({ now: 0, sections: { questions: [{ ...question, holder }] } });
+    const session = holder === "ann" ? "b1" : "";
+    store.receive({ now: 0, sections: { questions: [{ ...question, holder, session }] } });
     return detail.claimBar.root.textContent;
   };
   said("bob");

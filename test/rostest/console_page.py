@@ -31,6 +31,11 @@ class Node:
         """SIGCONT."""
         self._process.send_signal(signal.SIGCONT)
 
+    def kill(self):
+        """SIGKILL: it takes leave of nobody."""
+        self._process.kill()
+        self._process.wait(20)
+
     def stop(self):
         """Ctrl-C, as from a shell."""
         if self._process.poll() is None:
@@ -42,18 +47,30 @@ class ConsolePage:
     """Beside unittest.TestCase."""
 
     @classmethod
-    def begin(cls, robot, *arguments, size=()):
+    def begin(cls, robot, *arguments, size=(), name='operator'):
         """Start the console, the robot /alpha (a file beside this one, and its arguments) and a
-        browser at the page.
+        browser at the page, of somebody who has given that name before.
         """
         from browser import Browser
         cls.port = free_port()
         cls.page = 'http://localhost:{}/'.format(cls.port)
         cls.console = cls.start_console()
-        cls.robot = Node(sys.executable, os.path.join(HERE, robot), *arguments, '__name:=alpha')
+        cls.robot = cls.start_robot(robot, *arguments)
         cls.browser = Browser(*size)
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get(cls.page)
+        if name:
+            cls.remember_name(cls.browser, name)
+
+    @staticmethod
+    def remember_name(browser, name):
+        """As if it had been given before; the page begins anew."""
+        browser.run('localStorage.setItem("expert", arguments[0])', name)
+        browser.driver.refresh()
+
+    @classmethod
+    def start_robot(cls, robot, *arguments):
+        return Node(sys.executable, os.path.join(HERE, robot), *arguments, '__name:=alpha')
 
     @classmethod
     def tearDownClass(cls):

@@ -301,6 +301,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             self.browser.close()
             type(self).browser = Browser(1360, 1000)
             self.browser.driver.get(self.page)
+            self.remember_name(self.browser, 'operator')
             self.browser.click(QUESTION)
             self.browser.click('.wheel', 40.0)
             self.assertTrue(self.browser.says('You drive.', '.driver', 30.0))

@@ -39,6 +39,13 @@ class ListedQuestion(NamedTuple):
         return '{} {}'.format(self.server, self.goal.query_id)
 
 
+class ListNews(NamedTuple):
+    """When a server spoke last."""
+
+    came_s: float  # by this process's monotonic clock
+    stamp_s: float  # by the server's ROS clock; 0 where that does not run yet
+
+
 class FollowedServer:
     """Follows the open list of one server and calls its services.
 
@@ -54,6 +61,7 @@ class FollowedServer:
         self.name = name
         self._on_change = on_change
         self._questions: List[ListedQuestion] = []
+        self._news: Optional[ListNews] = None
         self._unheard_since_s: Optional[float] = None
         self._unanswered: Optional[ServiceCall] = None
         self._subscriber = self._subscribe()
@@ -63,9 +71,22 @@ class FollowedServer:
         """Whether the server's process is there."""
         return bool(live_connections(self._subscriber))
 
+    @property
+    def news(self) -> Optional[ListNews]:
+        """When its list came last; None before the first.
+
+        While a question is open the list comes every second.
+        """
+        return self._news
+
     def questions(self) -> List[ListedQuestion]:
         """The open questions, oldest first; none while the server is gone."""
-        return list(self._questions) if self.connected else []
+        known = self._questions
+        if self.connected:
+            return list(known)
+        if self._questions is known:
+            self._questions = []  # of whoever comes next under this name they are none
+        return []
 
     def claim(self, query_id: str, expert: str, action: int = ClaimQueryRequest.CLAIM,
               lease_s: float = 0.0) -> ClaimQueryResponse:
@@ -111,6 +132,7 @@ class FollowedServer:
 
     def _on_list(self, message: OpenQueries) -> None:
         now_s = time.monotonic()
+        self._news = ListNews(now_s, message.header.stamp.to_sec())
         self._questions = [_listed(self.name, entry, now_s) for entry in message.queries]
         self._on_change()
 

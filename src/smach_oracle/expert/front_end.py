@@ -11,7 +11,7 @@ from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
 
 from .claims import LEASE_S, Claim, ClaimKeeper
-from .followed_server import FollowedServer, ListedQuestion
+from .followed_server import FollowedServer, ListedQuestion, ListNews
 
 _DISCOVERY_PERIOD_S = 2.0
 _FORGET_S = 600.0  # after which a server that was found, and is gone, is followed no longer
@@ -54,6 +54,11 @@ class FrontEnd:
         """Whether the server is there now."""
         followed = self._servers.get(server)
         return followed is not None and followed.connected
+
+    def news(self, server: str) -> Optional[ListNews]:
+        """When the server's list came last; None before the first."""
+        followed = self._servers.get(server)
+        return followed.news if followed is not None else None
 
     def questions(self) -> List[ListedQuestion]:
         """Open questions of all servers, oldest first."""

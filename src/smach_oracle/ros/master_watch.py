@@ -5,6 +5,7 @@ existing connections go on, but nobody new can find the node. `MasterWatch` noti
 everything again.
 """
 import threading
+import time
 import xmlrpc.client
 from http.client import HTTPConnection
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
@@ -109,8 +110,14 @@ class MasterWatch:
         self._poll_s = poll_s
         self._known_pid: Optional[int] = None
         self._lost = False
+        self._heard_s: Optional[float] = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='master_watch', daemon=True)
+
+    @property
+    def heard_s(self) -> Optional[float]:
+        """When the master answered last, by the monotonic clock, in s; None before it has."""
+        return self._heard_s
 
     def start(self) -> None:
         """Begin to watch; the thread ends with the process."""
@@ -123,7 +130,9 @@ class MasterWatch:
     def check(self) -> None:
         """Look once, and register again where needed."""
         try:
+            asked_s = time.monotonic()
             pid, known = self._link.identity()
+            self._heard_s = asked_s
             if self._known_pid is None and known:
                 self._known_pid = pid
             if self._lost or not known or pid != self._known_pid:

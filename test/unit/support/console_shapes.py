@@ -17,6 +17,8 @@ from smach_oracle.expert.console.answering import teleoperation
 from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
 from smach_oracle.expert.console.answering.interface_commands import marked_view
 from smach_oracle.expert.console.answering.interface_output_view import interface_output_view
+from smach_oracle.expert.console.answering.last_heard import LastHeard
+from smach_oracle.expert.console.answering.onlookers import Onlookers
 from smach_oracle.expert.console.answering.precondition_sections import status_view
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
@@ -31,11 +33,13 @@ from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.sensors import sample_handlers
 from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
 from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
-from smach_oracle.expert.console.sensors.sensor_streams import SensorStream
+from smach_oracle.expert.console.sensors.robot_cameras import RobotCameras
+from smach_oracle.expert.console.sensors.sensor_streams import SensorStream, SensorStreams
+from smach_oracle.expert.console.trials import bag_catalogue
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
 from smach_oracle.expert.console.web.audit import Person
-from smach_oracle.expert.followed_server import ListedQuestion
+from smach_oracle.expert.followed_server import ListedQuestion, ListNews
 from smach_oracle.expert.interface_outputs import InterfaceOutputs
 from smach_oracle.msg import (
     InterfaceOutput,
@@ -79,7 +83,8 @@ def questions():
              listed(OpenQuery.INTERFACE_RUNNING, interface='assist', rate=math.nan,
                     choices=unknown),
              listed(failure_kind=FailureKind.STILL_RUNNING, outcome='', interfaces=())]
-    return [question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)) for each in asked]
+    return [dict(question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)), session='a1')
+            for each in asked]
 
 
 class NoLayouter:
@@ -98,12 +103,25 @@ class FrontEnd:
 
 def put_questions(sections):
     sections.put('questions', questions())
+    put_people(sections)
     sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
     checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
         (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
     sections.put('preconditions', {KEY: status_view(PreconditionChecks(checks=checks), 1000.0)})
+    RobotCameras(SensorStreams(), {}).write_sections(sections, ['/robot'])
     sections.put('images', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
                                   for late_s in (None, 1.5)]})
+
+
+def put_people(sections):
+    """Who looks at a question, and who is heard: one server is, the other one and the master never
+    were.
+    """
+    Onlookers(sections).look(1, KEY, Person('', 'a1', 'operator', 'ann'))
+    front = SimpleNamespace(servers=['/a', '/b'], questions=lambda: [listed()], news=lambda name:
+                            ListNews(1.0, 2.0) if name == '/a' else None)
+    LastHeard(front, SimpleNamespace(follow=lambda nodes: None, heard_s=lambda node: 1.0),
+              lambda: {'/robot': ['/node']}, lambda: None).write_sections(sections)
 
 
 def put_machines(sections):
@@ -187,6 +205,10 @@ def sensor_facts():
         frame = sensor.newer(0)
         encoded, facts = sensor.file_of(frame, 640)
         found.append((name, json.loads(facts or encoded.body)))
+        for age_s in (1.5, None):
+            ages = SimpleNamespace(age_s=lambda *_, told=age_s: told)
+            found.append((name, json.loads(sample_handlers._with_age(
+                facts or encoded.body.decode(), ages, '/topic', frame))))
     for place in (np.eye(4)[:3], None):
         beside = SimpleNamespace(newer=lambda than: None,
                                  place_of=lambda *_, at=place: (at, 'no transform'))

@@ -10,6 +10,7 @@ import tornado.iostream
 import tornado.web
 import tornado.websocket
 
+from .answering.onlookers import Onlookers
 from .answering.question_commands import QuestionCommands
 from .answering.teleoperation import Teleoperation
 from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse
@@ -30,6 +31,7 @@ LONGEST_UNSEEN_S = 60.0
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
+NAME_FIRST = 'say your name first: the robot and the records have it'
 TOO_FAST = 4008
 FORGED = 4003
 SIGNED_OUT = 4001
@@ -45,6 +47,7 @@ class OpenPages:
         self.log = log
         self.question_commands = question_commands
         self.teleoperation = teleoperation
+        self.onlookers = Onlookers(sections)
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
         self.numbers = itertools.count(1)
@@ -153,6 +156,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         """Claims run out unless the page comes back."""
         self._pages.open.discard(self)
         self._pages.sockets.discard(self)
+        self._pages.onlookers.leave(self._number)
         self._pages.question_commands.leave(self._number)
         self._pages.teleoperation.leave(self._number)
 
@@ -210,6 +214,11 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if not may(self._person.role, needed_role(command.name)):
             return self._note(command, CommandReply(False, '{}s may not {} (sign in as {})'.format(
                 self._person.role, command.name.replace('_', ' '), needed_role(command.name))))
+        if not self._person.expert and not _by_anybody(command):
+            return self._note(command, CommandReply(False, NAME_FIRST))
+        if command.name == 'view':
+            self._pages.onlookers.look(self._number, command.arguments['question'], self._person)
+            return self._note(command, CommandReply(True))
         if command.name == 'watch':
             self._watched, self._watched_from = command.arguments['trial'], 0
             return self._note(command, CommandReply(True))
@@ -253,11 +262,12 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._note(None, CommandReply(False, 'forged'))
             self.close(FORGED, 'forged')
             return CommandReply(False, 'forged')
-        name = identity.name or command.arguments['expert'] or 'operator'
+        name = identity.name or command.arguments['expert']
         self._person = Person(self.request.remote_ip or '', session.short, identity.role, name)
         self._pages.sockets.add(self)
+        self._pages.onlookers.rename(self._number, self._person)
         self._note(command, CommandReply(True))
-        return CommandReply(True, name)
+        return CommandReply(True, name, {'browser': session.short})
 
     def _note(self, command: Optional[PageCommand], reply: CommandReply) -> CommandReply:
         """Record in the audit a command that went no further than this socket."""
@@ -320,6 +330,11 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             if done is not None:
                 done()
         asyncio.get_running_loop().create_task(send())
+
+
+def _by_anybody(command: PageCommand) -> bool:
+    """Whether a command may come from somebody who has not said a name."""
+    return needed_role(command.name) == 'viewer' or stops(command.name, command.arguments)
 
 
 def _only_stops(message: Union[str, bytes]) -> bool:

@@ -18,17 +18,20 @@ from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
 from .answering.interface_commands import InterfaceCommands
+from .answering.last_heard import LastHeard
 from .answering.precondition_sections import PreconditionStatuses
 from .answering.question_commands import QuestionCommands
 from .answering.question_sections import QuestionSections
 from .answering.sensor_discovery import SensorDiscovery
 from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
+from .feeds.node_pulse import NodePulse
 from .feeds.repeating import repeat
 from .graphs.layout_worker import LayoutWorker
 from .page_socket import OpenPages, PageSocket
 from .robots.followed_robots import FollowedRobots
 from .sensors.question_images import ImageStore, QuestionImages
+from .sensors.robot_clocks import ImageAges, RobotClocks
 from .sensors.sample_handlers import RobotAppearanceHandler, SampleHandler, SensorRequests
 from .sensors.sensor_streams import SensorStreams
 from .trials.bag_catalogue import BagCatalogue
@@ -52,9 +55,10 @@ PONG_LIMIT_S = 15.0
 
 
 def make_app(access: AccessControl, pages: OpenPages, sensors: SensorStreams,
-             history: HistoryRequests) -> tornado.web.Application:
+             history: HistoryRequests,
+             ages: Optional[ImageAges] = None) -> tornado.web.Application:
     """The web application; its handlers run in the thread of the loop that serves it."""
-    shared = SensorRequests(sensors)
+    shared = SensorRequests(sensors, ages)
     static = {'path': str(STATIC)}
     return tornado.web.Application(
         [(r'/session', SessionHandler, {'close': pages.close}),
@@ -94,23 +98,30 @@ class Console:
         self._log = TrialLog()
         self._audit = Audit()
         layouts = LayoutWorker()
-        self._robots = FollowedRobots(self._sections, self._log, layouts)
+        self._clocks = RobotClocks()
+        self._robots = FollowedRobots(self._sections, self._log, layouts, self._clocks)
         self._front_end = FrontEnd('expert_console')
-        self._discovery = SensorDiscovery(self._sections, self._front_end)
-        self._question_sections = QuestionSections(self._front_end, self._log)
+        self._discovery = SensorDiscovery(self._sections, self._front_end, settings.cameras)
         self._preconditions = PreconditionStatuses()
         files = ImageStore()
-        self._question_images = QuestionImages(files, self._discovery.sensors)
+        self._question_images = QuestionImages(files, self._discovery.sensors,
+                                                self._discovery.cameras)
         self._catalogue = BagCatalogue(settings.bags, self._sections)
         self._teleoperation = Teleoperation(self._sections, self._front_end, self._audit)
-        self._pages = OpenPages(
-            self._sections, self._log,
-            QuestionCommands(self._front_end, self._audit,
-                 InterfaceCommands(self._teleoperation.is_interface).commands), self._teleoperation)
+        master = start_master_watch()
+        self._last_heard = LastHeard(self._front_end, NodePulse(), self._robots.nodes,
+                                     lambda: master.heard_s, self._clocks)
+        questions = QuestionCommands(self._front_end, self._audit,
+                                     InterfaceCommands(self._teleoperation.is_interface).commands,
+                                     self._last_heard.refusal)
+        self._question_sections = QuestionSections(self._front_end, self._log,
+                                                   questions.sessions.session_of)
+        self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation)
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         access = AccessControl(settings._replace(port=port), secret, self._audit)
         app = make_app(access, self._pages, self._discovery.sensors,
-                       HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files))
+                       HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files),
+                       ImageAges(self._clocks, self._discovery.cameras))
         server = LimitedServer(app, ssl_options=tls, max_body_size=MOST_BYTES,
                                max_header_size=16384, body_timeout=10.0,
                                idle_connection_timeout=60.0, max_buffer_size=4 * MOST_BYTES)
@@ -132,6 +143,7 @@ class Console:
 
     def _write_sections(self) -> None:
         """Make sections of what ROS threads have taken in."""
+        self._last_heard.write_sections(self._sections)
         self._robots.write_sections()
         self._question_sections.write_sections(self._sections)
         questions = self._front_end.questions()
@@ -141,6 +153,8 @@ class Console:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)
             self._pages.write_trials()
+            self._discovery.cameras.write_sections(
+                self._sections, {*self._robots.nodes(), *(each.goal.robot for each in questions)})
 
 
 def _listen(settings: ConsoleSettings) -> List[socket.socket]:
@@ -198,8 +212,8 @@ def main() -> None:
     parameters_only(
         'Node: a web page from which people watch robots and answer their questions. Parameters: '
         '~address, '
-        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags; see '
-        'doc/console.md.'
+        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~cameras; '
+        'see doc/console.md.'
     )
     rospy.init_node('expert_console')
     start_master_watch()

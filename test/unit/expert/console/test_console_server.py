@@ -272,3 +272,42 @@ class TestWithoutTokens(console_case.ConsoleCase):
         _, info = self.begin()
         assert (info['signed_in'], info['role'], info['tokens']) == (True, 'teleoperator', False)
         assert self.ask('/session', Origin='http://evil.example').code == 403
+
+
+class TestPeople(console_case.ConsoleCase):
+    """Without tokens, where anybody may choose a name."""
+
+    tokens = False
+
+    async def nameless(self, expert=''):
+        answer = await self.http_client.fetch(self.get_url('/session'))
+        socket = await self.connect(answer.headers['Set-Cookie'].split(';')[0])
+        self.xsrf = json.loads(answer.body)['xsrf']
+        return socket, await self.say(socket, do='hello', xsrf=self.xsrf, expert=expert)
+
+    @tornado.testing.gen_test
+    async def test_who_has_said_no_name_looks_and_stops_and_does_nothing_else(self):
+        socket, hello = await self.nameless()
+        assert (hello['ok'], hello['message']) == (True, '')
+        for command in ({'do': 'claim'}, {'do': 'take_over'}, {'do': 'take_wheel'},
+                        {'do': 'answer', 'kind': 'goto', 'name': 'x'}):
+            refused = await self.say(socket, 5, question='q', **command)
+            assert (refused['ok'], refused['message']) == (False, page_socket.NAME_FIRST)
+        assert self.question_commands.done == []
+        for command in ('view', 'stop_hand', 'leave_wheel'):
+            assert (await self.say(socket, 6, do=command, question='q'))['ok']
+
+    @tornado.testing.gen_test
+    async def test_a_page_tells_all_others_which_question_it_shows(self):
+        socket, hello = await self.nameless('ann')
+        other, _ = await self.nameless()
+        for page in (socket, other):
+            await self.say(page, 7, do='view', question='q')
+        assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann', '']
+        assert self.sections.get('onlookers')['q'][0]['session'] == hello['data']['browser']
+        await self.say(other, 8, do='hello', xsrf=self.xsrf, expert='bob')
+        assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann', 'bob']
+        await self.say(other, 9, do='view', question='')
+        assert [each['name'] for each in self.sections.get('onlookers')['q']] == ['ann']
+        socket.close()
+        await self.until(lambda: self.sections.get('onlookers') == {})

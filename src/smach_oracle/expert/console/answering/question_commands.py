@@ -20,6 +20,7 @@ from ...front_end import FrontEnd
 from ..commands.checks import TypedOutput
 from ..commands.commands import KINDS, CommandReply, PageCommand
 from ..web.audit import Audit, Person
+from .session_claims import SessionClaims
 
 _KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,
                          ExpertDecision.INTERFACE)))
@@ -30,6 +31,8 @@ _FIELD = {'goto': 'state', 'supersede': 'outcome', 'give_up': 'outcome', 'interf
 
 # may raise ServerGoneError
 CommandWorker = Callable[[PageCommand, Person, ListedQuestion], CommandReply]
+# why a command is refused before anything is done for it; '' where it is not
+Refusal = Callable[[PageCommand, ListedQuestion], str]
 
 
 class OutputError(OracleError):
@@ -39,12 +42,17 @@ class OutputError(OracleError):
 class QuestionCommands:
     """Works on the open questions of a front end, for several people at once."""
 
-    def __init__(self, front_end: FrontEnd, audit: Audit, others: Mapping[str,
-                                                                          CommandWorker]) -> None:
-        """`others`: further commands about questions, by name."""
+    def __init__(self, front_end: FrontEnd, audit: Audit, others: Mapping[str, CommandWorker],
+                 refusal: Refusal = lambda command, listed: '') -> None:
+        """
+        :param others: further commands about questions, by name.
+        :param refusal: says of each command whether it is too late for it.
+        """
+        self._refusal = refusal
         self._front_end = front_end
         self._others = others
         self._audit = audit
+        self.sessions = SessionClaims()
         self.claims = ClaimKeeper(front_end)  # held by the pages that show the questions
 
     def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
@@ -63,6 +71,9 @@ class QuestionCommands:
              listed: Optional[ListedQuestion]) -> CommandReply:
         if listed is None:
             return CommandReply(False, 'This question is open no longer.')
+        refused = self._refusal(command, listed) or self.sessions.refusal(command, person, listed)
+        if refused:
+            return CommandReply(False, refused)
         try:
             if command.name in self._others:
                 return self._others[command.name](command, person, listed)
@@ -73,11 +84,20 @@ class QuestionCommands:
             return CommandReply(False, str(err))
 
     def _claim(self, name: str, person: Person, page: int, listed: ListedQuestion) -> CommandReply:
-        if name == 'release' and not self.claims.leave(Claim(listed.key, person.expert), page):
-            return CommandReply(True, '')  # another page of the same person shows it
+        claim = Claim(listed.key, person.expert)
+        if name == 'release':
+            if not self.sessions.holds(person, listed):
+                return CommandReply(True, '')  # it is not this browser's to give back
+            if not self.claims.leave(claim, page):
+                return CommandReply(True, '')  # another page of the same browser shows it
         response = self._front_end.server(listed).claim(listed.goal.query_id, person.expert,
                                                         _ACTION[name], LEASE_S)
-        if response.ok and name != 'release':
+        if response.ok and name == 'release':
+            self.sessions.give_back(person, listed)
+        elif response.ok:
+            if not self.sessions.holds(person, listed):
+                self.claims.drop(claim)  # another browser of the same name has renewed it
+            self.sessions.take(person, listed)
             self.claims.keep(listed, person.expert, page)
         return CommandReply(response.ok, response.message)
 

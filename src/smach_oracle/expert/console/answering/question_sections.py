@@ -1,7 +1,7 @@
 """The open questions of all robots as one section."""
 import time
 from collections import OrderedDict
-from typing import Any, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
@@ -17,7 +17,10 @@ MOST_REMEMBERED = 1000
 class QuestionSections:
     """Draws the queue; one thread calls it."""
 
-    def __init__(self, front_end: FrontEnd, log: TrialLog) -> None:
+    def __init__(self, front_end: FrontEnd, log: TrialLog, session_of: Callable[[
+            ListedQuestion], str] = lambda listed: '') -> None:
+        """`session_of`: the browser that holds a question, in short."""
+        self._session_of = session_of
         self._front_end = front_end
         self._log = log
         self._epoch_s = time.time() - time.monotonic()
@@ -33,8 +36,9 @@ class QuestionSections:
             view['key']: {'asked': view['asked'], 'deadline': view['deadline']}
             for view in views
         }
-        sections.put('questions', views)
+        # first: where a question goes with its server, that is told of it
         sections.put('servers', self._servers())
+        sections.put('questions', views)
 
     def _servers(self) -> List[Dict[str, Any]]:
         return [{'name': name, 'connected': self._front_end.connected(name)}
@@ -48,6 +52,7 @@ class QuestionSections:
             now = view[name]
             if before is not None and now is not None and abs(before - now) < _JITTER_S:
                 view[name] = before
+        view['session'] = self._session_of(listed)
         view['asked'] = self._since(listed.key, view['asked'])
         return view
 

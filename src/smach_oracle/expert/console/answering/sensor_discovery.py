@@ -1,6 +1,7 @@
 """Keeps the closed sets of sensors and of perception interfaces up to date."""
 from functools import partial
-from typing import Any, Dict, Sequence, Set
+from types import MappingProxyType
+from typing import Any, Dict, Mapping, Sequence, Set
 
 import rosgraph
 import rospy
@@ -12,6 +13,7 @@ from ...front_end import FrontEnd
 from ..feeds.repeating import repeat
 from ..sensors.depth_clouds import AS_A_CLOUD, DepthCloudStream, depth_cameras
 from ..sensors.depth_clouds import TYPE as DEPTH_TYPE
+from ..sensors.robot_cameras import PARAMETER, RobotCameras, declared_in
 from ..sensors.robot_stream import DESCRIPTION, RobotStream, robots_in
 from ..sensors.sensor_streams import DerivedStream, SensorStreams
 from ..web.sections import PageSections
@@ -25,8 +27,11 @@ _SEGMENT = '/segment'
 class SensorDiscovery:
     """Its threads ask the master, and subscribe to the sensors that somebody watches."""
 
-    def __init__(self, sections: PageSections, front_end: FrontEnd) -> None:
+    def __init__(self, sections: PageSections, front_end: FrontEnd,
+                 cameras: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
+        """`cameras`: of robots, as set."""
         self.sensors = SensorStreams()
+        self.cameras = RobotCameras(self.sensors, cameras)
         self._sections = sections
         self._front_end = front_end
         self._perception_actions: Set[str] = set()
@@ -44,14 +49,17 @@ class SensorDiscovery:
         """Ask the master once."""
         master = rosgraph.Master(rospy.get_name())
         published = master.getPublishedTopics('')
+        parameters = master.getParamNames()
         self.sensors.follow(published, [
             DerivedStream(camera.depth + AS_A_CLOUD, DEPTH_TYPE,
                           partial(DepthCloudStream, camera=camera))
             for camera in depth_cameras(published)
         ] + [
             DerivedStream(name, DESCRIPTION, partial(RobotStream, parameter=name))
-            for name in robots_in(master.getParamNames())
+            for name in robots_in(parameters)
         ])
+        self.cameras.declare({robot: master.getParam(robot + PARAMETER)
+                              for robot in declared_in(parameters)})
         self._follow_interfaces(published, {name for name, _ in master.getSystemState()[2]})
 
     def write_sections(self) -> None:

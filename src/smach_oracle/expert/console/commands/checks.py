@@ -77,6 +77,15 @@ def _argument(check: checks.Check) -> Check:
 flag = _argument(checks.flag)
 
 
+def optional(check: Check) -> Check:
+    """What another check takes, or nothing: then None."""
+    return lambda value: None if value is None else check(value)
+
+
+# the newest beat that the page had seen, s by the console's clock
+seen = optional(number(0.0, 1e12))
+
+
 def shown(value: object) -> str:
     """A value for the text of a refusal: never long."""
     whole_text = repr(value)

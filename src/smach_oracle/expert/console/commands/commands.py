@@ -8,7 +8,7 @@ from typing import Any, Dict, Mapping, NamedTuple, Optional
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.ros.strict_json import load_json
 
-from .checks import QUESTION, CommandSpec, one_of, outputs, shown, text, whole
+from .checks import QUESTION, CommandSpec, one_of, outputs, seen, shown, text, whole
 from .driving import DRIVING_COMMANDS
 from .marking import MARKING_COMMANDS
 
@@ -101,13 +101,14 @@ COMMANDS: Dict[str, CommandSpec] = {
     'hello': CommandSpec('viewer', {'xsrf': text(200, 1), 'expert': _person}),
     'watch': CommandSpec('viewer', {'trial': text(400)}),
     'look': CommandSpec('viewer', {'at': one_of(('', 'trials'))}),
+    'view': CommandSpec('viewer', {'question': text(1000)}),
     'claim': CommandSpec('operator', QUESTION),
     'take_over': CommandSpec('operator', QUESTION),
     'release': CommandSpec('operator', QUESTION),
     'answer': CommandSpec(
         'operator',
         dict(QUESTION, kind=one_of(KINDS), name=text(400), container=text(4000),
-             outputs=outputs, why=text(2000))),
+             outputs=outputs, why=text(2000), seen=seen)),
     **MARKING_COMMANDS,
     **DRIVING_COMMANDS,
 }

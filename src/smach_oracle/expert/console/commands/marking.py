@@ -4,7 +4,7 @@ from typing import Callable, Dict, List, NamedTuple, Tuple
 
 import genpy
 
-from .checks import QUESTION, CommandSpec, flag, number, one_of, outputs, shown, text
+from .checks import QUESTION, CommandSpec, flag, number, one_of, outputs, seen, shown, text
 
 AT_GOAL, FRESH = 'at_goal', 'fresh'
 MOST_CORNERS = 2000
@@ -65,6 +65,7 @@ MARKING_COMMANDS: Dict[str, CommandSpec] = {
                  dict(QUESTION, stamp=_stamp, region=_points(3, MOST_CORNERS), strokes=_strokes)),
     'use_frame': CommandSpec('operator', dict(QUESTION, frame=one_of((AT_GOAL, FRESH)))),
     'hand_over': CommandSpec('operator',
-                      dict(QUESTION, outcome=text(400, 1), outputs=outputs, why=text(2000))),
+                      dict(QUESTION, outcome=text(400, 1), outputs=outputs, why=text(2000),
+                           seen=seen)),
     'give_up_interface': CommandSpec('operator', dict(QUESTION, why=text(2000))),
 }

@@ -2,7 +2,7 @@
 import threading
 from collections import OrderedDict
 from types import MappingProxyType
-from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Sequence, Set, Tuple
+from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set, Tuple
 
 import rosgraph
 import rospy
@@ -12,6 +12,7 @@ from smach_oracle.msg import OracleEvent, OracleRates
 
 from ..feeds.views import event_of
 from ..graphs.layout_worker import LayoutWorker
+from ..sensors.robot_clocks import RobotClocks
 from ..trials.trial_log import TrialLog
 from ..web.sections import PageSections
 from .followed_robot import FollowedRobot
@@ -29,7 +30,9 @@ _TOPICS: Dict[str, Tuple[Any, str]] = {
 class FollowedRobots:
     """Follows all topics of four types and names; the name in front of them is the robot's."""
 
-    def __init__(self, sections: PageSections, log: TrialLog, layouts: LayoutWorker) -> None:
+    def __init__(self, sections: PageSections, log: TrialLog, layouts: LayoutWorker,
+                 clocks: Optional[RobotClocks] = None) -> None:
+        self._clocks = clocks or RobotClocks()
         self._sections = sections
         self._log = log
         self._layouts = layouts
@@ -69,6 +72,12 @@ class FollowedRobots:
                 self._log.end_missing(name)
         self._forget_gone()
 
+    def nodes(self) -> Dict[str, FrozenSet[str]]:
+        """The robots that the master knows now, each with the nodes that publish it."""
+        with self._lock:
+            return {name: self._nodes.get(name) or frozenset([name])
+                    for name, robot in self._robots.items() if robot.alive}
+
     def write_sections(self) -> None:
         """Bring the sections up to date."""
         with self._lock:
@@ -95,7 +104,13 @@ class FollowedRobots:
             self._robots[name] = robot
 
     def _receiver(self, robot: FollowedRobot, method: str) -> Callable[[Any], None]:
-        take = getattr(robot, method)
+        take_in = getattr(robot, method)
+        if method == 'on_rates':  # latched: its stamp may be of long ago
+            return take_in
+
+        def take(message: Any) -> None:
+            self._clocks.take(robot.name, message.header.stamp.to_sec())
+            take_in(message)
         if method != 'on_event':
             return take
 

@@ -4,7 +4,6 @@ Those that a robot itself publishes (~failure_frames) come first: it had them be
 question. For other robots the console takes images itself, as soon as the question appears.
 """
 import itertools
-import re
 import threading
 import time
 from collections import OrderedDict
@@ -19,6 +18,7 @@ from ...followed_server import ListedQuestion
 from ...robot_topics import RobotTopics
 from ..web.sections import PageSections
 from .images import BrowserFile, encode_image
+from .robot_cameras import RobotCameras
 from .sensor_streams import SensorStreams
 
 SECTION = 'images'
@@ -30,8 +30,7 @@ MOST_CAMERAS = 2  # from which the console takes images by itself, for one quest
 BEFORE_S = 2.0
 TAKE_WITHIN_S = 15.0  # of the question: later images do not show the failure
 WIDTH = 640
-_NO_COLOUR = re.compile('depth|disparity|/ir/')
-_RANK = [re.compile(pattern) for pattern in ('/(rgb|color|colour)/', 'image_(raw|rect|color)', '')]
+AT_ONCE_S = 1.0  # the robot's own images within this time are those of the failure
 
 
 class QuestionImage(NamedTuple):
@@ -43,6 +42,7 @@ class QuestionImage(NamedTuple):
     late_s: Optional[float]
     width: int  # px of the original
     height: int
+    stamp_s: float = 0.0  # by the clock of its camera; 0 where it has none
 
 
 class ImageStore:
@@ -76,13 +76,16 @@ class ImageStore:
         """
         encoded = encode_image(image, WIDTH)
         width, height = encoded.facts['size']
-        return QuestionImage(self.put(encoded), topic, late_s, width, height)
+        return QuestionImage(self.put(encoded), topic, late_s, width, height,
+                             image.header.stamp.to_sec())
 
 
 class QuestionImages:
     """The images of open questions."""
 
-    def __init__(self, files: ImageStore, sensors: SensorStreams) -> None:
+    def __init__(self, files: ImageStore, sensors: SensorStreams,
+                 cameras: Optional[RobotCameras] = None) -> None:
+        self._cameras = cameras or RobotCameras(sensors, {})
         self._files = files
         self._sensors = sensors
         self._lock = threading.Lock()
@@ -103,7 +106,8 @@ class QuestionImages:
                 sent = self._sent.get(_key(listed.goal.robot, listed.goal.query_id))
             shown = sent or self._taken(listed, now_s)
             if shown:
-                found[listed.key] = [image_view(image) for image in shown]
+                asked_s = listed.goal.asked.to_sec()
+                found[listed.key] = [image_view(image, asked_s) for image in shown]
         sections.put(SECTION, found)
 
     def _taken(self, listed: ListedQuestion, now_s: float) -> List[QuestionImage]:
@@ -113,8 +117,8 @@ class QuestionImages:
             while len(self._seen) > MOST_QUESTIONS:
                 self._seen.popitem(last=False)
         if now_s - listed.asked_s < TAKE_WITHIN_S:
-            for camera in cameras_of(listed.goal.robot, self._sensors.view())[:MOST_CAMERAS]:
-                if camera['topic'] not in seen:
+            for camera in self._cameras.of(listed.goal.robot)[:MOST_CAMERAS]:
+                if _is_too_old(seen.get(camera['topic']), listed):
                     self._take_image(camera, listed, seen, now_s)
         return list(seen.values())
 
@@ -123,6 +127,9 @@ class QuestionImages:
         sensor = self._sensors.find(camera['id'])
         sample = sensor.newer(0) if sensor is not None else None
         if sample is None or sample.came_s < listed.asked_s - BEFORE_S:
+            return
+        known = seen.get(camera['topic'])
+        if known is not None and sample.message.header.stamp.to_sec() <= known.stamp_s:
             return
         if now_s - self._failed.get(camera['topic'], -TAKE_WITHIN_S) < TAKE_WITHIN_S:
             return
@@ -154,24 +161,25 @@ def stored_images(files: ImageStore, topics: Sequence[str],
             rospy.logdebug('An image of %s cannot be shown: %s', topic, err)
 
 
-def image_view(image: QuestionImage) -> Dict[str, Any]:
-    """As plain data."""
-    late = None if image.late_s is None else round(image.late_s, 1)
+def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
+    """As plain data.
+
+    :param asked_s: when the question was put, by the robot's ROS clock; 0: not known.
+    """
+    stamped = bool(image.stamp_s and asked_s)
+    late = image.stamp_s - asked_s if stamped else image.late_s
+    if late is not None and image.late_s is None and abs(late) < AT_ONCE_S:
+        late = None
     return {
-        'id': image.number, 'topic': image.topic, 'late': late, 'size': [image.width, image.height]
+        'id': image.number, 'topic': image.topic, 'late': None if late is None else round(late, 1),
+        'stamped': stamped or late is None, 'size': [image.width, image.height]
     }
 
 
-def cameras_of(robot: str, sensors: Sequence[Dict[str, Any]]) -> List[Dict[str, Any]]:
-    """Colour cameras of a robot's namespace, else all of them; the likeliest first."""
-    space = robot[:robot.rfind('/') + 1]
-    cameras = [
-        each for each in sensors if each['kind'] == 'image' and not _NO_COLOUR.search(each['topic'])
-    ]
-    own = [each for each in cameras if each['topic'].startswith(space)]
-    return sorted(
-        own or cameras, key=lambda each: (next(rank for rank, pattern in enumerate(_RANK)
-                                               if pattern.search(each['topic'])), each['topic']))
+def _is_too_old(image: Optional[QuestionImage], listed: ListedQuestion) -> bool:
+    """Whether another image is wanted: there is none, or a latched one of long before."""
+    return image is None or bool(
+        image.stamp_s and image.stamp_s < listed.goal.asked.to_sec() - BEFORE_S)
 
 
 def _key(robot: str, query_id: str) -> str:

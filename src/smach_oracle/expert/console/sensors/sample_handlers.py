@@ -15,6 +15,7 @@ import tornado.web
 from ..web.access import ClientRateLimits
 from ..web.handlers import SignedInHandler
 from .images import WIDTHS
+from .robot_clocks import ImageAges
 from .robot_stream import RobotStream
 from .sensor_streams import SensorSample, SensorStream, SensorStreams
 
@@ -29,8 +30,9 @@ RATE, BURST = 100.0, 200.0  # samples a second of one address
 class SensorRequests:
     """What all requests for samples share."""
 
-    def __init__(self, sensors: SensorStreams) -> None:
+    def __init__(self, sensors: SensorStreams, ages: Optional[ImageAges] = None) -> None:
         self.sensors = sensors
+        self.ages = ages
         self.limits = ClientRateLimits(rate=RATE, burst=BURST, for_all=3.0)
         self.waiting: Counter[str] = Counter()
         self.workers = ThreadPoolExecutor(3, 'encode')
@@ -86,6 +88,7 @@ class RobotAppearanceHandler(SensorHandler):
 class SampleHandler(SensorHandler):
     """GET /sample/NUMBER?after=SEQUENCE&width=PIXELS: a sample other than SEQUENCE (0: any).
 
+    Its facts have its `age`, s by the robot's clock, where that is known.
     With `robot=NUMBER` its facts have `place`, the pose of its tf frame at that robot, 12 numbers
     of (3, 4), or `astray`, why that is not known. 204 where none came within 5 s, 404 for no such
     sensor, 422 with a text for a message that cannot be shown.
@@ -109,6 +112,8 @@ class SampleHandler(SensorHandler):
             return
         if beside is not None and facts:
             facts = _with_place(facts, beside, sample)
+        if facts and self._shared.ages is not None:
+            facts = _with_age(facts, self._shared.ages, sensor.topic, sample)
         self.set_header('Content-Type', encoded.content_type)
         if facts:
             self.set_header('X-Facts', facts)
@@ -140,6 +145,11 @@ class SampleHandler(SensorHandler):
                 or not _NUMBER.fullmatch(after[0]) or not _NUMBER.fullmatch(robot[0] or '0'):
             raise tornado.web.HTTPError(400)
         return int(after[0]), int(width[0]), robot[0]
+
+
+def _with_age(facts: str, ages: ImageAges, topic: str, sample: SensorSample) -> str:
+    age_s = ages.age_s(topic, sample.message.header.stamp.to_sec())
+    return json.dumps(dict(json.loads(facts), age=age_s), allow_nan=False)
 
 
 def _with_place(facts: str, robot: RobotStream, sample: SensorSample) -> str:

@@ -1,7 +1,8 @@
 """Settings of the console, from the node's private parameters."""
 import os
 import socket
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from types import MappingProxyType
+from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
@@ -26,6 +27,8 @@ class ConsoleSettings(NamedTuple):
     certificate: str  # '' without TLS
     private_key: str
     bags: Tuple[str, ...] = ()  # folders
+    # by robot: topics, or names above them
+    cameras: Mapping[str, Tuple[str, ...]] = MappingProxyType({})
 
     @property
     def scheme(self) -> str:
@@ -55,7 +58,7 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
     return ConsoleSettings(address, _port('~port', get('port', DEFAULT_PORT)),
                            load_tokens(token_file) if token_file else None,
                            AllowedHosts(_hosts(get, remote), addresses=remote), certificate, key,
-                           _folders(get('bags', [])))
+                           _folders(get('bags', [])), _cameras(get('cameras', {})))
 
 
 def _hosts(get: GetParameter, remote: bool) -> List[str]:
@@ -74,6 +77,22 @@ def _folders(value: object) -> Tuple[str, ...]:
         raise SettingsError('~bags', value,
                           'folders separated by {}, or a list of folders'.format(os.pathsep))
     return tuple(os.path.abspath(path_of(folder)) for folder in folders if folder not in ('', NONE))
+
+
+def _cameras(value: object) -> Dict[str, Tuple[str, ...]]:
+    allowed = 'a dictionary of robots, each with a list of topics of its cameras'
+    if value in (None, '', NONE):
+        return {}
+    if not isinstance(value, dict):
+        raise SettingsError('~cameras', value, allowed)
+    found = {}
+    for robot, topics in value.items():
+        names = topics.split() if isinstance(topics, str) else topics
+        if not isinstance(robot, str) or not isinstance(names, list) or not all(
+                isinstance(name, str) and name.startswith('/') for name in names):
+            raise SettingsError('~cameras', value, allowed + ', with their whole names')
+        found['/' + robot.strip('/')] = tuple(names)
+    return found
 
 
 def _path(get: GetParameter, name: str) -> str:

@@ -31,8 +31,9 @@ def test_an_answer_is_taken_apart():
     assert (command.number, command.name) == (1, 'answer')
     assert command.arguments == {
         'question': 'q', 'kind': 'goto', 'name': 'PICK', 'container': '', 'why': 'it slipped',
-        'outputs': [TypedOutput('grasp', [1, {'a': None}], '')]
+        'outputs': [TypedOutput('grasp', [1, {'a': None}], '')], 'seen': None
     }
+    assert parse(text(**ANSWER, seen=12.5)).arguments['seen'] == 12.5
 
 
 def test_a_mark_is_taken_apart():
@@ -127,7 +128,7 @@ def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
 
 def test_viewers_may_only_look_and_stop():
     assert {name for name in COMMANDS if needed_role(name) == 'viewer'
-            } == {'hello', 'watch', 'look', 'leave_wheel', 'stop_hand'}
+            } == {'hello', 'watch', 'look', 'view', 'leave_wheel', 'stop_hand'}
     assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
     assert {name
             for name in COMMANDS
@@ -139,5 +140,5 @@ def test_no_command_names_a_topic_a_service_or_a_type():
     assert fields == {
         'xsrf', 'expert', 'trial', 'at', 'question', 'kind', 'name', 'outputs', 'why', 'stamp',
         'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent',
-        'arm', 'container'
+        'arm', 'container', 'seen'
     }

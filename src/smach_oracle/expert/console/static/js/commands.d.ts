@@ -40,10 +40,11 @@ export interface Commands {
   claim: OfQuestion;
   take_over: OfQuestion;
   release: OfQuestion;
-  answer: OfQuestion & Answer;
+  view: { question: string }; // '': at none
+  answer: OfQuestion & Answer & { seen?: number }; // the newest beat that the page has had
   mark: OfQuestion & { stamp: string; region: Point[]; strokes: Stroke[] };
   use_frame: OfQuestion & { frame: 'at_goal' | 'fresh' };
-  hand_over: OfQuestion & { outcome: string; outputs?: Output[]; why: string };
+  hand_over: OfQuestion & { outcome: string; outputs?: Output[]; why: string; seen?: number };
   give_up_interface: OfQuestion & { why: string };
   take_wheel: OfQuestion;
   leave_wheel: OfQuestion;
@@ -53,6 +54,7 @@ export interface Commands {
 
 /** What a reply to some commands holds. */
 export interface ReplyData {
+  hello: { browser: string }; // the session of this browser, in short
   mark: Marked;
   take_wheel: { wheel: number };
 }

@@ -36,10 +36,13 @@ export interface ListChange<List> {
 
 /** Named pieces of what the pages show; each comes whole, but for the lists. */
 export interface Sections {
+  heard: Heard;
+  onlookers: ByKey<Onlooker[]>;
   questions: Question[];
   servers: QueryServer[];
   preconditions: ByKey<ByState<PreconditionStatus[]>>;
   images: ByKey<KeptImage[]>;
+  cameras: { [robot: string]: string[] | undefined }; // topics of its own, the likeliest first
   robots: string[]; // names of their nodes
   trials: TrialOverview;
   bags: BagOverview;
@@ -56,6 +59,21 @@ export interface ByKey<Value> { [key: string]: Value | undefined }
 export interface ByState<Value> { [label: string]: Value | undefined }
 /** By the path of a container, such as KITCHEN/FETCH. */
 export interface ByPath<Value> { [path: string]: Value | undefined }
+
+/** How long ago they were heard when this was sent, s; null: never. */
+export interface Heard {
+  beat: number; // the console's monotonic clock
+  master: number | null;
+  servers: { [name: string]: number | null | undefined };
+  robots: { [name: string]: number | null | undefined }; // by the name in questions
+}
+
+/** A page that shows a question. */
+export interface Onlooker {
+  name: string; // '' where the person has given none
+  role: Role;
+  session: string; // of its browser, in short
+}
 
 // --- questions
 
@@ -83,6 +101,7 @@ export interface Question {
   tried: string[];
   status: 'pending' | 'claimed' | 'interface';
   holder: string; // the expert who has claimed it
+  session: string; // of the holder's browser, in short; '': not by this console
   interface: string; // that runs for it
   asked: number;
   deadline: number | null; // null: it waits without end
@@ -139,7 +158,8 @@ export interface PreconditionStatus {
 export interface KeptImage {
   id: number;
   topic: string;
-  late: number | null; // s after the question; null: it is of the failure itself
+  late: number | null; // s after the question, below 0 before; null: it is of the failure itself
+  stamped: boolean; // false: `late` is when it came
   size: [width: number, height: number]; // px
 }
 
@@ -293,6 +313,7 @@ export interface SensorFacts { sequence: number }
 export interface StampedFacts extends SensorFacts {
   frame: string; // of its coordinates
   stamp: string; // seconds.nanoseconds
+  age?: number | null; // s, by the robot's clock; null: not known
 }
 
 export interface ImageFacts extends StampedFacts {

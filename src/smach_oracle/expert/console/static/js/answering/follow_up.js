@@ -103,6 +103,8 @@ export class FollowUp {
 
   /** @param {TrialEvent[]} steps */
   hintOf(steps) {
+    const gone = this.last ? '' : this.app.liveness.gone(this.question);
+    if (gone) return gone;
     if (!this.last && steps.length) return 'It goes on…';
     if (!this.last) {
       return this.waits
@@ -147,7 +149,9 @@ export class FollowUp {
   update() {
     if (!this.since) return;
     this.showNext();
-    if (!this.waits && !this.steps.childElementCount
+    const gone = this.last ? '' : this.app.liveness.gone(this.question);
+    if (gone) setText(this.hint, gone);
+    else if (!this.waits && !this.steps.childElementCount
         && Date.now() - this.since > SILENCE_MS) {
       setText(this.hint, 'What it does next is not known: nothing is heard on '
         + this.question.robot + '/oracle/events.');

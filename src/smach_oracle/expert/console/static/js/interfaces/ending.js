@@ -1,12 +1,13 @@
 // @ts-check
 // How an interface ends: the outcome of the state whose work it did, and the reply of the robot.
-import { unlessLost } from '../page/connection.js';
+import { NoReply, unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
 
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').Commands} Commands */
 /** @typedef {import('../server').Question} Question */
 
+const UNKNOWN = 'No reply came: whether it was carried out is not known.';
 const LOST = 'The connection was lost before the robot had confirmed; try again.';
 
 /** @param {Question} question */
@@ -34,7 +35,7 @@ export async function replyTo(app, problem, command, args) {
     return await app.connection.request(command, args);
   } catch (err) {
     unlessLost(err);
-    setText(problem, LOST);
+    setText(problem, err instanceof NoReply ? UNKNOWN : LOST);
     return null;
   }
 }

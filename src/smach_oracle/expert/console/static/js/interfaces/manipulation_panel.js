@@ -69,7 +69,7 @@ export class ManipulationPanel {
     this.pads = new Map(MOVES.map((move) => [move, this.pad(move)]));
     this.light = h('div', { class: 'drive-light' });
     this.facts = h('dl', { class: 'drive-facts' });
-    this.camera = new DriveCamera(app);
+    this.camera = new DriveCamera(app, question.robot);
     this.hint = h('p', { class: 'dim hint' });
     this.root = this.build();
     this.showScale();

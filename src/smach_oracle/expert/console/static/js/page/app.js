@@ -4,13 +4,17 @@ import { Alerts } from './alerts.js';
 import { Connection } from './connection.js';
 import { watchOverClicks } from './deliberate.js';
 import { h, part, replace, setText, toast } from './dom.js';
+import { Gate } from './gate.js';
+import { Liveness, aged } from './liveness.js';
 import { leaveNote, remember, remembered, takeNote } from './preferences.js';
 import { Looking } from './row_lists.js';
 import { keysButton } from './shortcuts.js';
-import { askName, askToken } from './sign_in.js';
+import { askName, askToken, demandName } from './sign_in.js';
 import { Store } from './store.js';
 
 /** @typedef {import('./connection.js').State} State */
+/** @typedef {import('../server').Commands} Commands */
+/** @typedef {import('../server').Question} Question */
 /** @typedef {import('./types').App} AppOfPanels */
 /** @typedef {import('./types').Panel} Panel */
 /** @typedef {import('./types').PanelView} PanelView */
@@ -26,6 +30,9 @@ import { Store } from './store.js';
 /** @type {{ [state in State]: string }} */
 const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': 'signed out',
   lost: 'connection lost – trying again' };
+const RECONNECT_AFTER_S = 22; // of silence: the connection may lead nowhere
+/** @type {Set<keyof Commands>} */
+const UNTOLD = new Set(['hello', 'watch', 'look', 'view', 'release', 'drive']);
 /** @type {{ [theme in Theme]: { words: string, next: Theme } }} */
 const THEMES = {
   auto: { words: '◐ Auto', next: 'light' },
@@ -38,14 +45,20 @@ export class App {
   /** @param {Panel[]} panels the first one is shown at first */
   constructor(panels) {
     this.store = new Store();
+    this.liveness = new Liveness(this.store);
     this.alerts = new Alerts();
     this.connection = new Connection(this.store, (state) => this.onState(state),
-      () => this.leave('You have signed out on another page of this browser.'));
+      () => this.leave('You have signed out on another page of this browser.'),
+      (command, limit) => this.sayNoReply(command, limit));
+    this.connection.gate = new Gate(this.liveness, () => Boolean(this.expert),
+      () => this.nameOneself());
     this.connection.wantedExpert = remembered('expert', '');
     this.looking = new Looking(this.connection, () => this.current === 'trials');
     this.note = takeNote();
     this.current = '';
     this.status = h('span', { id: 'status', class: 'status' });
+    this.ages = h('span', { id: 'ages', class: 'ages dim',
+      title: 'How long ago they were heard' });
     this.person = h('button', { id: 'person', class: 'icon-button', disabled: true,
       title: 'Your name, as robots and records have it', onclick: () => this.askName() });
     /** @type {Theme} */
@@ -67,11 +80,16 @@ export class App {
 
   get mayAnswer() { return this.role === 'operator' || this.role === 'teleoperator'; }
 
+  /** @param {Question} question */
+  isMine({ holder, session }) {
+    return Boolean(holder) && holder === this.expert && session === this.connection.browser;
+  }
+
   buildTop() {
     const theme = remembered('theme', 'auto');
     this.setTheme(theme === 'light' || theme === 'dark' ? theme : 'auto');
     replace(part('top'), h('img', { src: 'static/icon.svg', alt: '', class: 'logo' }),
-      h('h1', { class: 'brand' }, 'Operator console'), this.status,
+      h('h1', { class: 'brand' }, 'Operator console'), this.status, this.ages,
       h('span', { class: 'spacer' }), this.alerts.buttons(), keysButton(),
       this.themeButton, this.person);
   }
@@ -113,16 +131,54 @@ export class App {
   }
 
   tick() {
+    this.showLife();
+    if (this.connection.connected && this.liveness.console > RECONNECT_AFTER_S) {
+      this.connection.connect();
+    }
     for (const { id, view } of this.tabs) if (id === this.current) view.tick?.();
+  }
+
+  /** Whether what is shown is live: said in the top bar; the styles grey what is not. */
+  showLife() {
+    const { connection, liveness } = this;
+    const state = connection.state;
+    const silent = state === 'connected' ? liveness.silent : '';
+    const age = silent === 'master' ? liveness.master : liveness.console;
+    setText(this.status, silent ? silent + ' silent for ' + aged(age) : STATES[state]);
+    this.status.dataset['state'] = silent ? 'silent' : state;
+    document.body.dataset['connection'] = state;
+    document.body.dataset['silent'] = silent;
+    setText(this.ages, state === 'connected' ? liveness.ages() : '');
+  }
+
+  /**
+   * @param {keyof Commands} command
+   * @param {number} limit s
+   */
+  sayNoReply(command, limit) {
+    if (UNTOLD.has(command)) return;
+    toast('No reply within ' + limit + ' s to “' + command.replace(/_/g, ' ')
+      + '”: whether it was carried out is not known.', 'bad');
+  }
+
+  /** Ask for the name that is needed first; whether it was given. */
+  async nameOneself() {
+    const given = await demandName(this.connection);
+    this.showPerson();
+    return given;
+  }
+
+  showPerson() {
+    const name = this.expert && this.expert + (this.mayAnswer ? '' : ' (viewer)');
+    setText(this.person, name || 'Your name?');
   }
 
   /** @param {State} state */
   onState(state) {
-    setText(this.status, STATES[state]);
-    this.status.dataset['state'] = state;
-    document.body.dataset['connection'] = state;
-    const name = this.expert && this.expert + (this.mayAnswer ? '' : ' (viewer)');
-    setText(this.person, name || 'Name');
+    if (state === 'connected') this.liveness.begin();
+    this.connection.state = state;
+    this.showLife();
+    this.showPerson();
     this.person.hidden = state === 'signed-out';
     this.person.disabled = !this.connection.session;
     if (state === 'signed-out') {

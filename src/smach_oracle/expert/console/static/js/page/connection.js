@@ -17,6 +17,9 @@ const SIGNED_OUT = 4001; // as the server closes the sockets of a session that h
 /** There is no connection, or it went before the reply came. */
 export class ConnectionLost extends Error {}
 
+/** The connection is there, and no reply came in time: nobody knows whether it was carried out. */
+export class NoReply extends ConnectionLost {}
+
 /**
  * For `catch`: nothing where the connection was lost, which the page shows anyway.
  * @param {unknown} err
@@ -30,9 +33,13 @@ export class Connection {
    * @param {Store} store
    * @param {(state: State) => void} onState
    * @param {() => void} onEnd the person has signed out on another page of this browser
+   * @param {(name: keyof Commands, limit: number) => void} onNoReply to a command within so many s
    */
-  constructor(store, onState, onEnd) {
+  constructor(store, onState, onEnd, onNoReply) {
     this.store = store;
+    this.onNoReply = onNoReply;
+    /** @type {import('./gate.js').Gate | null} */
+    this.gate = null;
     this.onState = onState;
     this.onEnd = onEnd;
     /** @type {Map<number, { resolve: (reply: Reply) => void, reject: (err: Error) => void }>} */
@@ -47,7 +54,10 @@ export class Connection {
     this.socket = null;
     this.wantedExpert = ''; // the name that the person has chosen
     this.expert = ''; // the one under which the server knows this page
+    this.browser = ''; // under which claims of this browser are known
     this.connected = false;
+    /** @type {State} */
+    this.state = 'connecting';
     this.signedOut = false;
     this.leaving = false;
     const hurry = () => this.hurry();
@@ -66,6 +76,7 @@ export class Connection {
     clearTimeout(this.timer);
     this.timer = 0;
     const generation = ++this.generation;
+    this.fail();
     if (this.socket) this.socket.close();
     this.onState('connecting');
     try {
@@ -115,15 +126,27 @@ export class Connection {
    */
   async sayHello(generation, { xsrf }) {
     try {
-      const reply = await this.request('hello', { xsrf, expert: this.wantedExpert });
+      const reply = await this.hello(xsrf);
       if (!reply.ok || generation !== this.generation) return;
       this.pause = SHORTEST_PAUSE_S;
       this.connected = true;
-      this.expert = reply.message;
       this.onState('connected');
     } catch (err) {
       unlessLost(err);
     }
+  }
+
+  /**
+   * Say who uses this page: at first, and once a name is given.
+   * @param {string} xsrf
+   */
+  async hello(xsrf) {
+    const reply = await this.request('hello', { xsrf, expert: this.wantedExpert });
+    if (reply.ok) {
+      this.expert = reply.message;
+      this.browser = reply.data?.browser || '';
+    }
+    return reply;
   }
 
   retryLater() {
@@ -160,6 +183,19 @@ export class Connection {
    * @returns {Promise<import('../server').Reply<Name>>}
    */
   request(name, args) {
+    const first = this.gate?.before(name, /** @type {{ question?: string }} */ (args));
+    if (!first) return this.post(name, args);
+    return first.then((refusal) => (
+      /** @type {import('../server').Reply<Name> | null} */ (refusal) || this.post(name, args)));
+  }
+
+  /**
+   * @template {keyof Commands} Name
+   * @param {Name} name
+   * @param {Commands[Name]} args
+   * @returns {Promise<import('../server').Reply<Name>>}
+   */
+  post(name, args) {
     const socket = this.openSocket;
     if (!socket) return Promise.reject(new ConnectionLost('not connected'));
     const number = ++this.number;
@@ -168,9 +204,10 @@ export class Connection {
       this.waiting.set(number, { resolve: settle, reject });
       setTimeout(() => {
         if (!this.waiting.delete(number)) return;
-        reject(new ConnectionLost('no reply within ' + REQUEST_LIMIT_S + ' s'));
+        this.onNoReply(name, REQUEST_LIMIT_S);
+        reject(new NoReply('no reply within ' + REQUEST_LIMIT_S + ' s'));
       }, REQUEST_LIMIT_S * 1000);
-      socket.send(JSON.stringify({ id: number, do: name, ...args }));
+      socket.send(JSON.stringify({ id: number, do: name, ...args, ...this.gate?.beside(name) }));
     });
   }
 

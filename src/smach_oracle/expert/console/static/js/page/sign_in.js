@@ -10,8 +10,7 @@ const WORDS = { 0: 'The console does not answer.', 200: '', 401: 'There is no su
   429: 'Too many tries; wait a little.' };
 const ABOUT_TOKENS = 'This console takes commands to robots. Its token is in the file that it was '
   + 'started with.';
-const ABOUT_NAMES = 'As robots, other experts and the records of trials have it. Whoever has the '
-  + 'same name is the same expert.';
+const ABOUT_NAMES = 'Your name, as robots, other experts and the records of trials have it.';
 
 /**
  * Put the form that takes a token in the place of the panels.
@@ -62,6 +61,56 @@ export function askName(connection, signOut) {
   document.body.append(dialog);
   dialog.showModal();
   name.select();
+}
+
+/** @type {Promise<boolean> | null} */
+let demanded = null;
+
+/**
+ * Ask for the name that something needs which is to be done. It covers nothing up: a hand can be
+ * stopped meanwhile.
+ * @param {Connection} connection
+ * @returns {Promise<boolean>} whether it was given
+ */
+export function demandName(connection) {
+  demanded = demanded || new Promise((resolve) => { showDemand(connection, resolve); })
+    .finally(() => { demanded = null; });
+  return demanded;
+}
+
+/**
+ * @param {Connection} connection
+ * @param {(given: boolean) => void} done
+ */
+function showDemand(connection, done) {
+  const name = h('input', { type: 'text', id: 'expert', maxlength: 60, autocomplete: 'name',
+    required: true, 'aria-label': 'Your name' });
+  const problem = h('p', { class: 'problem', role: 'alert' });
+  let given = false;
+  /** @param {SubmitEvent} event */
+  const onsubmit = async (event) => {
+    event.preventDefault();
+    if (!name.value.trim()) return;
+    connection.wantedExpert = name.value.trim();
+    const reply = await connection.hello(connection.xsrf).catch(() => null);
+    given = Boolean(reply && reply.ok && reply.message);
+    if (given) remember('expert', connection.wantedExpert);
+    if (given) dialog.close();
+    else setText(problem, reply ? reply.message : WORDS[0] || '');
+  };
+  /** @type {HTMLDialogElement} */
+  const dialog = h('dialog', { class: 'card name-demand', 'aria-label': 'Your name',
+    onclose: () => { dialog.remove(); done(given); },
+    onkeydown: (event) => { if (event.key === 'Escape') dialog.close(); } },
+  h('form', { onsubmit },
+    h('h2', {}, 'Who are you?'), h('p', { class: 'dim' }, ABOUT_NAMES), name, problem,
+    h('div', { class: 'row' },
+      h('button', { type: 'button', id: 'no-name', onclick: () => dialog.close() }, 'Only look'),
+      h('span', { class: 'spacer' }),
+      h('button', { class: 'primary', id: 'save-name' }, 'Go on'))));
+  document.body.append(dialog);
+  dialog.show();
+  name.focus();
 }
 
 /**

@@ -1,7 +1,8 @@
 // Shapes of the page itself: elements, and what the frame and its panels know of each other.
 import { Connection } from './connection.js';
+import { Liveness } from './liveness.js';
 import { Store } from './store.js';
-import { Role } from '../server';
+import { Question, Role } from '../server';
 
 /** What an element may hold: null, undefined and false are left out. */
 export type Child = Node | string | number | false | null | undefined | Child[];
@@ -28,10 +29,13 @@ export type Properties = Handlers & {
 export interface App {
   readonly store: Store;
   readonly connection: Connection;
+  readonly liveness: Liveness;
   readonly current: string; // id of the panel that is shown
   readonly role: Role | '';
   readonly expert: string;
   readonly mayAnswer: boolean;
+  /** Whether this browser holds its claim. */
+  isMine(question: Question): boolean;
 }
 
 /** One tab of the page. */

@@ -14,6 +14,8 @@ import { h, replace } from '../page/dom.js';
  * @property {boolean} sending
  * @property {boolean} mayAnswer
  * @property {string} problem
+ * @property {string} expert who uses this page
+ * @property {string} gone how the robot went, and the question with it; '' where it is there
  */
 /**
  * @typedef {object} Use
@@ -25,6 +27,7 @@ import { h, replace } from '../page/dom.js';
 
 const CLOSED = 'This question is closed: it was answered elsewhere, taken back, or its time was '
   + 'over. ';
+const ELSEWHERE = ' (the same name, in another browser or front end)';
 const VIEWER = 'You are signed in as a viewer: you can watch, others answer.';
 
 export class ClaimBar {
@@ -47,7 +50,7 @@ export class ClaimBar {
   /** @param {ClaimState} state */
   show(state) {
     const { now, problem } = state;
-    const key = JSON.stringify([{ ...state, now: now && [now.holder, now.status] }]);
+    const key = JSON.stringify([{ ...state, now: now && [now.holder, now.session, now.status] }]);
     if (key === this.key) return;
     this.key = key;
     const { kind, words } = this.barOf(state);
@@ -61,10 +64,14 @@ export class ClaimBar {
    * @param {ClaimState} state
    * @returns {Bar}
    */
-  barOf({ settled, now, mine, held, claiming, sending, mayAnswer }) {
+  barOf({ settled, now, mine, held, claiming, sending, mayAnswer, expert, gone }) {
     if (settled) return { kind: '', words: null };
-    if (!now) return { kind: 'warn', words: [CLOSED, button('Back to the list', this.use.leave)] };
-    const holder = h('strong', {}, now.holder || 'somebody');
+    if (!now) {
+      return { kind: 'warn', words: [gone || CLOSED, button('Back to the list', this.use.leave)] };
+    }
+    const taken = now.holder === expert && (held || claiming); // and is not told yet
+    const holder = [h('strong', {}, now.holder || 'somebody'),
+      now.holder === expert && !mine && ELSEWHERE];
     if (now.status === 'interface') {
       const name = h('strong', {}, now.interface);
       return { kind: '', words: ['Interface ', name, ' runs for it; ', holder, ' started it.'] };
@@ -73,7 +80,9 @@ export class ClaimBar {
       return { kind: '', words: [VIEWER, now.holder && [' ', holder, ' works on it.']] };
     }
     if (mine) return { kind: 'good', words: sending ? 'Sending…' : this.yours() };
-    if (now.holder) return { kind: 'warn', words: [holder, ' works on it. ', this.takeOver()] };
+    if (now.holder && !taken) {
+      return { kind: 'warn', words: [holder, ' works on it. ', this.takeOver()] };
+    }
     if (claiming || held) return { kind: '', words: 'Taking it…' };
     const take = button('Take it', this.use.claim, 'claim');
     return { kind: '', words: ['Nobody works on it. ', take] };

@@ -4,12 +4,14 @@ import { AnswerForm } from '../answering/answer_form.js';
 import { FollowUp } from '../answering/follow_up.js';
 import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
-import { unlessLost } from '../page/connection.js';
+import { NoReply, unlessLost } from '../page/connection.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { ClaimBar } from './claim_bar.js';
+import { Onlookers } from './onlookers.js';
+import { SilenceBar } from './silence_bar.js';
 import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
 import { SituationCamera } from './situation_camera.js';
 
@@ -20,6 +22,8 @@ import { SituationCamera } from './situation_camera.js';
 export const URGENT_S = 20;
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
+const UNKNOWN = 'The robot has not confirmed in time: whether it has your answer is not known. The '
+  + 'same answer twice does no harm.';
 
 export class QuestionDetail {
   /**
@@ -51,6 +55,9 @@ export class QuestionDetail {
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
+    this.silence = new SilenceBar(app.liveness, question);
+    this.onlookers = new Onlookers(app, question);
+    this.robotGone = ''; // how it went, and the question with it
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
       takeOver: () => this.claim('take_over') });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
@@ -65,7 +72,8 @@ export class QuestionDetail {
   build() {
     const { question } = this;
     return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
-      this.claimBar.root, this.perceptionPlace, this.interfacePlace,
+      this.silence.root, this.claimBar.root, this.onlookers.root, this.perceptionPlace,
+      this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
           h('section', { class: 'card mini-machine' }, this.machine.root), visitsCard(question),
@@ -78,7 +86,8 @@ export class QuestionDetail {
     return h('header', { class: 'detail-head' },
       h('button', { class: 'back', 'aria-label': 'Back to the list',
         onclick: this.ways.leave }, '‹'),
-      h('div', {}, this.title, h('p', { class: 'dim' }, robot, ' · ', path)),
+      h('div', {}, this.title,
+        h('p', { class: 'dim' }, robot, ' · ', path, ' ', this.silence.age)),
       h('span', { class: 'spacer' }), this.time);
   }
 
@@ -87,19 +96,22 @@ export class QuestionDetail {
 
   get mine() {
     const { now } = this;
-    return Boolean(now && now.holder && now.holder === this.app.expert && now.status === 'claimed');
+    return Boolean(now && now.status === 'claimed' && this.app.isMine(now));
   }
 
   /** Take the question, unless somebody else works on it. */
   begin() {
     this.showPerception();
     this.showInterface();
-    if (this.app.mayAnswer && this.question.status === 'pending') this.claim('claim');
+    this.onlookers.look();
+    const free = this.question.status === 'pending' || this.mine; // by a page of before: keep it
+    if (this.app.mayAnswer && free) this.claim('claim');
     this.show();
   }
 
   /** The connection is back: so is the claim, if nobody has taken it meanwhile. */
   connected() {
+    this.onlookers.look();
     if (this.held && !this.settled) this.claim('claim');
     if (this.followUp) this.followUp.watch();
   }
@@ -110,6 +122,7 @@ export class QuestionDetail {
   end() {
     if (this.held && !this.settled) this.release();
     this.ended = true;
+    this.onlookers.leave();
     this.form.cancel();
     this.camera.stop();
     if (this.perceptionPanel) this.perceptionPanel.stop();
@@ -126,7 +139,7 @@ export class QuestionDetail {
     if (this.claiming) return;
     this.claiming = true;
     this.problem = '';
-    this.holderBefore = this.now?.holder || '';
+    this.holderBefore = this.otherHolder;
     try {
       const reply = await this.app.connection.request(command, { question: this.key });
       this.held = reply.ok;
@@ -155,7 +168,7 @@ export class QuestionDetail {
       }
     } catch (err) {
       unlessLost(err);
-      this.problem = LOST;
+      this.problem = err instanceof NoReply ? UNKNOWN : LOST;
     }
     this.sending = false;
     this.show();
@@ -171,7 +184,9 @@ export class QuestionDetail {
     else if (this.mine && !this.settled) this.form.press(key);
   }
 
-  tick() {
+  tick() { this.show(); }
+
+  showTime() {
     const { now } = this;
     if (!now || this.settled) {
       setText(this.time, '');
@@ -255,13 +270,22 @@ export class QuestionDetail {
     /** @param {...string} wanted */
     const changed = (...wanted) => wanted.some((name) => names.includes(name));
     if (changed('questions', 'manipulation', 'interface_output', 'sensors')) this.showInterface();
-    if (changed('preconditions')) this.tick();
-    if (changed('images', 'sensors')) this.camera.update();
+    if (changed('preconditions')) this.showTime();
+    if (changed('onlookers')) this.onlookers.show();
+    if (changed('images', 'cameras')) this.camera.update();
     if (changed('sensors')) this.showPerception();
     if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
     if (machines || changed('questions')) this.machine.update();
     if (this.followUp) this.followUp.update();
+  }
+
+  /** Who holds the claim where it is not this browser; '' where nobody does. */
+  get otherHolder() {
+    const { now, app } = this;
+    if (!now || !now.holder || app.isMine(now)) return '';
+    if (now.holder !== app.expert) return now.holder;
+    return now.session ? now.holder + ' (in another browser)' : ''; // '': it is not told yet
   }
 
   /** Keep the claim, or see that it is lost. */
@@ -271,7 +295,7 @@ export class QuestionDetail {
     // a server that was restarted knows nobody who holds it
     if (free && this.held && this.app.connection.connected) this.claim('claim');
     if (this.mine) this.holderBefore = ''; // whoever holds it next has taken it over
-    const other = now && now.holder !== this.app.expert ? now.holder : '';
+    const other = this.otherHolder;
     if (this.held && other && other !== this.holderBefore) { // else it is not told yet
       this.held = false;
       this.problem = other + ' has taken this question over.';
@@ -281,9 +305,13 @@ export class QuestionDetail {
 
   show() {
     const { now, mine, settled, held, claiming, sending, problem } = this;
-    const { mayAnswer } = this.app;
-    this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer });
-    this.form.enable(mine && !sending && !settled);
-    this.tick();
+    const { mayAnswer, expert, liveness } = this.app;
+    const silent = Boolean(now && !settled && this.silence.show());
+    this.robotGone = now ? '' : this.robotGone || liveness.gone(this.question);
+    this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
+      gone: this.robotGone });
+    this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
+    this.form.enable(mine && !sending && !settled && !silent);
+    this.showTime();
   }
 }

@@ -29,8 +29,9 @@ class QuestionPanel {
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
+    this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.servers,
+      h('aside', { class: 'queue-side' }, this.queue, this.servers, this.ages,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
@@ -60,6 +61,7 @@ class QuestionPanel {
 
   tick() {
     this.showQueue();
+    setText(this.ages, 'Heard: ' + this.app.liveness.ages() + ' ago');
     if (this.detail) this.detail.tick();
   }
 
@@ -89,7 +91,8 @@ class QuestionPanel {
   /** @param {Question} question */
   row(question) {
     const { key, status, state, robot, path, rate } = question;
-    return h('button', { key, class: 'question-row ' + status, 'data-key': key,
+    const silent = this.app.liveness.whoIsSilent(question) ? ' silent' : '';
+    return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
       'data-deliberate': 'choose ' + key, 'aria-current': this.isChosen(key),
       onclick: () => this.choose(key) },
     h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
@@ -102,12 +105,13 @@ class QuestionPanel {
   }
 
   /** @param {Question} question */
-  statusChip({ status, holder, interface: name }) {
+  statusChip(question) {
+    const { status, holder, interface: name } = question;
     if (status === 'interface') {
       return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
     }
     if (!holder) return chip('waiting', 'bad');
-    return holder === this.app.expert ? chip('yours', 'good') : chip(holder, 'warn');
+    return this.app.isMine(question) ? chip('yours', 'good') : chip(holder, 'warn');
   }
 
   /** @param {Question} question */

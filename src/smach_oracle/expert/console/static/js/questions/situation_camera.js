@@ -8,30 +8,11 @@ import { FailureImageView } from '../sensors/failure_image_view.js';
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').KeptImage} KeptImage */
 /** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').Sensor} Sensor */
 /** @typedef {'then' | 'now'} Pane */
 
-// Colour first, raw or compressed alike; depth and everything else after it.
-const RANK = [/\/(rgb|color|colour)\//, /image_(raw|rect|color)/, /./];
-const NO_COLOUR = /depth|disparity/;
 const UNKNOWN = 'What it saw at the failure is not known.';
-
-/**
- * Topics of a robot's cameras: those of its namespace, or all that there are.
- * @param {App} app
- * @param {string} robot
- */
-function camerasOf(app, robot) {
-  const namespace = robot.slice(0, robot.lastIndexOf('/') + 1);
-  const all = app.store.sensors.filter((each) => each.kind === 'image').map((each) => each.topic)
-    .filter((topic) => !NO_COLOUR.test(topic));
-  const own = all.filter((topic) => topic.startsWith(namespace));
-  return (own.length ? own : all).sort((one, other) => (
-    rankOf(one) - rankOf(other) || one.localeCompare(other)));
-}
-
-/** @param {string} topic */
-function rankOf(topic) { return RANK.findIndex((pattern) => pattern.test(topic)); }
+export const NO_CAMERA = 'No camera of its own. The console’s setting ~cameras names one; the tab '
+  + 'Sensors shows all there are.';
 
 export class SituationCamera {
   /**
@@ -77,13 +58,15 @@ export class SituationCamera {
   update() {
     this.images = this.app.store.get('images')?.[this.question.key] || this.images;
     const topics = [...new Set([...this.images.map((image) => image.topic),
-      ...camerasOf(this.app, this.question.robot)])];
-    this.root.hidden = !topics.length;
+      ...(this.app.store.get('cameras')?.[this.question.robot] || [])])];
     const shape = JSON.stringify([topics, this.images]);
     if (shape === this.shape) return;
     this.shape = shape;
     replace(this.choice, options(topics, this.choice.value));
     this.choice.hidden = topics.length < 2;
+    this.root.classList.toggle('none', !topics.length);
+    if (!topics.length) this.live = false;
+    this.toggle.hidden = !topics.length;
     this.look();
   }
 
@@ -115,8 +98,8 @@ export class SituationCamera {
     setText(this.toggle, this.live ? 'Stop live' : 'Show live');
     this.toggle.setAttribute('aria-pressed', String(this.live));
     this.showLive(this.live ? topic : '');
-    if (!image && !this.live && !this.now.childElementCount) {
-      replace(this.now, h('p', { class: 'dim' }, UNKNOWN));
+    if (!topic || (!image && !this.live)) {
+      replace(this.now, h('p', { class: 'dim' }, topic ? UNKNOWN : NO_CAMERA));
     }
   }
 

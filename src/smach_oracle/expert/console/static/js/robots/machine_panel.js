@@ -1,6 +1,7 @@
 // @ts-check
 // All containers of all robots: one of them is shown, live.
 import { h, setText } from '../page/dom.js';
+import { aged } from '../page/liveness.js';
 import { remember, remembered } from '../page/preferences.js';
 import { arrange, redraw } from '../page/redraw.js';
 import { takeArrowKeys } from '../page/tree_keys.js';
@@ -70,6 +71,8 @@ class MachinePanel {
 
   shown() { this.show(); }
 
+  tick() { this.show(); }
+
   /** @param {string[]} names */
   update(names) {
     if (names.some((name) => name === 'robots' || name === 'questions' || name.startsWith('live ')
@@ -83,7 +86,11 @@ class MachinePanel {
     this.showPicker(robots);
     setText(this.title, this.path || this.robot);
     const { alive, unwell } = this.source.state(this.robot);
+    const { liveness } = this.app;
+    const age = alive === false ? null : liveness.robot(this.robot);
+    this.body.classList.toggle('silent', alive === false || liveness.isSilent(this.robot));
     setText(this.state, this.robot + (alive === false ? ' · gone' : '')
+      + (age === null ? '' : ' · heard ' + aged(age) + ' ago')
       + (unwell ? ' · waits until it is well: ' + unwell : ''));
     if (this.robot) this.view.show(this.robot, this.path);
     this.toggle.hidden = !this.view.drawable;
@@ -123,7 +130,8 @@ class MachinePanel {
    * @returns {PickerGroup}
    */
   pickerGroup(robot) {
-    const { alive, active, failed, paths } = this.source.state(robot);
+    const { alive: known, active, failed, paths } = this.source.state(robot);
+    const alive = known && !this.app.liveness.isSilent(robot);
     const rows = paths.map((path) => ({
       path,
       failed: Boolean(failed[path]),

@@ -2,6 +2,7 @@
 // A camera, live: colour, or depth in false colours with its range.
 import { h, setText } from '../page/dom.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
+import { ImageAge } from './image_age.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -18,17 +19,21 @@ export class CameraView {
     this.canvas = imageCanvas(topic);
     this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the first image…');
     this.range = h('span', { class: 'view-range' });
+    this.age = new ImageAge();
     this.rate = h('span', { class: 'dim number' });
     this.root = h('figure', { class: 'view camera-view', 'data-topic': topic },
       h('div', { class: 'screen' }, this.canvas, this.note, this.range),
       h('figcaption', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
-        h('span', { class: 'spacer' }), this.rate));
+        h('span', { class: 'spacer' }), this.age.root, this.rate));
     /** @type {SensorFeed<ImageFacts>} */
     this.feed = new SensorFeed(app, () => numberOf(app, topic, type), this.root,
       { width, take: (answer, facts) => this.take(answer, facts), say: (text) => this.say(text) });
   }
 
-  stop() { this.feed.stop(); }
+  stop() {
+    this.age.stop();
+    this.feed.stop();
+  }
 
   /** @param {string} text */
   say(text) {
@@ -43,8 +48,9 @@ export class CameraView {
    * @param {Response} answer
    * @param {ImageFacts} facts
    */
-  async take(answer, { range }) {
+  async take(answer, { range, age }) {
     await drawImage(this.canvas, answer);
+    this.age.take(age);
     const [near, far] = (range || []).map((each) => each.toFixed(2) + ' m');
     setText(this.range, range ? 'red ' + near + ' … blue ' + far : '');
     this.root.classList.add('shown');

@@ -5,6 +5,8 @@ import { h, setText } from '../page/dom.js';
 import { duration } from '../page/format.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
 
+const FAR_S = 10;
+
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').KeptImage} KeptImage */
 
@@ -22,7 +24,8 @@ export class FailureImageView {
       'data-image': id },
     h('div', { class: 'screen' }, this.canvas, this.note),
     h('figcaption', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
-      h('span', { class: 'spacer' }), h('span', { class: 'dim' }, whenTaken(image))));
+      h('span', { class: 'spacer' }), h('span', { class: isFar(image) ? 'image-age old' : 'dim' },
+        whenTaken(image))));
     this.fetch(app, id);
   }
 
@@ -48,7 +51,17 @@ export class FailureImageView {
 }
 
 /** @param {KeptImage} image */
-function whenTaken({ late }) {
+function whenTaken({ late, stamped }) {
   if (late === null) return 'at the failure';
-  return late < 1 ? 'at the question' : duration(late) + ' after the question';
+  const when = Math.abs(late) < 1 ? 'at the question'
+    : duration(Math.abs(late)) + (late < 0 ? ' before' : ' after') + ' the question';
+  return stamped ? when : 'came ' + when + ', without a stamp';
+}
+
+/**
+ * Whether it may show something else than the failure.
+ * @param {KeptImage} image
+ */
+function isFar({ late, stamped }) {
+  return late !== null && (!stamped || Math.abs(late) > FAR_S);
 }

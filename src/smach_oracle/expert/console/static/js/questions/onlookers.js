@@ -1,0 +1,64 @@
+// @ts-check
+// Who else looks at a question now.
+import { h, setText } from '../page/dom.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').Onlooker} Onlooker */
+/** @typedef {import('../server').Question} Question */
+
+const PAUSE_MS = 1000; // whoever turns the pages fast uses up no limit on commands
+let wanted = ''; // the question that this page shows
+let timer = 0;
+
+export class Onlookers {
+  /**
+   * @param {App} app
+   * @param {Question} question
+   */
+  constructor(app, question) {
+    this.app = app;
+    this.key = question.key;
+    this.root = h('p', { class: 'dim onlookers', role: 'status', hidden: true });
+  }
+
+  /** Tell the others that this page shows the question. */
+  look() { this.tell(this.key); }
+
+  leave() { this.tell(''); }
+
+  /** @param {string} question */
+  tell(question) {
+    wanted = question;
+    timer = timer || setTimeout(() => {
+      timer = 0;
+      this.app.connection.request('view', { question: wanted }).catch(() => {});
+    }, PAUSE_MS);
+  }
+
+  show() {
+    const names = namesOf(this.app, this.key);
+    this.root.hidden = !names.length;
+    setText(this.root, names.length ? 'Also looking at it: ' + names.join(', ') + '.' : '');
+  }
+}
+
+/**
+ * The others who look at a question, each browser once.
+ * @param {App} app
+ * @param {string} key
+ */
+function namesOf(app, key) {
+  const all = app.store.get('onlookers')?.[key] || [];
+  const others = new Map(all.filter(({ session }) => session !== app.connection.browser)
+    .map((each) => [each.session + ' ' + each.name, nameOf(app, each)]));
+  return [...others.values()];
+}
+
+/**
+ * @param {App} app
+ * @param {Onlooker} onlooker
+ */
+function nameOf(app, { name, role }) {
+  if (name) return name + (name === app.expert ? ' (in another browser)' : '');
+  return role === 'viewer' ? 'a viewer' : 'somebody without a name';
+}

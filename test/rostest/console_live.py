@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""What is live and what is not, in a real browser: the console stopped, the master dead, the robot
+stopped or killed. A master and nodes of its own.
+"""
+import os
+import subprocess
+import sys
+import unittest
+
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from console_page import WITH_BROWSER, ConsolePage
+from expert_fixtures import Process
+from own_master import wait_for_master
+from waiting import wait_for
+
+from smach_oracle.experiment.launching import free_port
+
+QUESTION = '.question-row[data-key^="/alpha/"]'
+ANSWER = '.choice.goto[data-name=PLACE]'
+LIVE = 'live'
+SILENT = 'Nothing is heard from {} any more.'
+GREY = 'return getComputedStyle(document.querySelector(".detail-body")).filter'
+
+
+@unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
+class Live(ConsolePage, unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.master_port = free_port()
+        os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(cls.master_port)
+        cls.start_master()
+        cls.begin('console_robot.py', 'PICK', '0.1', '0', '9')
+
+    @classmethod
+    def tearDownClass(cls):
+        super().tearDownClass()
+        cls.master.kill()
+
+    @classmethod
+    def start_master(cls):
+        cls.master = Process('rosmaster', '--core', '-p', str(cls.master_port),
+                             stdout=subprocess.DEVNULL, env=dict(os.environ))
+        wait_for_master(os.environ['ROS_MASTER_URI'])
+
+    def setUp(self):
+        if not self.browser.text('.detail-head'):
+            self.browser.click(QUESTION)
+        self.assertTrue(self.answerable())
+
+    def answerable(self):
+        """Whether the question comes to be live, held, and may be answered."""
+        browser = self.browser
+        return browser.says(LIVE, '#status') and browser.says('It is yours.') and wait_for(
+            lambda: browser.find(ANSWER).is_enabled() and browser.run(GREY) == 'none')
+
+    def refused(self, who):
+        """Whether the page comes to say who is silent, is grey, and takes no answer."""
+        browser = self.browser
+        return browser.says(SILENT.format(who), '.silence-bar') and wait_for(
+            lambda: browser.run(GREY) == 'grayscale(1)' and not browser.find(ANSWER).is_enabled())
+
+    def test_1_the_ages_of_the_last_words_are_shown(self):
+        browser = self.browser
+        for told, where in (('console 0 s', '#ages'), ('master 0 s', '#ages'),
+                            ('heard 0 s ago', '.last-word')):
+            self.assertTrue(browser.says(told, where), told)
+        browser.click('#tab-machines')
+        self.assertTrue(browser.says('/alpha · heard', '.machine-card .head'))
+        browser.click('#tab-questions')
+
+    def test_2_of_a_console_that_is_stopped_nothing_is_live_and_what_it_was_told_is_not_known(self):
+        browser = self.browser
+        self.console.freeze()
+        try:
+            browser.click(ANSWER)
+            self.assertTrue(browser.says('console silent for', '#status'))
+            self.assertTrue(self.refused('the console'))
+            self.assertTrue(browser.says('whether it has your answer is not known',
+                                         '.claim-bar .problem'))
+            self.assertIn('No reply within 20 s to “answer”', browser.text('#toasts'))
+            self.assertTrue(browser.says('conn', '#status'), 'it tries to come back')
+        finally:
+            self.console.thaw()
+        self.assertTrue(self.answerable(), 'it comes back; the answer has come too late')
+
+    def test_3_with_a_dead_master_no_answer_is_sent(self):
+        self.master.kill()
+        try:
+            self.assertTrue(self.browser.says('master silent for', '#status'))
+            self.assertTrue(self.refused('the ROS master'))
+        finally:
+            self.start_master()
+        self.assertTrue(self.answerable())
+
+    def test_4_a_robot_that_is_stopped_is_silent(self):
+        self.robot.freeze()
+        try:
+            self.assertTrue(self.refused('/alpha'))
+            self.assertEqual(self.browser.text('#status'), LIVE, 'the others are heard')
+            self.browser.click('#tab-machines')
+            self.assertTrue(wait_for(lambda: self.browser.run(
+                'return Boolean(document.querySelector(".machine-card.silent"))')))
+            self.browser.click('#tab-questions')
+        finally:
+            self.robot.thaw()
+        self.assertTrue(self.answerable())
+
+    def test_5_a_robot_that_was_killed_reads_as_gone(self):
+        browser = self.browser
+        self.robot.kill()
+        self.assertTrue(browser.says('/alpha is gone', '.claim-bar'))
+        self.assertNotIn('answered elsewhere', browser.text())
+        type(self).robot = self.start_robot('console_robot.py', 'PICK', '0.1', '0', '9')
+        browser.find(QUESTION)
+        self.assertIn('/alpha is gone', browser.text('.claim-bar'),
+                      'that question does not come back')
+        browser.click('.claim-bar .inline')
+        browser.click(QUESTION)
+        self.assertTrue(self.answerable())
+        self.assertEqual(browser.errors(), [])
+
+
+if __name__ == '__main__':
+    rostest.rosrun('smach_oracle', 'console_live', Live)
