@@ -1,0 +1,151 @@
+"""The model of a tree under an oracle: brute force, from the words of doc/, without SMACH."""
+from typing import Any, Dict, List, Optional, Tuple
+
+from .answers import Options, draw_reply
+from .ends import Goal, Reply
+from .machine import MachinePart
+from .parts import ConcurrencePart, Cut, IteratorPart, LeafPart, Part, Raised, View
+from .plan import CUT, KEYS, MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
+from .scheduling import Scheduler
+
+PARTS = {Leaf: LeafPart, Machine: MachinePart, Beside: ConcurrencePart, Repeated: IteratorPart}
+
+
+class Model:
+    """A tree, executed by the model; what happens, by path of the container."""
+
+    def __init__(self, plan: TreePlan, is_upstream: bool) -> None:
+        """`is_upstream`: SMACH's own engine, which preempts Concurrences and Iterators otherwise.
+        """
+        self.plan = plan
+        self.is_upstream = is_upstream
+        self.course: List[Tuple[str, Tuple[Any, ...]]] = []
+        self.budget = {'recoveries': 0, 'questions': 0}
+        self._numbers: Dict[Tuple[str, ...], int] = {}
+        self._machines: Dict[str, MachinePart] = {}
+        self.top: MachinePart = self._make(plan.top, TOP, None)
+        self.cross_jumps = 0
+
+    def part_of(self, plan: Any, path: str, parent: Part) -> Part:
+        """Make the part of a node; `path`: of its container."""
+        return self._make(plan, path if isinstance(plan, Leaf) else '{}/{}'.format(
+            path, plan.label), parent)
+
+    def _make(self, plan: Any, path: str, parent: Any) -> Any:
+        part = PARTS[type(plan)](self, plan, path, parent)
+        if isinstance(part, MachinePart):
+            self._machines[path] = part
+        return part
+
+    def execute(self) -> str:
+        """One trial; returns the outcome, or '' where it raises."""
+        for kind in self.budget:
+            self.budget[kind] = 0
+        for machine in self._machines.values():
+            machine.memory.begin_trial()
+        self._numbers = {key: number for key, number in self._numbers.items()
+                         if key[0] != 'question'}
+        self.entries = 0
+        scheduler = Scheduler(self.plan.seed)
+        self.top.userdata.update({key: key + '0' for key in KEYS[:2]})
+        try:
+            return scheduler.run(self.top.execute(View({}, {})))
+        except Raised:
+            return ''
+        except Cut:
+            return CUT
+
+    # -- what the parts need
+
+    def tell(self, path: str, event: Tuple[Any, ...]) -> None:
+        """Note an event."""
+        self.course.append((path, event))
+
+    def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
+        """Note what a leaf sees when it is executed."""
+        self.entries += 1
+        if self.entries > MOST_ENTRIES:
+            raise Cut()
+        self.tell(path, ('ENTRY', label, tuple(sorted(seen.items()))))
+
+    def number_of(self, *key: str) -> int:
+        """How often this was asked for before."""
+        number = self._numbers.get(key, 0)
+        self._numbers[key] = number + 1
+        return number
+
+    def is_spent(self, kind: str) -> bool:
+        """Whether the trial's budget of that kind is spent."""
+        limit = self.plan.budget.get(kind)
+        return limit is not None and self.budget[kind] >= limit
+
+    def machine(self, path: str) -> MachinePart:
+        """The machine of that path."""
+        return self._machines[path]
+
+    @staticmethod
+    def is_machine(part: Any) -> bool:
+        """Whether it is a wrapped container."""
+        return isinstance(part, MachinePart)
+
+    def place(self, name: str) -> Tuple[str, str]:
+        """Path and label of PATH/LABEL below the top."""
+        path, _, label = '{}/{}'.format(TOP, name).rpartition('/')
+        return path, label
+
+    def is_foreseen(self, inner: Part, outcome: str) -> bool:
+        """Whether the author of a level above recovers from a container that ends so."""
+        level = inner.parent
+        if isinstance(level, IteratorPart):
+            return outcome in level.plan.loop_outcomes
+        if not isinstance(level, MachinePart):
+            return False
+        failed = level.failure_of(inner.label, outcome, False)
+        if failed is None:
+            return False
+        if level.author_recovers(failed):
+            return True
+        way = failed.way
+        return way is not None and bool(way.target) and not way.is_state and self.is_foreseen(
+            level, way.target)
+
+    def goal_of(self, origin: MachinePart, path: str, label: str) -> Goal:
+        """Where to go from a container to a place."""
+        target: Part = self._machines[path]
+        around = _with_ancestors(origin)
+        begins = {}
+        while target not in around or not isinstance(target, MachinePart):
+            if isinstance(target, MachinePart):
+                begins[target.path] = label
+            label = target.label
+            target = target.parent
+        self.cross_jumps += bool(begins or target is not origin)
+        return Goal(target, label, begins)
+
+    # -- questions
+
+    def ask(self, machine: MachinePart, failed: Any) -> Optional[Reply]:
+        """Put a question; the answer is drawn."""
+        options = self.options(machine, failed.label)
+        number = self.number_of('question', machine.path, failed.label)
+        self.tell(machine.path, ('QUESTION', failed.label, failed.kind, options))
+        return draw_reply(self.plan, machine.path, failed.label, number, options)
+
+    def options(self, machine: MachinePart, label: str) -> Options:
+        """What may be answered."""
+        part = machine.child(label)
+        places = [(each.path, name) for each in self._machines.values() for name in each.labels]
+        levels = [each for each in _with_ancestors(machine) if isinstance(each, MachinePart)]
+        return Options(
+            tuple(sorted(places)),
+            tuple(sorted((name, machine.way_of(label, name).target)
+                         for name in part.plan.outcomes)),
+            tuple(sorted((each.path, name) for each in levels for name in each.plan.outcomes)),
+            tuple(sorted(getattr(part.plan, 'writes', part.keys))))
+
+
+def _with_ancestors(part: Part) -> List[Part]:
+    found = [part]
+    while found[-1].parent is not None:
+        found.append(found[-1].parent)
+    return found
