@@ -257,8 +257,12 @@ class OracleContainer(smach.StateMachine):
 
     def call_start_cbs(self) -> None:
         """Forget the execution before: the machine has its initial state now."""
-        if self._oracle.engine.stepped:
-            self._oracle.begin_execution()
+        node = self._oracle
+        if node.engine.stepped:
+            node.begin_execution()
+        if node.entry and node.entry in self._states:
+            self._set_current_state(node.entry)
+        node.entry = ''
         super().call_start_cbs()
 
     def _update_once(self) -> Optional[str]:

@@ -2,7 +2,7 @@
 import threading
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Union
 
-from smach_oracle.oracle.asking.answer_rules import check_answer, choices_of
+from smach_oracle.oracle.asking.answer_rules import addressed, check_answer, choices_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
@@ -122,7 +122,8 @@ class AnswerScript(Expert):
             said = self._said(question)
             self._chosen = said
             if said.answer is not None:
-                check_answer(said.answer, choices_of(question))
+                choices = choices_of(question)
+                check_answer(addressed(said.answer, choices), choices)
             return said.answer
         except AnswerError as err:
             self._note('the answer of the script does not fit {}: {}'.format(

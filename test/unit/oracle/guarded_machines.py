@@ -9,6 +9,8 @@ HELD_BACK = 'POUR was done in this trial and is not repeated by itself'
 OUTCOMES = ['done', 'aborted', 'preempted']
 CONFIRM, NEVER = {'on_retry': 'confirm'}, {'on_retry': 'never'}
 ASKED_ABOUT = {'max_recoveries': 0}
+# it is tried again once; then its policy asks, and an oracle above may decide
+UNSURE = {'prior': 0.5}
 
 
 def chain(**states):

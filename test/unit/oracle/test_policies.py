@@ -246,12 +246,13 @@ def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
 
 @pytest.mark.parametrize('policy', sorted(POLICIES))
 def test_a_failure_of_the_machine_around_breaks_no_continuity(policy):
-    arm = machine_of(('REACH', Scripted('aborted', 'aborted'), {'ok': 'done'}))
+    arm = machine_of(('REACH', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'}))
     machine = Watched(machine_of(('ARM', arm, {'done': 'done'})), settings={
-        'policy': policy, 'states': {'REACH': {'max_recoveries': 0}}})
-    assert machine.run() == 'done'
-    assert [event.state for event in machine.of(EventKind.FAILURE)][:3] == ['REACH', 'ARM', 'REACH']
-    assert continuous_failures(machine, 'REACH') == [False, True]
+        'policy': policy, 'memory': 1000, 'escalate': True, 'states': {'REACH': {'prior': 0.5}}})
+    machine.run()
+    assert [event.state for event in machine.of(EventKind.FAILURE)] == [
+        'REACH', 'REACH', 'ARM', 'REACH', 'ARM']
+    assert continuous_failures(machine, 'REACH') == [False, True, True]
 
 
 def test_prose_keeps_the_initial_state_as_its_goal_whatever_succeeds_while_the_state_fails():

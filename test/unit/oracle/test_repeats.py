@@ -218,7 +218,8 @@ def test_behind_a_state_never_visited_it_says_where_the_authors_transitions_lead
     machine, expert = guarded(states, give_up(), max_recoveries=0)
     machine.run()
     assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
-        'ARM': ('ARM/POUR',), 'DETECT': (), 'LATER': ('ARM/POUR',), 'LAST': ('ARM/POUR',)}
+        'ARM': ('ARM/POUR',), 'POUR': ('ARM/POUR',), 'DETECT': (),
+        'LATER': ('ARM/POUR',), 'LAST': ('ARM/POUR',)}
 
 
 def test_a_fallback_does_not_lead_to_where_the_way_leads_back():

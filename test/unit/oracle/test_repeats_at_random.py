@@ -129,8 +129,11 @@ class Rule:
         assert event.by or not again, 'the oracle repeats nothing by itself'
         assert target not in self._begun or self.guard(target) == 'confirm', target
         self._spent |= again
-        if target in self._begun:
-            self._confirmed.add(target)
+        confirmed = {target}
+        if 'to' in event.data:  # it crosses containers: so are those on its way down
+            names = event.data['to'].split('/')
+            confirmed.update(('/'.join(names[:end]), names[end]) for end in range(1, len(names)))
+        self._confirmed |= confirmed & self._begun
 
 
 @pytest.mark.parametrize('policy', ['prose', 'algorithm1'])

@@ -7,10 +7,10 @@ from guarded_machines import (
     HELD_BACK,
     NEVER,
     OUTCOMES,
+    UNSURE,
     chain,
     guarded,
     pouring,
-    sentences,
 )
 from machines import Scripted, give_up, goto, supersede
 
@@ -70,20 +70,23 @@ def test_a_machine_that_is_a_precondition_may_do_it_once():
 # -- nested machines
 
 def test_an_outer_oracle_does_not_repeat_what_lies_within():
-    inner = chain(POUR=Scripted(), LIFT=Scripted('aborted'))
-    machine, expert = guarded(chain(INNER=inner), give_up(),
-                              states={'POUR': CONFIRM, 'LIFT': ASKED_ABOUT})
+    inner = chain(POUR=Scripted(), LIFT=Scripted('aborted', 'aborted'))
+    machine, expert = guarded(chain(INNER=inner), give_up(), escalate=True,
+                              states={'POUR': CONFIRM, 'LIFT': UNSURE})
     assert machine.run() == 'aborted'
-    assert sentences(machine)[1] == ('INNER failed (its first result); trying it again would '
-                                     'repeat INNER/POUR: asking an expert, 300 s')
-    assert expert.questions[0].failed_state == 'INNER'
+    question, = expert.questions
+    assert question.failed_state == 'LIFT'
+    assert question.tried == ('SM_ROOT: INNER failed (its first result); trying it again would '
+                              'repeat INNER/POUR: asks too',)
 
 
 def test_an_outer_oracle_may_repeat_a_machine_that_has_not_come_so_far():
-    inner = chain(LIFT=Scripted('aborted'), POUR=Scripted())
-    machine, expert = guarded(chain(INNER=inner), states={'POUR': CONFIRM, 'LIFT': ASKED_ABOUT})
+    inner = chain(LIFT=Scripted('aborted', 'aborted'), POUR=Scripted())
+    machine, expert = guarded(chain(INNER=inner), escalate=True,
+                              states={'POUR': CONFIRM, 'LIFT': UNSURE})
     assert machine.run() == 'done'
-    assert machine.decisions() == [('ask', ''), ('revisit', 'INNER')] and not expert.questions
+    assert machine.decisions() == [('revisit', 'LIFT'), ('ask', ''), ('revisit', 'INNER')]
+    assert not expert.questions
 
 
 def test_within_a_machine_that_is_executed_again_the_question_is_about_the_state():
@@ -92,16 +95,26 @@ def test_within_a_machine_that_is_executed_again_the_question_is_about_the_state
                               states={'POUR': CONFIRM, 'LIFT': ASKED_ABOUT})
     assert machine.run() == 'done'
     asked = [(question.container_path, question.failed_state) for question in expert.questions]
-    assert asked == [('SM_ROOT', 'INNER'), ('SM_ROOT/INNER', 'POUR')], 'nobody above could confirm'
+    assert asked == [('SM_ROOT/INNER', 'LIFT'), ('SM_ROOT/INNER', 'POUR')]
     assert machine.visits() == ['INNER', 'POUR', 'LIFT', 'INNER', 'POUR', 'LIFT']
 
 
-def test_a_spent_state_that_nobody_confirms_is_not_come_to_again_and_again():
+def test_a_guarded_state_in_another_container_is_confirmed_by_going_to_it():
+    pour = Scripted()
+    machine, expert = guarded(chain(INNER=chain(POUR=pour), LIFT=Scripted('aborted')),
+                              goto('POUR'), max_recoveries=0)
+    assert machine.run() == 'done' and pour.runs == 2
+    repeats = {(choice.container, choice.state): choice.repeats
+               for choice in expert.questions[0].choices}
+    assert repeats['SM_ROOT/INNER', 'POUR'] == ('INNER/POUR',)
+
+
+def test_a_spent_state_that_nobody_confirms_ends_the_machine():
     inner = chain(POUR=Scripted(), LIFT=Scripted('aborted'))
     machine, expert = guarded(chain(INNER=inner), goto('INNER'),
                               states={'POUR': CONFIRM, 'LIFT': ASKED_ABOUT})
     assert machine.run() == 'aborted'
-    assert [question.failed_state for question in expert.questions] == ['INNER', 'POUR', 'INNER']
+    assert [question.failed_state for question in expert.questions] == ['LIFT', 'POUR']
     assert machine.visits().count('INNER') == 2
 
 
@@ -121,13 +134,13 @@ def test_the_authors_loop_around_a_machine_leaves_its_states_free():
 def test_a_guarded_state_of_an_earlier_round_is_not_held_against_this_one():
     """In the second round INNER fails before POUR, so that a revisit repeats nothing."""
     pour = Scripted()
-    inner = chain(LIFT=Scripted('ok', 'aborted'), POUR=pour)
+    inner = chain(LIFT=Scripted('ok', 'aborted', 'aborted'), POUR=pour)
     machine = smach.StateMachine(outcomes=OUTCOMES)
     with machine:
         smach.StateMachine.add('INNER', inner, {'done': 'AGAIN'})
         smach.StateMachine.add('AGAIN', Scripted('again', outcomes=('ok', 'again')),
                                {'again': 'INNER', 'ok': 'done'})
-    watched, expert = guarded(machine, states={'POUR': NEVER, 'LIFT': ASKED_ABOUT})
+    watched, expert = guarded(machine, escalate=True, states={'POUR': NEVER, 'LIFT': UNSURE})
     assert watched.run() == 'done'
     assert pour.runs == 2 and not expert.questions
 
@@ -161,14 +174,16 @@ def test_the_branches_of_a_concurrence_do_not_hinder_each_other():
     assert not expert.questions
 
 
-def test_a_concurrence_is_not_repeated_where_a_branch_has_done_it():
+def test_a_concurrence_is_not_repeated_where_an_expert_gave_a_branch_up():
     left, right = chain(POUR=Scripted()), chain(DRIVE=Scripted('aborted'))
     machine, expert = guarded(chain(BOTH=both(LEFT=left, RIGHT=right)), give_up(),
                               states={'POUR': CONFIRM, 'DRIVE': ASKED_ABOUT})
     assert machine.run() == 'aborted'
-    assert sentences(machine)[-1].startswith(
-        'BOTH failed (its first result); trying it again would repeat BOTH/LEFT/POUR')
-    assert len(expert.questions) == 1
+    question, = expert.questions
+    repeats = {choice.state: choice.repeats for choice in question.choices}
+    assert question.failed_state == 'DRIVE'
+    assert [event.state for event in machine.of(EventKind.FAILURE)] == ['DRIVE', 'BOTH']
+    assert repeats['BOTH'] in ((), ('BOTH/LEFT/POUR',)), 'by which branch was faster'
 
 
 def test_a_guarded_container_is_guarded_as_one():
@@ -176,4 +191,5 @@ def test_a_guarded_container_is_guarded_as_one():
     machine, expert = guarded(chain(INNER=inner), goto('INNER'),
                               states={'INNER': CONFIRM, 'LIFT': ASKED_ABOUT})
     assert machine.run() == 'done'
-    assert [question.failed_state for question in expert.questions] == ['INNER']
+    assert [question.failed_state for question in expert.questions] == ['LIFT']
+    assert {choice.state: choice.repeats for choice in expert.questions[0].choices}['INNER']

@@ -309,21 +309,20 @@ def test_a_state_in_which_a_person_is_asked_does_not_count_as_still_running():
     def ask(question, cancelled, progress):
         assert not cancelled.wait(1.5)
         return supersede('ok')
-    expert = FakeExpert(give_up(), ask)
+    expert = FakeExpert(goto('X'), ask)
     machine = Watched(around('X', chain_of(Scripted('aborted', 'aborted'))), expert=expert,
-                      settings=dict(SOON, still_running_s=1.0, escalate=False, max_recoveries=0,
-                                    states={'X': {'max_recoveries': 1}}))
-    assert machine.run() == 'done' and failures(machine) == ['A', 'X', 'A']
+                      settings=dict(SOON, still_running_s=1.0, max_recoveries=0))
+    assert machine.run() == 'done' and failures(machine) == ['A', 'A']
     assert [question.failed_state for question in expert.questions] == ['A', 'A']
 
 
 def test_a_nested_machine_that_hangs_is_preempted_as_a_whole():
     inner = chain_of(Scripted('aborted', Gate()))
-    machine = Watched(around('X', inner), expert=FakeExpert(supersede('done')),
-                      settings=dict(SOON, max_recoveries=0, states={'X': {'max_recoveries': 1}}))
+    machine = Watched(around('X', inner), expert=FakeExpert(goto('X'), supersede('done')),
+                      settings=dict(SOON, max_recoveries=0))
     assert machine.run() == 'done'
     assert not inner.preempt_requested()
-    assert [event.state for event in machine.of(EventKind.QUERY_ANSWERED)] == ['X']
+    assert [event.state for event in machine.of(EventKind.QUERY_ANSWERED)] == ['A', 'X']
 
 
 def test_the_clocks_thread_lives_only_while_a_state_runs():

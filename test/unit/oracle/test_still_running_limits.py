@@ -9,8 +9,8 @@ from waiting import wait_for
 
 from smach_oracle.oracle.machine import trial_budget
 from smach_oracle.oracle.machine.alarm_clock import AlarmClock
+from smach_oracle.oracle.places import way
 from smach_oracle.oracle.records.events import EventKind, FailureKind
-from smach_oracle.oracle.recovery import recovery, still_running
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 
 
@@ -141,15 +141,17 @@ def test_the_answer_waits_until_the_robot_is_well():
 
 def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
     closed = []
-    monkeypatch.setattr(recovery, 'why_closed',
+    monkeypatch.setattr(way, 'why_closed',
                         lambda node, label: 'still runs' if closed and label == 'B' else '')
 
-    def ask(question, cancelled, progress):
-        closed.append('B')
-        return goto('B')
-    expert = FakeExpert(ask, goto('C'))
-    monkeypatch.setattr(still_running, 'why_closed', lambda node, label: '')
-    machine = asked(Scripted('aborted', Gate()), Scripted(), Scripted(), expert=expert)
+    class ClosesB(Gate):
+        def __call__(self, state, ud):
+            outcome = super().__call__(state, ud)
+            closed.append('B')  # after the answer was taken
+            return outcome
+
+    expert = FakeExpert(goto('B'), goto('C'))
+    machine = asked(Scripted('aborted', ClosesB()), Scripted(), Scripted(), expert=expert)
     assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'C']
     assert [event.text for event in machine.of(EventKind.WARNING)] == [
         'cannot go to B, as was answered: B still runs']

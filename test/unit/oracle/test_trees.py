@@ -85,19 +85,6 @@ def test_nested_machines_stay_as_they_are_where_told():
     assert not isinstance(again, OracleContainer)
 
 
-def test_an_inner_oracle_that_gives_up_hands_the_failure_up_and_only_the_outermost_asks():
-    inner = chain_of(Scripted(), Scripted(*['aborted'] * 20))
-    expert = FakeExpert(supersede('done'))
-    machine = Watched(around('INNER', inner), name='TOP', expert=expert,
-                      settings={'max_recoveries': 1})
-    assert machine.run() == 'done'
-    assert [question.container_path for question in expert.questions] == ['TOP']
-    assert expert.questions[0].failed_state == 'INNER'
-    assert [(event.path, event.state)
-            for event in machine.of(EventKind.FAILURE)][-1] == ('TOP', 'INNER')
-    assert 'handed to the oracle above' in machine.of(EventKind.GIVE_UP)[0].text
-
-
 def test_an_exception_below_is_handed_up_with_its_traceback():
     inner = chain_of(Scripted(ValueError('no grasp')))
     machine = Watched(around('INNER', inner), settings={'max_recoveries': 0})

@@ -102,10 +102,9 @@ def test_it_is_one_for_all_containers():
                       settings={'memory': 1000, 'budget': {'recoveries': 2}})
     assert machine.run() == 'aborted'
     assert [(event.path, event.outcome) for event in machine.of(EventKind.DECISION)] == [
-        ('SM_ROOT', 'revisit'), ('SM_ROOT/INNER', 'revisit'), ('SM_ROOT/INNER', 'ask'),
-        ('SM_ROOT', 'ask')]
+        ('SM_ROOT', 'revisit'), ('SM_ROOT/INNER', 'revisit'), ('SM_ROOT/INNER', 'ask')]
     assert sentences(machine)[2] == ("REACH keeps failing (2 of its last 2); the trial's 2 "
-                                     'recoveries are spent: asking the oracle above')
+                                     'recoveries are spent: asking an expert, 300 s')
 
 
 def test_a_fallback_to_a_state_costs_a_recovery():
@@ -166,12 +165,14 @@ def test_a_question_put_again_counts_once():
     assert len(expert.questions) == 2
 
 
-def test_a_failure_handed_to_the_oracle_above_is_no_question():
-    inner = chain(REACH=Scripted('aborted'))
-    expert = FakeExpert(goto('INNER'))
-    machine = Watched(chain(INNER=inner), expert=expert,
-                      settings={'max_recoveries': 0, 'budget': {'questions': 1}})
-    assert machine.run() == 'done' and len(expert.questions) == 1
+def test_a_failure_on_which_the_level_above_decides_is_no_question():
+    inner = chain(REACH=Scripted('aborted', 'aborted'))
+    expert = FakeExpert()
+    machine = Watched(chain(INNER=inner), expert=expert, settings={
+        'escalate': True, 'memory': 1000, 'budget': {'questions': 0, 'recoveries': 2},
+        'states': {'REACH': {'prior': 0.5}}})
+    assert machine.run() == 'done' and not expert.questions
+    assert machine.decisions() == [('revisit', 'REACH'), ('ask', ''), ('revisit', 'INNER')]
 
 
 # -- minutes

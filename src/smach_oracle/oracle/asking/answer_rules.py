@@ -1,11 +1,16 @@
 """Which answers fit a question: one rule for executive, servers and interfaces. Pure."""
-from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence
+from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence, Tuple
 
 from ..errors import AnswerError
 from .question import Answer, AnswerKind, names
 
+Target = Tuple[str, str]  # path of a container, '' for that of the failed state; label in it
+
 
 class _NamedState(Protocol):
+    @property
+    def container(self) -> str: ...
+
     @property
     def state(self) -> str: ...
 
@@ -14,6 +19,14 @@ class _NamedState(Protocol):
 
 
 class _NamedOutcome(Protocol):
+    @property
+    def outcome(self) -> str: ...
+
+
+class _LevelOutcome(Protocol):
+    @property
+    def container(self) -> str: ...
+
     @property
     def outcome(self) -> str: ...
 
@@ -42,6 +55,9 @@ class AskedQuestion(Protocol):
     def give_up_outcomes(self) -> Sequence[str]: ...
 
     @property
+    def give_up_above(self) -> Sequence[_LevelOutcome]: ...
+
+    @property
     def interfaces(self) -> Sequence[_NamedInterface]: ...
 
     @property
@@ -53,20 +69,23 @@ class AnswerChoices(NamedTuple):
 
     container: str  # path
     failed_state: str
-    states: Mapping[str, str]  # label: why it cannot be entered now, '' where it can
+    states: Mapping[Target, str]  # why it cannot be entered now, '' where it can
     supersede_outcomes: Sequence[str]
     give_up_outcomes: Sequence[str]
     interfaces: Sequence[str]
     output_keys: Sequence[str]  # of the failed state
+    give_up_above: Sequence[Tuple[str, str]] = ()  # path of a level above, and an outcome of it
 
 
 def choices_of(question: AskedQuestion) -> AnswerChoices:
     """Return what an answer to a question may choose from."""
     return AnswerChoices(question.container_path, question.failed_state,
-                         {choice.state: choice.blocked for choice in question.choices},
+                         {(choice.container, choice.state): choice.blocked
+                          for choice in question.choices},
                          [choice.outcome for choice in question.supersede_outcomes],
                          question.give_up_outcomes, [offer.name for offer in question.interfaces],
-                         question.output_keys)
+                         question.output_keys,
+                         [(each.container, each.outcome) for each in question.give_up_above])
 
 
 def checked_type(given: object) -> Answer:
@@ -81,7 +100,7 @@ def checked_type(given: object) -> Answer:
     for name in ('state', 'outcome', 'interface'):
         if not _is_hashable(getattr(given, name)):
             raise AnswerError('{} is {}, not a name'.format(name, _type_of(getattr(given, name))))
-    for name in ('by', 'why'):
+    for name in ('by', 'why', 'container'):
         if not isinstance(getattr(given, name), str):
             raise AnswerError('{} is {}, not text'.format(name, _type_of(getattr(given, name))))
     if given.outputs is not None and not isinstance(given.outputs, Mapping):
@@ -101,8 +120,22 @@ def _is_hashable(value: object) -> bool:
     return True
 
 
+def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
+    """Return an answer with the container of what it names.
+
+    A state that the container of the failed state has not, and one other has, is that one's.
+    """
+    if answer.container == choices.container:
+        return answer._replace(container='')
+    is_told = answer.container or ('', answer.state) in choices.states
+    if is_told or answer.kind is not AnswerKind.GOTO:
+        return answer
+    others = [path for path, label in choices.states if label == answer.state]
+    return answer._replace(container=others[0]) if len(others) == 1 else answer
+
+
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
-    """Check an answer and the keys of its outputs.
+    """Check an answer that is `addressed`, and the keys of its outputs.
 
     :raises AnswerError: where it does not fit; the text says what would.
     """
@@ -136,13 +169,16 @@ def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:
 
 
 def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
-    free = [state for state, blocked in choices.states.items() if not blocked]
-    if answer.state not in choices.states:
+    container = answer.container
+    target = (container, answer.state)
+    free = [label for (path, label), blocked in choices.states.items()
+            if path == container and not blocked]
+    if target not in choices.states:
         raise AnswerError('{} has no state {!r} to go to; allowed: {}'.format(
-            choices.container, answer.state, names(free)))
-    if choices.states[answer.state]:
+            container or choices.container, answer.state, names(free)))
+    if choices.states[target]:
         raise AnswerError('{} cannot be entered now: {}; allowed: {}'.format(
-            answer.state, choices.states[answer.state], names(free)))
+            answer.state, choices.states[target], names(free)))
 
 
 def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
@@ -150,7 +186,13 @@ def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
 
 
 def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:
-    if answer.outcome and answer.outcome not in choices.give_up_outcomes:
+    container = answer.container
+    if container:
+        allowed = [outcome for path, outcome in choices.give_up_above if path == container]
+        if answer.outcome not in allowed:
+            raise AnswerError('{} has no outcome {!r} to give up with; allowed: {}'.format(
+                container, answer.outcome, names(allowed)))
+    elif answer.outcome and answer.outcome not in choices.give_up_outcomes:
         raise AnswerError(
             '{} has no outcome {!r} to give up with; allowed: {}, or none at all'.format(
                 choices.container, answer.outcome, names(choices.give_up_outcomes)))

@@ -6,7 +6,7 @@ from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
-from .answer_rules import check_answer, checked_type, choices_of
+from .answer_rules import Target, addressed, check_answer, checked_type, choices_of
 from .question import Answer, AnswerKind, Expert, Progress, Question
 
 _WATCH_PERIOD_S = 0.05  # how soon a shutdown is noticed while a question is open
@@ -32,8 +32,8 @@ class Asker(Protocol):
     def say_that_it_waits(self, question: Question) -> None:
         """Log that the machine waits for an answer."""
 
-    def states_now(self) -> Mapping[str, str]:
-        """Return the states by label, and why each cannot be entered now, '' where it can."""
+    def states_now(self) -> Mapping[Target, str]:
+        """Return where the machine could go, and why it cannot go there now, '' where it can."""
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers."""
@@ -136,7 +136,7 @@ class Inquiry:
                 lambda progress: self._expert.ask(question, self._cancelled, progress))
             if given is None:
                 raise _NoAnswer('no answer by the deadline')
-            answer = checked_type(given)
+            answer = addressed(checked_type(given), choices_of(question))
             self._check(answer, question)
             self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(),
                        target=answer.named(), by=answer.by, text=answer.why)

@@ -31,6 +31,7 @@ class StateChoice(NamedTuple):
     # states done in this trial that would come again behind it, though they are not repeated by
     # themselves; its own label: going there repeats it
     repeats: Tuple[str, ...] = ()
+    container: str = ''  # path of its container; '': that of the failed state
 
 
 class OutcomeChoice(NamedTuple):
@@ -38,6 +39,13 @@ class OutcomeChoice(NamedTuple):
 
     outcome: str
     target: str
+
+
+class LevelOutcome(NamedTuple):
+    """An outcome with which a container above that of the failed state may be given up."""
+
+    container: str  # path
+    outcome: str
 
 
 class PreconditionStatus(NamedTuple):
@@ -92,6 +100,7 @@ class Question(NamedTuple):
     fallback: str  # what happens at the deadline, in words
     # how those of the choices stand, as long as it is open; None: nobody can tell
     preconditions: Optional[PreconditionProbe] = None
+    give_up_above: Tuple[LevelOutcome, ...] = ()  # innermost level first
 
     @property
     def query_id(self) -> str:
@@ -111,11 +120,18 @@ class Answer(NamedTuple):
     outputs: Optional[Mapping[str, Any]] = None  # by the failed state's own key names
     by: str = ''
     why: str = ''
+    # GOTO, GIVE_UP: path of the container of `state`, or of the one that ends with `outcome`; '':
+    # that of the failed state
+    container: str = ''
 
     def named(self) -> str:
-        """Return what it names: a state, an interface or an outcome."""
-        return {AnswerKind.GOTO: self.state,
+        """Return what it names: a state, an interface or an outcome.
+
+        What is in another container than the failed state has its path in front.
+        """
+        name = {AnswerKind.GOTO: self.state,
                 AnswerKind.INTERFACE: self.interface}.get(self.kind, self.outcome)
+        return '{}/{}'.format(self.container, name) if self.container else name
 
 
 # Told while a question is open: ('claimed', by, text), ('released', by, text), ('interface_start',

@@ -1,5 +1,5 @@
 """One visit of the meta state: entered by a failure, left by a verdict (paper, section IV-A)."""
-from typing import Optional, Sequence, cast
+from typing import Any, Mapping, Optional, Sequence, cast
 
 import smach
 
@@ -9,15 +9,17 @@ from ..machine.learned_rates import save_rates
 from ..machine.repeats import leave_for, note_superseded
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..machine.userdata_view import missing_keys
+from ..places.way import Way, missing_on
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
-from ..recovery.failure import Failure, route_of
+from ..recovery.failure import ContainerEnding, Failure, natural_ending, route_of
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
 from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
+from .departure import depart, leaving_outcome
 from .oracle_state import OracleState
 from .transitions import go_to, message_of, terminate
 
@@ -102,13 +104,28 @@ class OracleVisit:
         lock.release()
         try:
             meta.execute(self._machine.userdata)
+            verdict = meta.take_verdict()
+            if verdict.arrives_at is None or depart(self._node, self._record.label, verdict):
+                return verdict
+            return self._void()
         finally:
             lock.acquire()
-        return meta.take_verdict()
+
+    def _void(self) -> Verdict:
+        """Return the verdict where another one, of a branch beside, leaves the container."""
+        return Verdict(VerdictKind.PREEMPTED, ending=ContainerEnding(outcome=self._leaving()))
+
+    def _leaving(self) -> str:
+        """Return the outcome with which the container ends that is left."""
+        natural = natural_ending(self._failure, self._machine.get_registered_outcomes(),
+                                 self._node.in_force.failing)
+        return leaving_outcome(self._machine, self._node.in_force.failing, natural.outcome)
 
     def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
-        if verdict.kind is VerdictKind.JUMP:
-            self._jump(verdict)
+        if verdict.arrives_at not in (None, self._node):
+            return self._depart(meta)
+        if verdict.way is not None:
+            self._jump(verdict.way, verdict)
             return None
         if verdict.kind is VerdictKind.SUPERSEDE:
             return self._supersede(verdict)
@@ -116,21 +133,33 @@ class OracleVisit:
             return self._preempted(meta, verdict)
         return self._give_up(verdict)
 
-    def _jump(self, verdict: Verdict) -> None:
-        node, target = self._node, verdict.state
+    def _depart(self, meta: OracleState) -> str:
+        """End the container, which is left for a level above."""
+        meta.service_preempt()
+        self._machine.service_preempt()
+        return self._terminate(self._leaving())
+
+    def _jump(self, way: Way, verdict: Verdict) -> None:
+        node, target = self._node, way.first
         snapshot = node.record(target).snapshot
-        missing = missing_keys(self._machine, target,
-                               keys_after_jump(node, target, verdict.written))
+        missing = missing_on(way, verdict.written)
         restores = snapshot if node.settings.userdata == 'restore' else None
         if restores is not None:
             restore(self._machine.userdata._data, restores, verdict.written,
                     node.in_force.deep_copy_keys)
-        leave_for(node, target)
+        leave_for(node, target, way.down[1:])
         if missing:
-            node.warn('jumping there without its input keys {}'.format(', '.join(missing)), target)
+            place = way.down[-1]
+            place.node.warn('jumping there without its input keys {}'.format(', '.join(missing)),
+                            place.label)
         self._note_entry(target)
+        node.record(target).go_down(way.down[1:])
         self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,
-                    verdict.text)
+                    verdict.text, self._across(way))
+
+    def _across(self, way: Way) -> Mapping[str, str]:
+        """Return what is told of a jump that crosses containers."""
+        return {'to': way.down[-1].path} if len(way.down) > 1 else {}
 
     def _supersede(self, verdict: Verdict) -> Optional[str]:
         route = route_of(self._machine, self._record.label, verdict.outcome)
@@ -150,7 +179,10 @@ class OracleVisit:
     def _give_up(self, verdict: Verdict) -> Optional[str]:
         ending, text = verdict.ending, verdict.text
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
-        self._node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
+        node = self._node
+        node.gave_up = ending.error is not None or (
+            ending.outcome is not None and ending.outcome in node.in_force.failing)
+        node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
                         target=ending.state or '', by=verdict.by, text=told)
         if ending.error is not None:
             smach.logerr(str(ending.error))
@@ -174,18 +206,18 @@ class OracleVisit:
         return self._terminate(str(ending.outcome))
 
     def _go_on(self, target: str, userdata: str = 'keep', missing: Optional[Sequence[str]] = None,
-               by: str = '', text: str = '') -> None:
+               by: str = '', text: str = '', across: Optional[Mapping[str, str]] = None) -> None:
         """Leave the meta state for a state."""
         node = self._node
         if missing is None:
             missing = missing_keys(self._machine, target, self._machine.userdata._data)
-        self._note_jump(target, userdata, missing, by, text)
+        self._note_jump(target, {'missing_keys': list(missing), 'userdata': userdata,
+                                 **(across or {})}, by, text)
         go_to(node, message_of(node.settings.oracle_label, target, target), target)
 
-    def _note_jump(self, target: str, userdata: str, missing: Sequence[str], by: str,
-                   text: str) -> None:
+    def _note_jump(self, target: str, data: Mapping[str, Any], by: str, text: str) -> None:
         self._node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
-                        data={'missing_keys': list(missing), 'userdata': userdata})
+                        data=data)
         self._node.records.count_oracle_edge(target)
 
     def _terminate(self, outcome: str) -> str:

@@ -26,6 +26,8 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
+from .arriving_visit import ArrivingVisit
+from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
@@ -99,8 +101,8 @@ class Step:
         when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
-        entered_by_oracle = record.entered_by_oracle
-        if entered_by_oracle:
+        entered_by_oracle, way_down = record.entered_by_oracle, record.way_down
+        if entered_by_oracle or way_down:
             record.forget_entry()
         if node.in_force.deep_copy_keys:
             record.snapshot = node.snapshot()
@@ -114,6 +116,8 @@ class Step:
             return Overrun(blocked)
         begun_s = time.monotonic()
         outcome: object = None
+        for place in way_down:
+            place.node.entry = place.label
         try:
             if record.settings.time_limit_s is not None and node.tree.recover:
                 outcome = self._execute_limited(state, record.settings.time_limit_s)
@@ -123,6 +127,8 @@ class Step:
                 outcome = state.execute(userdata)
             return outcome
         finally:
+            for place in way_down:
+                place.node.entry = ''
             took_s = time.monotonic() - begun_s
             if took_s > (record.longest_s or 0.0) and not (
                     isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
@@ -156,6 +162,10 @@ class Step:
         if node.is_left_behind():
             stop_left_behind(node)
             return None
+        if node.departure is not None:
+            departure = take_departure(node)
+            if departure is not None:
+                return self._left(departure, outcome, error)
         if isinstance(outcome, TakenOut):
             if not (self._machine.preempt_requested() or smach.is_shutdown()):
                 return self._taken_out(outcome)
@@ -178,6 +188,23 @@ class Step:
             if why is not None:
                 return self._failed_unwell(judged, why)
         return self._failed(judged)
+
+    def _left(self, departure: Departure, outcome: Any,
+              error: Optional[Exception]) -> Optional[str]:
+        """Go as a verdict of a container below says, which has left the present state."""
+        node, record = self._node, self._record
+        told = outcome if isinstance(outcome, str) else ''
+        if error is not None:
+            smach.logwarn('{}/{}: raised {!r} when it was left'.format(
+                node.path, record.label, error))
+        node.records.visit_ended(record, told, departure.result_of(node))
+        if departure.arrives_at is not node:
+            wanted = leaving_outcome(self._machine, node.in_force.failing, None)
+            return self._advance(told, Route(wanted, False), counted=False)
+        recall_preempts(self._machine._states[record.label])
+        failure = Failure(record.label, FailureKind.TIME_LIMIT, told,
+                          'was left, as {} failed'.format(departure.failed), None)
+        return ArrivingVisit(node, record, failure, departure).arrive(told, self._context())
 
     def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
         """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""
@@ -220,9 +247,17 @@ class Step:
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
             return self._end_unrecovered(self._natural_ending(failure), failure)
+        if is_settled(node, record.label):
+            return self._end_settled(failure)
         visit = (OftenUnwellVisit(node, record, failure, why_unwell) if why_unwell
                  else OracleVisit(node, record, failure))
         return visit.run(context, continuous)
+
+    def _end_settled(self, failure: Failure) -> Optional[str]:
+        """End the container by a failure that has had its account further below."""
+        ending = self._natural_ending(failure)
+        self._node.gave_up = ending.state is None
+        return self._end_unrecovered(ending, failure)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:
         """Go as an expert has answered while the state still ran; what it ended with is nothing."""

@@ -88,7 +88,7 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
 def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     machine = node.machine
     node.begin_execution()
-    node.emit(EventKind.CONTAINER_START, state=machine._initial_state_label or '')
+    node.emit(EventKind.CONTAINER_START, state=node.entry or machine._initial_state_label or '')
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
     try:

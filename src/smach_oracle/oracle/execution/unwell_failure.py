@@ -4,7 +4,7 @@ Such a visit is no visit: it is in no history, no rate and no count, and the obs
 no failure, transition or jump. They are told that the machine waits.
 """
 import time
-from typing import Optional, Sequence
+from typing import Any, Mapping, Optional
 
 import smach
 
@@ -64,10 +64,9 @@ class UnwellVisit(OracleVisit):
     def _note_superseded(self, outcome: str) -> None:
         self._count_superseded(outcome)
 
-    def _note_jump(self, target: str, userdata: str, missing: Sequence[str], by: str,
-                   text: str) -> None:
+    def _note_jump(self, target: str, data: Mapping[str, Any], by: str, text: str) -> None:
         if target != self._record.label or by:  # else it runs again, and that is told
-            super()._note_jump(target, userdata, missing, by, text)
+            super()._note_jump(target, data, by, text)
 
 
 class OftenUnwellVisit(OracleVisit):

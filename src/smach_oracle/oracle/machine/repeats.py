@@ -3,7 +3,7 @@
 A repeat is a state that was executed in this trial and that the oracle leads the machine to again,
 at once or by the author's transitions from where it has jumped to. The author's own loops are none.
 """
-from typing import Iterator, NamedTuple, Set, Tuple
+from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 
 from ..records.state_record import StateRecord
 from ..records.visit_marks import VisitMark
@@ -79,16 +79,18 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
     return reached
 
 
-def leave_for(node: TreeNode, target: str) -> None:
+def leave_for(node: TreeNode, target: str, below: Iterable[Tuple[TreeNode, str]] = ()) -> None:
     """Note that the oracle goes to a state: what may come again now is spent.
 
-    Only an expert goes to a state that would be repeated itself, and has confirmed it so.
+    Only an expert goes to a state that would be repeated itself, and has confirmed it so, and what
+    is entered in the containers `below`.
     """
     if not node.tree.numbers_visits:
         return
     for done in _done_since(node, target):
         done.mark.spent = True
-    node.records.marks.of(target).spent = False
+    for each, label in ((node, target), *below):
+        each.records.marks.of(label).spent = False
 
 
 def note_superseded(node: TreeNode, label: str) -> None:

@@ -53,6 +53,7 @@ class Tree:
         self.clock = AlarmClock()
         self.trial_id = ''
         self.rates_lock = threading.Lock()
+        self.departures_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
@@ -84,7 +85,7 @@ class Tree:
         That is the expert, its connection, and locks.
         """
         state = dict(self.__dict__)
-        del state['_lock'], state['rates_lock']
+        del state['_lock'], state['rates_lock'], state['departures_lock']
         state['expert'] = None
         state['describe_failure'] = no_description
         return state
@@ -93,3 +94,4 @@ class Tree:
         self.__dict__.update(state)
         self._lock = threading.Lock()
         self.rates_lock = threading.Lock()
+        self.departures_lock = threading.Lock()

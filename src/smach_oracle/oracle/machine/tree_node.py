@@ -62,6 +62,10 @@ class TreeNode:
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
+        # where a verdict from below or here ends the present state (execution.departure)
+        self.departure: object = None
+        self.entry = ''  # the state in which the next execution begins; '': its initial one
+        self.gave_up = False  # the latest execution ended so, in a failure
         self.join(tree)
 
     def take_name(self, name: str) -> None:
@@ -206,7 +210,8 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.preempt_told = False
+        self.preempt_told = self.gave_up = False
+        self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()
 

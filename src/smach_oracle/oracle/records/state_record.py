@@ -68,8 +68,8 @@ class StateRecord:
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
                  'unwell_repeats',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
-                 '_is_special', '_estimator', '_lock', '_learned', '_retired', '_edges', '_visits',
-                 '_visits_before')
+                 'way_down', '_is_special', '_estimator', '_lock', '_learned', '_retired',
+                 '_edges', '_visits', '_visits_before')
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
@@ -85,6 +85,8 @@ class StateRecord:
         # observes is not
         self.longest_s: Optional[float] = None
         self.entered_by_oracle = False  # at the coming visit
+        # at the coming visit: the state in which each container below it begins
+        self.way_down: Tuple[Any, ...] = ()
         self._learned = 0  # successes by way of edges that the estimator knows
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
@@ -106,20 +108,26 @@ class StateRecord:
             learned = self._up_to_date().snapshot()
             self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
             self._estimator.restore(learned)
-        self._retire_edges()
+        self.retire_edges()
 
     def be_special(self, special: bool) -> None:
         """Have more done than to execute the state, which a time limit wants in any case."""
         self._is_special = special or self.settings.time_limit_s is not None
-        self.special = self._is_special or self.entered_by_oracle
+        self.special = self._is_special or self.entered_by_oracle or bool(self.way_down)
 
     def enter_by_oracle(self) -> None:
         """Note that the oracle leads to the state, which is visited next."""
         self.entered_by_oracle = self.special = True
 
+    def go_down(self, way_down: Tuple[Any, ...]) -> None:
+        """Note in which state each container below begins at the visit that is next."""
+        self.way_down = way_down
+        self.special = self.special or bool(way_down)
+
     def forget_entry(self) -> None:
         """Note that the visit to which the oracle led begins now, or never."""
         self.entered_by_oracle = False
+        self.way_down = ()
         self.special = self._is_special
 
     def _up_to_date(self) -> Estimator:
@@ -214,7 +222,7 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=_NO_VIEW)
+        state.update(snapshot=None, view=_NO_VIEW, way_down=())
         del state['_lock']
         return state
 
@@ -223,7 +231,8 @@ class StateRecord:
             setattr(self, name, value)
         self._lock = threading.RLock()
 
-    def _retire_edges(self) -> None:
+    def retire_edges(self) -> None:
+        """Forget all edges: the next visit takes no short way. Their counts stay."""
         for outcome in list(self.fast):
             self.retire_edge(outcome)
 

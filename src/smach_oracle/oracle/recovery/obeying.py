@@ -1,9 +1,14 @@
 """From an expert's answer to the verdict that obeys it."""
-from typing import Callable
+from typing import Callable, Optional
+
+import smach
 
 from ..asking.question import Answer, AnswerKind
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
+from ..places.levels import levels_above
+from ..places.place import place_at
+from ..places.way import Way, way_to
 from .failure import ContainerEnding
 from .verdict import Verdict, VerdictKind
 
@@ -18,10 +23,30 @@ def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
     for key, value in (answer.outputs or {}).items():
         watch.gate[remapping.get(key, key)] = value
     if answer.kind is AnswerKind.GOTO:
-        return Verdict(VerdictKind.JUMP, state=answer.state, by=answer.by, text=answer.why,
-                       written=frozenset(watch.written()))
+        way = way_of(answer, node)
+        return Verdict(VerdictKind.JUMP, way=way, by=answer.by, text=answer.why,
+                       written=frozenset() if way.left else frozenset(watch.written()))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by,
                        text=answer.why)
     ending = ContainerEnding(outcome=answer.outcome) if answer.outcome else natural_ending()
-    return Verdict(VerdictKind.GIVE_UP, ending=ending, by=answer.by, text=answer.why)
+    return Verdict(VerdictKind.GIVE_UP, ending=ending, by=answer.by, text=answer.why,
+                   level=_level_of(answer, node))
+
+
+def way_of(answer: Answer, node: TreeNode) -> Way:
+    """Return the way that an answer sends the machine.
+
+    :raises InvalidStateError: where there is none; an answer that was checked has one.
+    """
+    place = place_at(node, answer.container, answer.state)
+    way = way_to(node, place) if place is not None else None
+    if way is None:
+        raise smach.InvalidStateError('there is no way to {}/{}'.format(
+            answer.container or node.path, answer.state))
+    return way
+
+
+def _level_of(answer: Answer, node: TreeNode) -> Optional[TreeNode]:
+    """Return the level above that an answer gives up; None where it is the container itself."""
+    return next((level for level in levels_above(node) if level.path == answer.container), None)

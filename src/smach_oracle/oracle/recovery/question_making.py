@@ -1,13 +1,15 @@
 """Everything an expert is told about a failure (paper, section V)."""
-from typing import Any, Collection, Dict, Iterator, NamedTuple, Tuple
+from typing import Any, Collection, Dict, Iterator, Mapping, NamedTuple, Tuple
 
 import smach
 
-from ..asking.question import OutcomeChoice, Question, StateChoice
+from ..asking.answer_rules import Target
+from ..asking.question import LevelOutcome, OutcomeChoice, Question, StateChoice
 from ..machine.protocols import Machine
-from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..places.levels import levels_above
+from ..places.place import places_of
+from ..places.way import Way, missing_on, repeated_on, way_to, why_closed_on
 from ..records.state_record import StateRecord
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
@@ -41,18 +43,43 @@ def make_question(node: TreeNode, record: StateRecord, failure: Failure, account
         interfaces=node.settings.offers_for(node.relative_path, record.label),
         userdata=dict(machine.userdata._data),
         input_userdata=_inputs(machine, record.label, state), deadline_s=deadline_s,
-        fallback=account.fallback, preconditions=LivePreconditionProbe(node))
+        fallback=account.fallback, preconditions=LivePreconditionProbe(node),
+        give_up_above=tuple(_give_up_above(node)))
+
+
+def targets_of(node: TreeNode) -> Mapping[Target, str]:
+    """Return where a machine could go, and why it cannot go there now, '' where it can."""
+    return {_target(node, way): why_closed_on(way) for way in _ways(node)}
+
+
+def _ways(node: TreeNode) -> Iterator[Way]:
+    """Yield the ways to all places of the tree, its own first, in the order of the states."""
+    for place in places_of(node):
+        way = way_to(node, place)
+        if way is not None:
+            yield way
+
+
+def _target(node: TreeNode, way: Way) -> Target:
+    place = way.down[-1]
+    return '' if place.node is node else place.node.path, place.label
 
 
 def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateChoice]:
-    """Yield the states the machine could be sent to, in the order in which they were added."""
-    for label in node.labels():
-        record = node.record(label)
+    for way in _ways(node):
+        container, label = _target(node, way)
+        record = way.down[-1].node.record(label)
         yield StateChoice(
             label, 1.0 - record.rate, int(record.failure_class), record.visits,
-            missing_keys(node.machine, label, keys_after_jump(node, label, written)),
+            missing_on(way, () if way.left else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed(node, label), repeated_by_going_to(node, label))
+            why_closed_on(way), repeated_on(way), container)
+
+
+def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
+    for level in levels_above(node):
+        for outcome in sorted(level.machine.get_registered_outcomes(), key=str):
+            yield LevelOutcome(level.path, outcome)
 
 
 def _supersede_outcomes(machine: Machine, label: str,

@@ -1,38 +1,41 @@
 """One failure, from the policy's question to the verdict (paper, Algorithm 1)."""
 import threading
-from typing import Any, List, Mapping, Optional, Tuple
+from typing import Any, Iterable, List, Mapping, Optional
 
 import smach
 
+from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, Expert, Question, names
 from ..decision.failure_rate import FailureClass
-from ..decision.policy import Action, FailureContext, Preconditions, Situation
-from ..decision.sentence import (
-    DecisionFacts,
-    cause_of,
-    decision_sentence,
-    going_would_repeat,
-)
+from ..decision.policy import Action, FailureContext
+from ..decision.sentence import cause_of, decision_sentence
 from ..machine.limited_run import standing_still
-from ..machine.repeats import has_visited, repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
-from ..machine.write_watch import WriteWatch
+from ..places.place import Place, place_named
+from ..places.way import Way, way_to, why_closed_on
 from ..records.events import EventKind
 from ..records.facts import DECIDED_BY, Decider
 from ..records.state_record import StateRecord
 from ..settings.failing_outcomes import PREEMPTED
-from ..settings.preconditions import PreconditionSpec
-from ..settings.settings import ALLOW
+from .deciding import Decided, Deciding
 from .failure import ContainerEnding, Failure, natural_ending
+from .levels import (
+    OuterDecision,
+    OuterLevel,
+    failure_above,
+    foreseen_above,
+    levels_that_may_decide,
+    runs_as_precondition,
+)
 from .obeying import verdict_of
-from .precondition_runner import PreconditionRunner
-from .question_making import Account, make_question
+from .question_making import Account, make_question, targets_of
+from .stop import Stop
 from .verdict import Verdict, VerdictKind
 
 
 class Recovery:
-    """The recovery from one failure.
+    """The recovery from one failure, on all levels of the tree.
 
     `run` is called in the machine's thread, `cancel` from any thread. It asks as an
     `inquiry.Asker`, and it alone makes the verdict.
@@ -44,206 +47,127 @@ class Recovery:
         self._machine = node.machine
         self._record = record
         self._failure = failure
-        self._context = context
         self._continuous = continuous
-        self._cancelled = threading.Event()
+        self._stop = Stop(node, record)
         self._cause = ''  # of the decision
-        self._met: List[str] = []  # names of preconditions
-        self._not_met = ''
         self._budget = node.tree.budget
         self._ends_budget = False  # whether the question's deadline is that of the trial
-        self._watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
-        self._preconditions = PreconditionRunner(node, record.settings, self._watch)
-        self.tried: List[str] = []
+        self._deciding = Deciding(node, record, failure, context, continuous, self._stop)
+        self._outer: Optional[OuterLevel] = None  # that decides now
+        self._watch = self._deciding.watch
+        self.tried: List[str] = self._deciding.tried
         self.question_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
 
     def cancel(self) -> None:
         """End the recovery soon: preempt what runs, take the question back."""
-        self._cancelled.set()
+        self._stop.cancelled.set()
         self.question_cancelled.set()
-        self._preconditions.cancel()
+        self._deciding.cancel()
+        outer = self._outer
+        if outer is not None:
+            outer.cancel()
 
     def stopped(self) -> bool:
         """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
-        return self._cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
+        return self._stop.stopped()
 
     def run(self) -> Verdict:
         """Decide, and ask where the policy says so; neither where the trial's time is over."""
         if self._budget.why_over():
             return self._end_unaided()
-        decider, facts = self._decide()
-        if self.stopped():
-            return self._preempted()
-        if self._budget.why_over():
-            return self._end_unaided()
-        record, self._cause, sentence = self._record, cause_of(facts), decision_sentence(facts)
+        decided = self._deciding.decide()
+        if self._stop.is_over():
+            return self._ended_early()
+        decider, facts = decided
+        record, self._cause = self._record, cause_of(facts)
+        if facts.action is not Action.ASK:
+            self._tell_decision(decided)
+            record.recoveries += 1
+            return self._jump(self._way_to(facts.target), self._watch.written())
+        nobody = self._why_nobody_is_asked()
+        levels = [] if nobody else self._levels_that_may_decide(decider)
+        asked = ('the oracle above' if levels
+                 else 'nobody, since ' + nobody if nobody else self._asked_in_words())
+        self._tell_decision((decider, facts._replace(asked=asked)))
+        outer = self._decided_above(levels)
+        if self._stop.is_over():
+            return self._ended_early()
+        if outer is not None:
+            record.recoveries += 1
+            return self._jump(outer.way, outer.written, outer.text, is_failure_above=True)
+        return self._give_up('{}: {}'.format(self._cause, nobody)) if nobody else self._ask()
+
+    def _tell_decision(self, decided: Decided) -> None:
+        decider, facts = decided
+        record, sentence = self._record, decision_sentence(facts)
         smach.loginfo('{}/{}'.format(self._node.path, sentence))
         self.emit(EventKind.DECISION, outcome=facts.action.value, target=facts.target,
                   failure_class=int(record.failure_class), rate=record.rate,
                   continuous=self._continuous, text=sentence,
                   data={DECIDED_BY: decider.value})
-        if facts.action is Action.ASK:
-            return self._ask()
-        record.recoveries += 1
-        return self._jump(facts.target)
 
-    # -- deciding
-
-    def _decide(self) -> Tuple[Decider, DecisionFacts]:
-        return self._ask_at_once() or self._follow_policy()
-
-    def _ask_at_once(self) -> Optional[Tuple[Decider, DecisionFacts]]:
-        """Return the decision where no policy has a say, and no precondition is run."""
-        record, ask = self._record, Action.ASK
-        if self._failure.is_held_back:
-            return Decider.HELD_BACK, self._facts_of(ask)
-        if record.recoveries >= record.settings.max_recoveries:
-            return Decider.MAX_RECOVERIES, self._facts_of(ask, spent=record.recoveries)
-        spent = self._budget.why_no_recovery()
-        if spent:
-            return Decider.BUDGET, self._facts_of(ask, blocked=spent)
-        if record.settings.on_retry != ALLOW:
-            return Decider.ON_RETRY, self._facts_of(ask, blocked=self._why_repeats(record.label))
-        return None
-
-    def _follow_policy(self) -> Tuple[Decider, DecisionFacts]:
-        record, policy = self._record, self._node.in_force.policy
-        preconditions = self._run_preconditions(record.failure_class)
-        action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
-        target = ''
-        if action is not Action.ASK:
-            target = (record.label if action is Action.REVISIT
-                      else policy.step_back_target(self._context))
-        decider, why_not = self._what_prevents(target) if target else (Decider.POLICY, '')
-        if why_not:
-            action, target = Action.ASK, ''
-        return decider, self._facts_of(action, target=target, blocked=why_not)
-
-    def _what_prevents(self, target: str) -> Tuple[Decider, str]:
-        """Spend a recovery on going to a state; or return what prevents it, and why."""
-        for decider, why_not in ((Decider.ON_RETRY, self._why_repeats),
-                                 (Decider.POLICY, self._why_not)):
-            reason = why_not(target)
-            if reason:
-                return decider, reason
-        spent = self._budget.take_recovery()
-        return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
-
-    def _why_repeats(self, target: str) -> str:
-        """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
-        repeated = repeated_by_going_to(self._node, target)
-        if not repeated:
-            return ''
-        if not has_visited(self._node, target):
-            return 'this trial has not been in {}, and going there may repeat {}'.format(
-                target, ', '.join(repeated))
-        return going_would_repeat(self._record.label, target, repeated)
-
-    def _why_not(self, target: str) -> str:
-        """Return why the machine cannot go on to a state by itself now, '' where it can."""
-        blocked = self._blocked(target)
-        return '{} {}'.format(target, blocked) if blocked else self._function_that_runs()
-
-    def _function_that_runs(self) -> str:
-        """Return which function among the preconditions was left behind and runs, '' for none."""
-        for spec in self._record.settings.preconditions:
-            for name, function in spec.functions():
-                blocked = self._node.tree.workers.blocked(function)
-                if blocked:
-                    return '{} {}'.format(name, blocked)
-        return ''
-
-    def _facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
-        record = self._record
-        return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
-                             met=self._met, not_met=self._not_met,
-                             held_back=self._failure.text if self._failure.is_held_back else '',
-                             asked=self._asked_in_words() if action is Action.ASK else '', **fields)
+    def _ended_early(self) -> Verdict:
+        """End the container, where a preempt, a shutdown or the budget has ended the recovery."""
+        return self._preempted() if self.stopped() else self._end_unaided()
 
     def _asked_in_words(self) -> str:
-        node = self._node
-        if self._escalates():
-            return 'the oracle above'
-        if node.tree.expert is None:
+        if self._node.tree.expert is None:
             return 'nobody, since there is no expert'
         spent = self._budget.why_no_question()
         if spent:
             return 'nobody, since ' + spent
-        limit_s, is_cut = self._budget.within(node.settings.deadline_s)
+        limit_s, is_cut = self._budget.within(self._node.settings.deadline_s)
         if is_cut:
             return "an expert, {:.0f} s, which are the trial's last".format(limit_s)
         return 'an expert, {:g} s'.format(limit_s) if limit_s else 'an expert'
 
-    def _escalates(self) -> bool:
-        """Whether the oracle above is to ask; it cannot confirm that a state is repeated here."""
-        node = self._node
-        return (node.settings.escalate and node.has_running_ancestor()
-                and not self._failure.is_held_back)
+    def _judge_anew(self, failure: Failure) -> None:
+        """Take the failure for another."""
+        self._failure = self._deciding.failure = failure
 
-    def _blocked(self, label: str) -> str:
-        """Return why a state cannot be entered now, '' where it can."""
-        return why_closed(self._node, label)
+    # -- the levels above
 
-    def _run_preconditions(self, failure_class: FailureClass) -> Preconditions:
-        specs = self._record.settings.preconditions
-        if not specs:
-            return Preconditions.NONE
-        if not self._node.in_force.policy.runs_preconditions(failure_class):
-            return Preconditions.NOT_MET
-        for spec in specs:
-            if self.stopped() or not self._run_precondition(spec):
-                return Preconditions.NOT_MET
-        return Preconditions.MET
+    def _why_nobody_is_asked(self) -> str:
+        """Say why the end of the container is left to a level above; '' where it is not."""
+        if runs_as_precondition(self._node):
+            return 'it runs as a precondition'
+        if self._failure.is_held_back:  # no other oracle can confirm that it is repeated
+            return ''
+        foreseen = foreseen_above(self._node, self._natural_ending())
+        return 'its author goes on from there ({})'.format(foreseen) if foreseen else ''
 
-    def _run_precondition(self, spec: PreconditionSpec) -> bool:
-        self.emit(EventKind.PRECONDITION_START, target=spec.name)
-        why_not = self._preconditions.run(spec)
-        for _ in range(self._record.most_repeats):
-            if not why_not or not self._has_waited_after('did not get its precondition '
-                                                         + spec.name):
-                break
-            why_not = self._preconditions.run(spec)
-        outcome = 'not met' if why_not else 'met'
-        self.emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
-        if why_not:
-            self._not_met = spec.name
-        else:
-            self._met.append(spec.name)
-        self.tried.append('precondition {}: {}'.format(
-            spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
-        return not why_not
+    def _levels_that_may_decide(self, decider: Decider) -> List[TreeNode]:
+        """Return them, innermost first; none where the failure is to be asked about at once."""
+        if decider is not Decider.POLICY or self._record.failure_class is FailureClass.HIGH:
+            return []
+        return levels_that_may_decide(self._node)
 
-    # -- health
+    def _decided_above(self, levels: List[TreeNode]) -> Optional[OuterDecision]:
+        """Return what the innermost level decides that does not ask; None where all ask."""
+        below, ending = self._node, self._natural_ending()
+        for level in levels:
+            failure = failure_above(level, below.below[0], ending,
+                                    '{}: {}'.format(below.path, self._cause))
+            if failure is None or self._stop.is_over():
+                return None
+            self._outer = OuterLevel(level, self._node, failure, self._stop)
+            decision = self._outer.decide()
+            self.tried += self._outer.tried
+            self._outer = None
+            if decision is not None:
+                return decision
+            below = level
+            ending = natural_ending(failure, level.machine.get_registered_outcomes(),
+                                    level.in_force.failing)
+        return None
 
-    def _has_waited_after(self, what: str) -> bool:
-        """Wait where the robot was not well at what has happened; whether it is well again."""
-        health = self._node.tree.health
-        if not health.is_set:
-            return False
-        why = health.unwell_after(self.stopped, self._cancelled.wait)
-        return bool(why) and self._wait_until_well(what, why)
-
-    def _wait_until_well(self, what: str, why: str) -> bool:
-        """Wait until the robot is well; False where something has ended the recovery."""
-        with standing_still(self._node.runs_around):
-            is_well = self._node.tree.health.wait_until_well(
-                self._node, self._record.label, what, why, self._is_over, self._cancelled.wait)
-        return is_well and not self._is_over()
-
-    def _is_over(self) -> bool:
-        return self.stopped() or bool(self._budget.why_over())
-
-    def _not_waited(self) -> Verdict:
-        """End the container, where something has ended the wait."""
-        return self._preempted() if self.stopped() else self._end_unaided()
+    def _way_to(self, label: str) -> Way:
+        return Way((), self._node, (Place(self._node, label),))
 
     # -- asking
 
     def _ask(self) -> Verdict:
-        node = self._node
-        if self._escalates():
-            return self._give_up('handed to the oracle above: ' + self._cause)
-        expert = node.tree.expert
+        expert = self._node.tree.expert
         if expert is None:
             return self._fall_back('no expert is there to ask')
         spent = self._budget.take_question()
@@ -256,7 +180,7 @@ class Recovery:
         if self.stopped():
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
-                          text=self._why_stopped())
+                          text=self._stop.why())
             return self._preempted()
         if reply.answer is not None:
             return self._obey(reply.answer)
@@ -264,11 +188,6 @@ class Recovery:
         self.emit(EventKind.QUERY_EXPIRED, query_id=reply.question_id,
                   text='{}; fallback: {}'.format(why, self._fallback_in_words()))
         return self._fall_back(why)
-
-    def _why_stopped(self) -> str:
-        if self._cancelled.is_set():
-            return 'preempted'
-        return 'left behind' if self._node.is_left_behind() else 'shutdown'
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
@@ -285,9 +204,9 @@ class Recovery:
         smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
             self._node.path, self._record.label, question.question_id, limit))
 
-    def states_now(self) -> Mapping[str, str]:
-        """Return the states by label, and why each cannot be entered now, '' where it can."""
-        return {label: self._blocked(label) for label in self._node.labels()}
+    def states_now(self) -> Mapping[Target, str]:
+        """Return where the machine could go, and why it cannot go there now, '' where it can."""
+        return targets_of(self._node)
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers of a step that is about the failed state."""
@@ -303,19 +222,22 @@ class Recovery:
         return self._when_well(verdict_of(answer, self._node, self._record.label, self._watch,
                                           self._natural_ending))
 
-    def _jump(self, target: str, text: str = '') -> Verdict:
-        """Go to a state, once the robot is well."""
-        return self._when_well(Verdict(VerdictKind.JUMP, state=target, text=text,
-                                       written=frozenset(self._watch.written())))
+    def _jump(self, way: Way, written: Iterable[str], text: str = '',
+              is_failure_above: bool = False) -> Verdict:
+        """Go to a place, once the robot is well."""
+        return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
+                                       written=frozenset(written),
+                                       is_failure_above=is_failure_above))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""
         health = self._node.tree.health
-        if verdict.kind is not VerdictKind.JUMP or not health.is_set:
+        if verdict.way is None or not health.is_set:
             return verdict
         why = health.why_unwell(self.stopped)
-        if why and not self._wait_until_well('is left for ' + verdict.state, why):
-            return self._not_waited()
+        if why and not self._stop.wait_until_well(
+                'is left for ' + verdict.way.down[-1].label, why):
+            return self._ended_early()
         return verdict
 
     def _give_up(self, text: str, outcome: str = '') -> Verdict:
@@ -325,7 +247,7 @@ class Recovery:
 
     def _end_unaided(self) -> Verdict:
         """End the container as without an oracle, since the trial's time is over."""
-        cause = cause_of(self._facts_of(Action.ASK, blocked=self._budget.why_over()))
+        cause = cause_of(self._deciding.facts_of(Action.ASK, blocked=self._budget.why_over()))
         text = '{}: the machine ends as without an oracle'.format(cause)
         smach.logwarn('{}/{}'.format(self._node.path, text))
         return self._give_up(text)
@@ -350,10 +272,12 @@ class Recovery:
         """Do what is configured for a question that nobody answers."""
         verb, target = self._node.settings.on_no_answer
         if verb == 'goto':
-            problem = self._why_not_fall_back_to(target) or self._budget.take_recovery()
-            if not problem:
+            way = self._way_back()
+            problem = self._why_not_fall_back(way) or self._budget.take_recovery()
+            if way is not None and not problem:
                 self._record.fallbacks += 1
-                return self._jump(target, text=why)
+                written = () if way.left else self._watch.written()
+                return self._jump(way, written, why)
             self.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
         elif verb == 'give_up':
             if target in self._machine.get_registered_outcomes():
@@ -361,8 +285,13 @@ class Recovery:
             self.warn('on_no_answer: {!r} is no outcome of this container; stopping'.format(target))
         return self._give_up(why)
 
-    def _why_not_fall_back_to(self, label: str) -> str:
-        """Return why `on_no_answer` cannot lead to a state, '' where it can.
+    def _way_back(self) -> Optional[Way]:
+        """Return the way to the place that `on_no_answer` names, None where there is none."""
+        place = place_named(self._node, self._node.settings.on_no_answer[1])
+        return way_to(self._node, place) if place is not None else None
+
+    def _why_not_fall_back(self, way: Optional[Way]) -> str:
+        """Return why `on_no_answer` cannot lead to a place, '' where it can.
 
         It has a cap, or a trial without experts might not end.
         """
@@ -370,17 +299,16 @@ class Recovery:
         if record.fallbacks >= max(1, record.settings.max_recoveries):
             return 'this trial has gone there {} times for {} already'.format(
                 record.fallbacks, record.label)
-        states = self.states_now()
-        if label not in states:
-            return 'no such state; there are ' + names(states)
+        if way is None:
+            return 'no such state; there are ' + names(self._node.labels())
         over = 'the trial is over then' if self._ends_budget else self._budget.why_over()
-        return (states[label] or self._why_repeats(label) or over
+        return (why_closed_on(way) or self._deciding.why_repeats_on(way) or over
                 or self._budget.why_no_recovery())
 
     def _fallback_in_words(self) -> str:
         """Return what `_fall_back` will do."""
         verb, target = self._node.settings.on_no_answer
-        if verb == 'goto' and not self._why_not_fall_back_to(target):
+        if verb == 'goto' and not self._why_not_fall_back(self._way_back()):
             return 'go to {}'.format(target)
         if verb == 'give_up' and target in self._machine.get_registered_outcomes():
             return 'end with {}'.format(target)

@@ -9,16 +9,16 @@ from typing import Any, List, Mapping, NamedTuple, Optional
 
 import smach
 
+from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry, Reply
 from ..asking.question import Answer, AnswerKind, Expert, Question
 from ..decision.sentence import ran_in_words, still_running_sentence
 from ..machine.limited_run import WatchedRun, inside, standing_still
-from ..machine.repeats import why_closed
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from .failure import Failure
-from .question_making import Account, make_question
+from .question_making import Account, make_question, targets_of
 
 
 class TakenOut(NamedTuple):
@@ -146,7 +146,8 @@ class WatchedVisit:
                 self._node.tree.clock.ring_in(self._ran_s(), self._ring)
 
     def _is_wait_on(self, answer: Answer) -> bool:
-        return answer.kind is AnswerKind.GOTO and answer.state == self._record.label
+        return (answer.kind is AnswerKind.GOTO and answer.state == self._record.label
+                and answer.container in ('', self._node.path))
 
     def _take_out(self, answer: Answer) -> None:
         """Preempt the state; once it has ended, the machine goes as answered."""
@@ -188,7 +189,8 @@ class WatchedVisit:
         # no interface can do the work of a state that runs, and no function of a user's is called
         # beside it
         choices = tuple(choice._replace(blocked='', repeats=())
-                        if choice.state == self._record.label else choice
+                        if (choice.container, choice.state) == ('', self._record.label)
+                        else choice
                         for choice in question.choices)  # its own name means to wait on
         return question._replace(choices=choices, interfaces=(), preconditions=None)
 
@@ -203,10 +205,9 @@ class WatchedVisit:
         smach.logwarn('{}: {} The expert is asked (question {})'.format(
             self._place(), self._sentence(), question.question_id))
 
-    def states_now(self) -> Mapping[str, str]:
-        """Return the states by label, and why each cannot be entered now, '' where it can."""
-        node, own = self._node, self._record.label
-        return {label: '' if label == own else why_closed(node, label) for label in node.labels()}
+    def states_now(self) -> Mapping[Target, str]:
+        """Return where the machine could go, and why it cannot go there now, '' where it can."""
+        return {**targets_of(self._node), ('', self._record.label): ''}
 
     def _close(self, why: str) -> None:
         """Tell that the question, if one is open, was taken back."""

@@ -2,6 +2,7 @@
 from ..asking.question import Answer, AnswerKind
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
+from ..places.way import why_closed_on
 from ..records.events import FailureKind
 from ..records.state_record import StateRecord
 from .failure import Failure
@@ -25,8 +26,8 @@ class TakenOutRecovery(Recovery):
             return self._preempted()
         verdict = self._obey(answer)
         closed = ''
-        if answer.kind is AnswerKind.GOTO and verdict.state == answer.state:
-            closed = self._blocked(answer.state)
+        if answer.kind is AnswerKind.GOTO and verdict.way is not None:
+            closed = why_closed_on(verdict.way)
         return self._refuse(closed) if closed else verdict
 
     def _refuse(self, closed: str) -> Verdict:
@@ -34,6 +35,6 @@ class TakenOutRecovery(Recovery):
             self._answer.state, self._answer.state, closed)
         self.warn(self._cause)
         # it does not run any more
-        self._failure = self._failure._replace(kind=FailureKind.TIME_LIMIT,
-                                               text='was taken out while it still ran')
+        self._judge_anew(self._failure._replace(kind=FailureKind.TIME_LIMIT,
+                                               text='was taken out while it still ran'))
         return self._end_unaided() if self._budget.why_over() else self._ask()

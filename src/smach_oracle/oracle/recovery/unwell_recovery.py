@@ -23,8 +23,8 @@ class UnwellRecovery(Recovery):
         """Wait, and enter the failed state again."""
         if not self._why_unwell:
             return self._preempted()
-        if self._is_over() or not self._wait_until_well(FAILED, self._why_unwell):
-            return self._not_waited()
+        if self._stop.is_over() or not self._stop.wait_until_well(FAILED, self._why_unwell):
+            return self._ended_early()
         return self._enter_again()
 
     def _enter_again(self) -> Verdict:
@@ -32,10 +32,10 @@ class UnwellRecovery(Recovery):
         label = self._record.label
         if not repeated_by_going_to(self._node, label):
             self._record.unwell_repeats += 1
-            return self._jump(label)
-        self._failure = self._failure._replace(
+            return self._jump(self._way_to(label), self._watch.written())
+        self._judge_anew(self._failure._replace(
             kind=FailureKind.HELD_BACK,
-            text='failed while the robot was not well, and is not repeated by itself')
+            text='failed while the robot was not well, and is not repeated by itself'))
         return super().run()
 
 
@@ -53,6 +53,6 @@ class OftenUnwellRecovery(Recovery):
 
     def run(self) -> Verdict:
         """Wait, and recover from a failure that was counted."""
-        if self._is_over() or not self._wait_until_well('failed again', self._why_unwell):
-            return self._not_waited()
+        if self._stop.is_over() or not self._stop.wait_until_well('failed again', self._why_unwell):
+            return self._ended_early()
         return super().run()

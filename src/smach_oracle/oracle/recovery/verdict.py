@@ -1,7 +1,9 @@
 """What the meta state hands back to the machine."""
 from enum import Enum
-from typing import FrozenSet, NamedTuple
+from typing import FrozenSet, NamedTuple, Optional
 
+from ..machine.tree_node import TreeNode
+from ..places.way import Way
 from .failure import ContainerEnding
 
 
@@ -18,13 +20,30 @@ class Verdict(NamedTuple):
     """One way out of the meta state."""
 
     kind: VerdictKind
-    state: str = ''  # JUMP
+    way: Optional[Way] = None  # JUMP
     outcome: str = ''  # SUPERSEDE
     ending: ContainerEnding = ContainerEnding()
     by: str = ''  # the expert's name
     text: str = ''
-    written: FrozenSet[str] = frozenset()  # userdata keys that survive a restore
+    # JUMP: userdata keys of the container where the ways meet that survive a restore
+    written: FrozenSet[str] = frozenset()
+    is_failure_above: bool = False  # JUMP: the level decided on it, as if its own state had failed
+    level: Optional[TreeNode] = None  # GIVE_UP: the container that ends; None: that of the failure
+
+    @property
+    def arrives_at(self) -> Optional[TreeNode]:
+        """The level above that goes on, once the containers below it are left; None: no other."""
+        if self.way is not None:
+            return self.way.meets if self.way.left else None
+        return self.level
 
     def leads_to(self) -> str:
-        """Return the state or outcome that the meta state leads to, '' where it raises."""
-        return self.state or self.outcome or self.ending.state or self.ending.outcome or ''
+        """Return the state or outcome that the meta state leads to.
+
+        It is '' where it raises, and where a level above goes on.
+        """
+        if self.arrives_at is not None:
+            return ''
+        if self.way is not None:
+            return self.way.first
+        return self.outcome or self.ending.state or self.ending.outcome or ''

@@ -89,7 +89,7 @@ class Settings:
     deep_copy_keys: Tuple[str, ...] = ()
     deadline_s: float = 300.0  # 0: waits without end
     on_no_answer: Tuple[str, str] = ('stop', '')
-    escalate: bool = True
+    escalate: bool = False
     # whether callables among them may be called while a question is open
     watch_preconditions: bool = True
     history_length: int = 50  # visits

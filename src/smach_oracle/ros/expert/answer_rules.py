@@ -4,6 +4,7 @@ from typing import Dict
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal
 from smach_oracle.oracle.asking.answer_rules import (
     AnswerChoices,
+    addressed,
     check_answer,
     check_output_keys,
     choices_of,
@@ -27,14 +28,15 @@ def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
         raise AnswerError('decision kind {} is unknown; allowed: GOTO (1), SUPERSEDE (2), '
                           'GIVE_UP (3), INTERFACE (4)'.format(decision.kind))
     choices = choices_of(goal)
-    check_answer(Answer(AnswerKind(decision.kind), decision.state, decision.outcome,
-                        decision.interface), choices)
+    check_answer(addressed(Answer(AnswerKind(decision.kind), decision.state, decision.outcome,
+                                  decision.interface, container=decision.container), choices),
+                 choices)
     _check_outputs(choices, decision)
 
 
 def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
     """Whether both ask the same of the robot, whoever gave them and why."""
-    fields = ('kind', 'state', 'outcome', 'interface')
+    fields = ('kind', 'state', 'outcome', 'interface', 'container')
     return (all(getattr(one, field) == getattr(other, field) for field in fields)
             and _items(one) == _items(other))
 
@@ -42,14 +44,19 @@ def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
 def describe_decision(decision: ExpertDecision) -> str:
     """One line for people."""
     if decision.kind == ExpertDecision.GOTO:
-        return 'go to {}'.format(decision.state)
+        return 'go to {}'.format(_named(decision, decision.state))
     if decision.kind == ExpertDecision.SUPERSEDE:
         return 'supersede with {}'.format(decision.outcome)
     if decision.kind == ExpertDecision.GIVE_UP:
-        return 'give up with {}'.format(decision.outcome) if decision.outcome else 'give up'
+        return ('give up with {}'.format(_named(decision, decision.outcome))
+                if decision.outcome else 'give up')
     if decision.kind == ExpertDecision.INTERFACE:
         return 'run interface {}'.format(decision.interface)
     return 'no decision'
+
+
+def _named(decision: ExpertDecision, name: str) -> str:
+    return '{}/{}'.format(decision.container, name) if decision.container else name
 
 
 def _check_outputs(choices: AnswerChoices, decision: ExpertDecision) -> None:

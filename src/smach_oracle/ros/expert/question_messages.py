@@ -8,6 +8,7 @@ from smach_oracle.msg import (
     ExpertDecision,
     ExpertQueryGoal,
     InterfaceOffer,
+    LevelOutcome,
     OutcomeChoice,
     SharedAutonomyGoal,
     StateChoice,
@@ -41,13 +42,16 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
             ], choices=[
                 StateChoice(choice.state, choice.predicted_success,
                             int(choice.failure_class), choice.visits, list(choice.missing_keys),
-                            list(choice.preconditions), choice.blocked, list(choice.repeats))
+                            list(choice.preconditions), choice.blocked, list(choice.repeats),
+                            choice.container)
                 for choice in question.choices
             ], supersede_outcomes=[
                 OutcomeChoice(choice.outcome, choice.target)
                 for choice in question.supersede_outcomes
             ], output_keys=list(question.output_keys),
-            give_up_outcomes=list(question.give_up_outcomes), interfaces=[
+            give_up_outcomes=list(question.give_up_outcomes), give_up_above=[
+                LevelOutcome(each.container, each.outcome) for each in question.give_up_above
+            ], interfaces=[
                 InterfaceOffer(offer.name, offer.action, offer.description)
                 for offer in question.interfaces
             ], userdata=encode_all(question.userdata, SUMMARY_BYTES), deadline=question.deadline_s,
@@ -66,7 +70,7 @@ def to_answer(decision: ExpertDecision) -> Answer:
         raise AnswerError('the answer of {} cannot be used: {}'.format(
             decision.by or 'nobody', err)) from err
     return Answer(kind, decision.state, decision.outcome, decision.interface, outputs or None,
-                  decision.by, decision.why)
+                  decision.by, decision.why, decision.container)
 
 
 def to_decision(answer: Answer) -> ExpertDecision:
@@ -81,7 +85,7 @@ def to_decision(answer: Answer) -> ExpertDecision:
             ', '.join(unsent)))
     return _sendable(
         ExpertDecision(int(answer.kind), answer.state, answer.outcome, answer.interface, outputs,
-                       answer.by, answer.why))
+                       answer.container, answer.by, answer.why))
 
 
 def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:

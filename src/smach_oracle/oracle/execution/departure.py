@@ -1,0 +1,140 @@
+"""Leaving containers for a level above: what a verdict far below means on the way there.
+
+A recovery in one container may send the machine to a state of another. The containers from the
+failure up to the one that goes on are left: those on the way end at once, and what runs beside them
+is preempted, and waited for.
+"""
+from typing import List, Optional, cast
+
+import smach
+
+from ..machine.nesting import machines_below
+from ..machine.protocols import Machine
+from ..machine.tree_node import TreeNode, WrappedMachine
+from ..places.levels import levels_above
+from ..places.way import repeated_on, why_closed_on
+from ..records.visits import VisitResult
+from ..recovery.verdict import Verdict
+from ..settings.failing_outcomes import PREEMPTED, FailingNames
+
+
+class Departure:
+    """A verdict on its way from the container of a failure to the level that follows it."""
+
+    def __init__(self, verdict: Verdict, arrives_at: TreeNode, failed: str) -> None:
+        """`failed`: path of the failed state."""
+        self.verdict = verdict
+        self.arrives_at = arrives_at
+        self.failed = failed
+        self._repeated = set(repeated_on(verdict.way)) if verdict.way is not None else set()
+
+    def why_not(self) -> str:
+        """Say what prevents it at its arrival that did not when it was decided; '' if nothing.
+
+        What was preempted may have gone on for a while.
+        """
+        way = self.verdict.way
+        if way is None:
+            return ''
+        closed = why_closed_on(way)
+        repeated = sorted(set(repeated_on(way)).difference(self._repeated))
+        if not (closed or repeated):
+            return ''
+        place = way.down[-1].path
+        return 'cannot go to {}: {}'.format(
+            place, closed or '{} was done while the way there was made free'.format(
+                ', '.join(repeated)))
+
+    def result_of(self, node: TreeNode) -> VisitResult:
+        """Return how the visit counts that a container was in when it was left."""
+        decided_there = self.verdict.is_failure_above and self.arrives_at is node
+        return VisitResult.FAILURE if decided_there else VisitResult.PREEMPTED
+
+
+def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
+    """Leave the containers between a failure and the level that goes on; whether they are left.
+
+    They are not where another departure came before, such as that of a concurrent branch.
+
+    To be called in the thread of the failed state's container, its lock not held: what runs in the
+    containers is preempted.
+    """
+    arrives_at = verdict.arrives_at
+    assert arrives_at is not None
+    left = _left_for(node, arrives_at)
+    departure = Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))
+    if not left or not _claim([*left, arrives_at], departure):
+        return False
+    state = arrives_at.machine._current_state
+    where = (verdict.way.down[-1].path if verdict.way is not None
+             else 'its end with {}'.format(verdict.ending.outcome))
+    smach.loginfo('{}/{} is left for {}'.format(arrives_at.path, arrives_at.machine._current_label,
+                                                where))
+    try:
+        if state is not None:
+            state.request_preempt()
+    except Exception as err:  # it is the user's
+        smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
+    return True
+
+
+def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
+    """Return the containers from that of a failure up to below a level; none if it is no level."""
+    left = [node]
+    for level in levels_above(node):
+        if level is arrives_at:
+            return left
+        left.append(level)
+    return []
+
+
+def _claim(nodes: List[TreeNode], departure: Departure) -> bool:
+    tree = departure.arrives_at.tree
+    with tree.departures_lock:
+        if any(isinstance(each.departure, Departure) for each in nodes):
+            return False
+        for each in nodes:
+            each.departure = departure
+    for each in nodes[1:]:
+        record = each.records.by_label.get(each.machine._current_label or '')
+        if record is not None:
+            record.retire_edges()  # its visit ends by no plain success
+    return True
+
+
+def take_departure(node: TreeNode) -> Optional[Departure]:
+    """Return the departure that the end of the present state is part of, once."""
+    departure = node.departure
+    node.departure = None
+    if not isinstance(departure, Departure):
+        return None
+    stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
+    return None if stopped or node.is_left_behind() else departure
+
+
+def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[str]) -> str:
+    """Return an outcome with which a container ends that is left: nobody goes by it.
+
+    :param wanted: how its failure would have ended it.
+    """
+    outcomes = sorted(machine.get_registered_outcomes(), key=str)
+    for outcome in (PREEMPTED, wanted):
+        if outcome in outcomes:
+            return str(outcome)
+    return next((outcome for outcome in outcomes if outcome in failing), outcomes[0])
+
+
+def is_settled(node: TreeNode, label: str) -> bool:
+    """Whether a state has failed because the oracle of a container in it gave up.
+
+    That failure has had its account: no level above recovers from it, or asks about it again.
+    """
+    state = node.machine._states[label]
+    below = [state] if isinstance(state, smach.StateMachine) else [
+        machine for _, machine in machines_below(state)]
+    nodes = [cast(WrappedMachine, machine)._oracle for machine in below
+             if isinstance(machine, node.tree.container_class)]
+    settled = any(each.gave_up for each in nodes)
+    for each in nodes:
+        each.gave_up = False
+    return settled

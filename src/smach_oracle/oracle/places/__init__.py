@@ -1,0 +1,1 @@
+"""Places, the states of all containers of a tree, and the ways between them."""

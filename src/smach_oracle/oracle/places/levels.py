@@ -1,0 +1,38 @@
+"""The levels of a tree: the wrapped containers that are being executed around one another.
+
+The first level of a failure is its own container, then comes the one above it, and so on to the
+top.
+"""
+from typing import Iterator
+
+from ..machine.nesting import nodes_of
+from ..machine.tree_node import TreeNode
+
+
+def levels_above(node: TreeNode) -> Iterator[TreeNode]:
+    """Yield the wrapped containers that are being executed around this one, innermost first."""
+    child, above = node, node.parent
+    while above is not None and _executes(above, child):
+        yield above
+        child, above = above, above.parent
+
+
+def _executes(above: TreeNode, child: TreeNode) -> bool:
+    """Whether a container is now in the state that holds the one below it."""
+    machine = above.machine
+    state = machine._states.get(child.below[0])
+    return machine._is_running and state is not None and machine._current_state is state
+
+
+def is_direct(node: TreeNode) -> bool:
+    """Whether nothing lies between a container and the wrapped one above it."""
+    return node.parent is not None and len(node.below) == 1
+
+
+def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
+    """Yield the container itself, the levels above it, and then the others of the tree."""
+    first = [node, *levels_above(node)]
+    yield from first
+    for each in nodes_of(first[-1].machine):
+        if not any(each is one for one in first):
+            yield each

@@ -1,0 +1,49 @@
+"""Places: the states of all containers of a tree."""
+from typing import Iterator, NamedTuple, Optional
+
+from ..machine.tree_node import TreeNode
+from .levels import nodes_of_tree
+
+
+class Place(NamedTuple):
+    """One state of one container."""
+
+    node: TreeNode
+    label: str
+
+    @property
+    def path(self) -> str:
+        """Path of the container, and the label."""
+        return '{}/{}'.format(self.node.path, self.label)
+
+
+def places_of(node: TreeNode) -> Iterator[Place]:
+    """Yield the places of the tree; those of the container itself come first."""
+    for each in nodes_of_tree(node):
+        for label in each.labels():
+            yield Place(each, label)
+
+
+def place_at(node: TreeNode, container: str, label: str) -> Optional[Place]:
+    """Return the place of a state in the tree, None where there is none.
+
+    :param container: path of its container, '' for the container itself.
+    """
+    for each in nodes_of_tree(node):
+        if each.path == (container or node.path) and label in each.labels():
+            return Place(each, label)
+    return None
+
+
+def place_named(node: TreeNode, name: str) -> Optional[Place]:
+    """Return the place that a setting names, None where there is none.
+
+    :param name: a label of the container itself, or the path of a state below the top machine.
+    """
+    if name in node.labels():
+        return Place(node, name)
+    for each in nodes_of_tree(node):
+        above = each.relative_path + '/' if each.relative_path else ''
+        if name.startswith(above) and name[len(above):] in each.labels():
+            return Place(each, name[len(above):])
+    return None

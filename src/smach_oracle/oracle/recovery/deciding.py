@@ -1,0 +1,159 @@
+"""What the oracle of one level decides about a failure of its state (paper, Algorithm 1)."""
+from typing import Any, List, Optional, Tuple
+
+from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..decision.sentence import DecisionFacts, going_would_repeat
+from ..machine.repeats import has_visited, why_closed
+from ..machine.tree_node import TreeNode
+from ..machine.write_watch import WriteWatch
+from ..places.place import Place
+from ..places.way import Way, repeated_on
+from ..records.events import EventKind
+from ..records.facts import Decider
+from ..records.state_record import StateRecord
+from ..settings.preconditions import PreconditionSpec
+from ..settings.settings import ALLOW
+from .failure import Failure
+from .precondition_runner import PreconditionRunner
+from .stop import Stop
+
+Decided = Tuple[Decider, DecisionFacts]
+
+
+class Deciding:
+    """One decision of one container's oracle; `tried` says what was done before it.
+
+    `decide` is called in the machine's thread, `cancel` from any thread.
+    """
+
+    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
+                 context: FailureContext, continuous: bool, stop: Stop) -> None:
+        self._node = node
+        self._record = record
+        self.failure = failure
+        self._context = context
+        self._continuous = continuous
+        self._stop = stop
+        self._budget = node.tree.budget
+        self._met: List[str] = []  # names of preconditions
+        self._not_met = ''
+        self.watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
+        self._preconditions = PreconditionRunner(node, record.settings, self.watch)
+        self.tried: List[str] = []
+
+    def cancel(self) -> None:
+        """Preempt the precondition that runs."""
+        self._preconditions.cancel()
+
+    def decide(self) -> Decided:
+        """Run the preconditions that the policy wants, and say what it does."""
+        return self._ask_at_once() or self._follow_policy()
+
+    def _ask_at_once(self) -> Optional[Decided]:
+        """Return the decision where no policy has a say, and no precondition is run."""
+        record, ask = self._record, Action.ASK
+        if self.failure.is_held_back:
+            return Decider.HELD_BACK, self.facts_of(ask)
+        if record.recoveries >= record.settings.max_recoveries:
+            return Decider.MAX_RECOVERIES, self.facts_of(ask, spent=record.recoveries)
+        spent = self._budget.why_no_recovery()
+        if spent:
+            return Decider.BUDGET, self.facts_of(ask, blocked=spent)
+        if record.settings.on_retry != ALLOW:
+            return Decider.ON_RETRY, self.facts_of(ask, blocked=self.why_repeats(record.label))
+        return None
+
+    def _follow_policy(self) -> Decided:
+        record, policy = self._record, self._node.in_force.policy
+        preconditions = self._run_preconditions()
+        action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
+        target = ''
+        if action is not Action.ASK:
+            target = (record.label if action is Action.REVISIT
+                      else policy.step_back_target(self._context))
+        decider, why_not = self._what_prevents(target) if target else (Decider.POLICY, '')
+        if why_not:
+            action, target = Action.ASK, ''
+        return decider, self.facts_of(action, target=target, blocked=why_not)
+
+    def _what_prevents(self, target: str) -> Tuple[Decider, str]:
+        """Spend a recovery on going to a state; or return what prevents it, and why."""
+        for decider, why_not in ((Decider.ON_RETRY, self.why_repeats),
+                                 (Decider.POLICY, self._why_not)):
+            reason = why_not(target)
+            if reason:
+                return decider, reason
+        spent = self._budget.take_recovery()
+        return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
+
+    def why_repeats(self, target: str) -> str:
+        """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
+        return self.why_repeats_on(Way((), self._node, (Place(self._node, target),)))
+
+    def why_repeats_on(self, way: Way) -> str:
+        """Say what would be repeated if the machine went to a place by itself; '' if nothing."""
+        repeated, place = repeated_on(way), way.down[-1]
+        if not repeated:
+            return ''
+        target = place.label if place.node is self._node else place.path
+        if not has_visited(place.node, place.label):
+            return 'this trial has not been in {}, and going there may repeat {}'.format(
+                target, ', '.join(repeated))
+        return going_would_repeat(self._record.label, target, repeated)
+
+    def _why_not(self, target: str) -> str:
+        """Return why the machine cannot go on to a state by itself now, '' where it can."""
+        blocked = why_closed(self._node, target)
+        return '{} {}'.format(target, blocked) if blocked else self._function_that_runs()
+
+    def _function_that_runs(self) -> str:
+        """Return which function among the preconditions was left behind and runs, '' for none."""
+        for spec in self._record.settings.preconditions:
+            for name, function in spec.functions():
+                blocked = self._node.tree.workers.blocked(function)
+                if blocked:
+                    return '{} {}'.format(name, blocked)
+        return ''
+
+    def facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
+        """Return what has led to a decision."""
+        record = self._record
+        return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
+                             met=self._met, not_met=self._not_met,
+                             held_back=self.failure.text if self.failure.is_held_back else '',
+                             **fields)
+
+    # -- preconditions
+
+    def _run_preconditions(self) -> Preconditions:
+        record = self._record
+        specs = record.settings.preconditions
+        if not specs:
+            return Preconditions.NONE
+        if not self._node.in_force.policy.runs_preconditions(record.failure_class):
+            return Preconditions.NOT_MET
+        for spec in specs:
+            if self._stop.stopped() or not self._run_precondition(spec):
+                return Preconditions.NOT_MET
+        return Preconditions.MET
+
+    def _run_precondition(self, spec: PreconditionSpec) -> bool:
+        self._emit(EventKind.PRECONDITION_START, target=spec.name)
+        why_not = self._preconditions.run(spec)
+        for _ in range(self._record.most_repeats):
+            if not why_not or not self._stop.has_waited_after('did not get its precondition '
+                                                              + spec.name):
+                break
+            why_not = self._preconditions.run(spec)
+        outcome = 'not met' if why_not else 'met'
+        self._emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
+        if why_not:
+            self._not_met = spec.name
+        else:
+            self._met.append(spec.name)
+        self.tried.append('precondition {}: {}'.format(
+            spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
+        return not why_not
+
+    def _emit(self, kind: EventKind, **fields: Any) -> None:
+        self._node.emit(kind, state=self._record.label, **fields)

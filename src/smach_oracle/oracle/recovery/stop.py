@@ -1,0 +1,48 @@
+"""What ends a recovery: a preempt, a shutdown, the trial's last minute; and waits until then."""
+import threading
+
+import smach
+
+from ..machine.limited_run import standing_still
+from ..machine.tree_node import TreeNode
+from ..records.state_record import StateRecord
+
+
+class Stop:
+    """Whether one recovery is over. `cancelled` is set by a preempt, from any thread."""
+
+    def __init__(self, node: TreeNode, record: StateRecord) -> None:
+        self._node = node
+        self._record = record
+        self.cancelled = threading.Event()
+
+    def stopped(self) -> bool:
+        """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
+        return self.cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
+
+    def why(self) -> str:
+        """Return why it is stopped."""
+        if self.cancelled.is_set():
+            return 'preempted'
+        return 'left behind' if self._node.is_left_behind() else 'shutdown'
+
+    def is_over(self) -> bool:
+        """Whether it is stopped, or the trial's time is over."""
+        return self.stopped() or bool(self._node.tree.budget.why_over())
+
+    # -- health
+
+    def has_waited_after(self, what: str) -> bool:
+        """Wait where the robot was not well at what has happened; whether it is well again."""
+        health = self._node.tree.health
+        if not health.is_set:
+            return False
+        why = health.unwell_after(self.stopped, self.cancelled.wait)
+        return bool(why) and self.wait_until_well(what, why)
+
+    def wait_until_well(self, what: str, why: str) -> bool:
+        """Wait until the robot is well; False where something has ended the recovery."""
+        with standing_still(self._node.runs_around):
+            is_well = self._node.tree.health.wait_until_well(
+                self._node, self._record.label, what, why, self.is_over, self.cancelled.wait)
+        return is_well and not self.is_over()
