@@ -12,6 +12,7 @@ class Options(NamedTuple):
     """What a question offers, sorted."""
 
     places: Tuple[Tuple[str, str], ...]  # path and label
+    missing: Tuple[Tuple[str, str, Tuple[str, ...]], ...]  # input keys, by place
     supersede: Tuple[Tuple[str, str], ...]  # outcome, and where it leads
     give_up: Tuple[Tuple[str, str], ...]  # path and outcome
     outputs: Tuple[str, ...]

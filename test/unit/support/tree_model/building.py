@@ -26,8 +26,14 @@ class World:
         """Nothing has happened yet."""
         self.turns = Turns(self.plan.seed)
         self.is_cut = False
+        self._is_preempted = False
         self._entries = 0
         self._lock = threading.Lock()
+
+    def takes_preempt(self) -> bool:
+        """Whether the tree is preempted now: once in a trial."""
+        takes, self._is_preempted = not self._is_preempted, True
+        return takes
 
     def tell(self, path: str, event: Any) -> None:
         """Note what happens, up to the cut."""
@@ -76,7 +82,7 @@ class Scripted(smach.State):
         for key in plan.writes:
             ud[key] = '{}/{}#{}'.format(self._path, plan.label, number)
         action = world.plan.action(self._path, plan, number)
-        if action.kind == 'preempt':
+        if action.kind == 'preempt' and world.takes_preempt():
             world.top.request_preempt()
         self._await_preempt()
         if self.preempt_requested():

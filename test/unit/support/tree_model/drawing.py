@@ -120,7 +120,7 @@ class _Drawing:
         outcomes = ['ok']
         if chance.random() < 0.95:
             outcomes.append('preempted')
-        if chance.random() < 0.9:
+        if chance.random() < 0.9 or 'preempted' not in outcomes:
             outcomes.append('aborted')
         if chance.random() < 0.25:
             outcomes.append('odd')

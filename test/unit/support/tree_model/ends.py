@@ -1,5 +1,5 @@
 """How a state ends in the model, and where a recovery leads."""
-from typing import Any, Dict, NamedTuple, Optional, Set
+from typing import Any, Dict, NamedTuple, Optional, Set, Tuple
 
 
 class Way(NamedTuple):
@@ -28,6 +28,8 @@ class Goal(NamedTuple):
     gives_up: Optional[str] = None  # an outcome
     failed: Optional[Failed] = None  # of its own state, where its oracle has decided
     written: Set[str] = frozenset()
+    place: Tuple[str, str] = ('', '')  # where it ends
+    crosses: bool = False  # containers were left
 
 
 class Reply(NamedTuple):

@@ -150,23 +150,26 @@ class DrawnExpert(Expert):
         self._numbers[key] = number + 1
         self._world.tell(path, ('QUESTION', label, question.failure_kind.name, options))
         reply = draw_reply(self._world.plan, path, label, number, options)
-        return reply and answer_of(reply, path)
+        return reply and answer_of(reply)
 
 
 def options_of(question: Any) -> Options:
     """What a question offers."""
     path = question.container_path
     return Options(
-        tuple(sorted((path, choice.state) for choice in question.choices)),
+        tuple(sorted((choice.container or path, choice.state) for choice in question.choices)),
+        tuple(sorted((choice.container or path, choice.state, tuple(sorted(choice.missing_keys)))
+                     for choice in question.choices)),
         tuple(sorted((choice.outcome, choice.target) for choice in question.supersede_outcomes)),
-        tuple(sorted((path, outcome) for outcome in question.give_up_outcomes)),
+        tuple(sorted([(path, outcome) for outcome in question.give_up_outcomes]
+                     + [(each.container, each.outcome) for each in question.give_up_above])),
         tuple(sorted(question.output_keys)))
 
 
-def answer_of(reply: Reply, path: str) -> Answer:
+def answer_of(reply: Reply) -> Answer:
     """The executive's form of a drawn answer."""
     if reply.kind == 'goto':
-        return Answer(AnswerKind.GOTO, state=reply.name)
+        return Answer(AnswerKind.GOTO, state=reply.name, container=reply.path)
     if reply.kind == 'supersede':
         return Answer(AnswerKind.SUPERSEDE, outcome=reply.name, outputs=dict(reply.outputs))
-    return Answer(AnswerKind.GIVE_UP, outcome=reply.name)
+    return Answer(AnswerKind.GIVE_UP, outcome=reply.name, container=reply.path)

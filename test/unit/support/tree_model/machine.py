@@ -24,6 +24,8 @@ class MachinePart(Part, Recovering):
         self.memory = Remembered(run.plan, path, self.labels, self.labels[0])
         self.current: Optional[Part] = None
         self._preempted: Optional[Part] = None
+        self.left_with = ''
+        self._natural: Optional[Way] = None  # ending, of the failure that is being recovered from
         self.begins_in: Optional[str] = None  # its next execution
 
     def children(self) -> List[Part]:
@@ -35,6 +37,7 @@ class MachinePart(Part, Recovering):
         """Run to the end; returns the outcome."""
         view.copy_to(self.keys, self.userdata)
         self.settled = False
+        self._natural = None
         self._preempted = None
         self.snapshots.clear()
         self.memory.begin_execution()
@@ -45,6 +48,10 @@ class MachinePart(Part, Recovering):
             outcome = yield from self._run_from(label)
         except Raised:
             self.tell('CONTAINER_END', '')
+            raise
+        except Jumping:
+            self.leave()
+            view.copy_from(self.keys, self.userdata)
             raise
         finally:
             self.current = None
@@ -76,10 +83,9 @@ class MachinePart(Part, Recovering):
         except Raised:
             raised = True
         except Jumping as jump:
+            self.run.forget_begins(child)
             return (yield from self.arrive(label, jump.goal))
-        finally:
-            for part in self._children:
-                part.begins_in = None
+        self.run.forget_begins(child)
         return (yield from self._ended(label, outcome, raised))
 
     def _ended(self, label: str, outcome: Any, raised: bool) -> Course:
@@ -116,7 +122,10 @@ class MachinePart(Part, Recovering):
         if self.child(label).settled:
             self.settled = True
             return self.end_naturally(failed)
-        return (yield from self.recover(failed, continuous))
+        self._natural = failed.ending
+        way = yield from self.recover(failed, continuous)
+        self._natural = None
+        return way
 
     def count_failure(self, failed: Failed, continuous: bool) -> None:
         """Tell of a failure and remember it."""
@@ -198,13 +207,27 @@ class MachinePart(Part, Recovering):
     def arrive(self, label: str, goal: Goal) -> Course:
         """A jump has left the state of that label."""
         if goal.machine is not self:
-            self.leave()
+            self.memory.ended(label, PREEMPTED)
+            self.choose_left_with()
+            self.tell('TRANSITION', label, self.child(label).left_with, self.left_with)
             raise Jumping(goal)
         return (yield from self.follow_from_below(label, goal))
 
     def leave(self) -> None:
         """End at once, as preempted."""
         self.flag = False
+        self.choose_left_with()
+        self.tell('CONTAINER_END', '', self.left_with)
+
+    def choose_left_with(self) -> None:
+        """Find the outcome of a container that is left: as without an oracle, if not preempted."""
+        outcomes, natural = self.plan.outcomes, self._natural
+        if 'preempted' in outcomes:
+            self.left_with = 'preempted'
+        elif natural is not None and not natural.is_state:
+            self.left_with = natural.target
+        else:
+            self.left_with = failing_outcome_of(outcomes) or ''
 
     def tell(self, kind: str, label: str, outcome: str = '', target: str = '',
              *more: Any) -> None:

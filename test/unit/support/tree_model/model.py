@@ -1,5 +1,5 @@
 """The model of a tree under an oracle: brute force, from the words of doc/, without SMACH."""
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .answers import Options, draw_reply
 from .ends import Goal, Reply
@@ -46,6 +46,7 @@ class Model:
         self._numbers = {key: number for key, number in self._numbers.items()
                          if key[0] != 'question'}
         self.entries = 0
+        self._is_preempted = False
         scheduler = Scheduler(self.plan.seed)
         self.top.userdata.update({key: key + '0' for key in KEYS[:2]})
         try:
@@ -56,6 +57,11 @@ class Model:
             return CUT
 
     # -- what the parts need
+
+    def takes_preempt(self) -> bool:
+        """Whether the tree is preempted now: once in a trial."""
+        takes, self._is_preempted = not self._is_preempted, True
+        return takes
 
     def tell(self, path: str, event: Tuple[Any, ...]) -> None:
         """Note an event."""
@@ -109,9 +115,16 @@ class Model:
         return way is not None and bool(way.target) and not way.is_state and self.is_foreseen(
             level, way.target)
 
+    def forget_begins(self, part: Part) -> None:
+        """What was not entered in the middle is entered at its own start from now on."""
+        for machine in self._machines.values():
+            if part in _with_ancestors(machine):
+                machine.begins_in = None
+
     def goal_of(self, origin: MachinePart, path: str, label: str) -> Goal:
         """Where to go from a container to a place."""
         target: Part = self._machines[path]
+        place = label
         around = _with_ancestors(origin)
         begins = {}
         while target not in around or not isinstance(target, MachinePart):
@@ -119,25 +132,50 @@ class Model:
                 begins[target.path] = label
             label = target.label
             target = target.parent
-        self.cross_jumps += bool(begins or target is not origin)
-        return Goal(target, label, begins)
+        return Goal(target, label, begins, place=(path, place))
+
+    def missing_at(self, goal: Goal, userdata: Dict[str, Any]) -> Tuple[str, ...]:
+        """Input keys of a place that are not there, where a goal's machine has this userdata."""
+        path, label = goal.place
+        machine = self._machines[path]
+        part = machine.child(label)
+        remapping = machine.plan.remappings.get(label, {})
+        return tuple(sorted(
+            key for key in getattr(part.plan, 'reads', part.keys)
+            if not self._will_have(machine, remapping.get(key, key), goal.machine, userdata)))
+
+    def _will_have(self, part: Any, key: str, around: Any, userdata: Dict[str, Any]) -> bool:
+        """Whether a container has a key once the machine has come down to it."""
+        if part is around:
+            return key in userdata
+        if key in part.userdata:
+            return True
+        if key not in part.keys:
+            return False
+        remapping = getattr(part.parent.plan, 'remappings', {}).get(part.label, {})
+        return self._will_have(part.parent, remapping.get(key, key), around, userdata)
 
     # -- questions
 
-    def ask(self, machine: MachinePart, failed: Any) -> Optional[Reply]:
+    def ask(self, machine: MachinePart, failed: Any, written: Set[str]) -> Optional[Reply]:
         """Put a question; the answer is drawn."""
-        options = self.options(machine, failed.label)
+        options = self.options(machine, failed.label, written)
         number = self.number_of('question', machine.path, failed.label)
         self.tell(machine.path, ('QUESTION', failed.label, failed.kind, options))
         return draw_reply(self.plan, machine.path, failed.label, number, options)
 
-    def options(self, machine: MachinePart, label: str) -> Options:
+    def options(self, machine: MachinePart, label: str, written: Set[str]) -> Options:
         """What may be answered."""
         part = machine.child(label)
         places = [(each.path, name) for each in self._machines.values() for name in each.labels]
         levels = [each for each in _with_ancestors(machine) if isinstance(each, MachinePart)]
+        missing = []
+        for path, name in places:
+            goal = self.goal_of(machine, path, name)
+            missing.append((path, name, self.missing_at(goal, goal.machine.after_jump(
+                goal.label, written if goal.machine is machine else set()))))
         return Options(
-            tuple(sorted(places)),
+            tuple(sorted(places)), tuple(sorted(missing)),
             tuple(sorted((name, machine.way_of(label, name).target)
                          for name in part.plan.outcomes)),
             tuple(sorted((each.path, name) for each in levels for name in each.plan.outcomes)),

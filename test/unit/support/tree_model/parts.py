@@ -54,6 +54,7 @@ class Part:
         self.parent = parent
         self.flag = False  # a preempt is requested
         self.settled = False  # its failure
+        self.left_with = 'preempted'
         self.keys: Tuple[str, ...] = getattr(plan, 'keys', ())
 
     def request_preempt(self) -> None:
@@ -91,7 +92,7 @@ class LeafPart(Part):
         value = '{}/{}#{}'.format(self.path, self.label, number)
         view.copy_from(plan.writes, {key: value for key in plan.writes})
         action = self.run.plan.action(self.path, plan, number)
-        if action.kind == 'preempt':
+        if action.kind == 'preempt' and self.run.takes_preempt():
             self.run.top.request_preempt()
         if self.flag:
             self.flag = False
@@ -114,7 +115,7 @@ class IteratorPart(Part):
     def __init__(self, run: Any, plan: Repeated, path: str, parent: Any) -> None:
         super().__init__(run, plan, path, parent)
         self._child = run.part_of(plan.child, path, self)
-        self._userdata: Dict[str, Any] = {}
+        self.userdata: Dict[str, Any] = {}
         self._runs = False
 
     def children(self) -> List[Part]:
@@ -127,7 +128,7 @@ class IteratorPart(Part):
 
     def execute(self, view: View) -> Course:
         """Go through the items; returns the outcome."""
-        view.copy_to(self.keys, self._userdata)
+        view.copy_to(self.keys, self.userdata)
         self._runs = True
         self.settled = False
         try:
@@ -135,7 +136,7 @@ class IteratorPart(Part):
         finally:
             self._runs = False
         self.flag = False
-        view.copy_from(self.keys, self._userdata)
+        view.copy_from(self.keys, self.userdata)
         return self.plan.final_map.get(outcome, outcome)
 
     def _iterate(self) -> Course:
@@ -143,7 +144,7 @@ class IteratorPart(Part):
         for _ in range(self.plan.items):
             if self.flag and not self.run.is_upstream:
                 child.request_preempt()
-            outcome = yield from child.execute(View(self._userdata, {}))
+            outcome = yield from child.execute(View(self.userdata, {}))
             self.settled = child.settled
             if self.flag or outcome not in self.plan.loop_outcomes:
                 return outcome
@@ -159,7 +160,7 @@ class ConcurrencePart(Part):
     def __init__(self, run: Any, plan: Beside, path: str, parent: Any) -> None:
         super().__init__(run, plan, path, parent)
         self._children = [run.part_of(child, path, self) for child in plan.children]
-        self._userdata: Dict[str, Any] = {}
+        self.userdata: Dict[str, Any] = {}
         self._active: List[str] = []
         self._outcomes: Dict[str, str] = {}
         self._error: Optional[Exception] = None
@@ -170,7 +171,7 @@ class ConcurrencePart(Part):
 
     def execute(self, view: View) -> Course:
         """Run all branches; returns the outcome."""
-        view.copy_to(self.keys, self._userdata)
+        view.copy_to(self.keys, self.userdata)
         self._active = [child.label for child in self._children]
         self._outcomes = {}
         self._error = None
@@ -188,12 +189,12 @@ class ConcurrencePart(Part):
         serviced = self._settle_preempt(is_deaf)
         outcome = self._outcome(serviced)
         self.settled = any(child.settled for child in self._children)
-        view.copy_from(self.keys, self._userdata)
+        view.copy_from(self.keys, self.userdata)
         return outcome
 
     def _branch(self, child: Part) -> Course:
         child.settled = False
-        return child.execute(View(self._userdata, {}))
+        return child.execute(View(self.userdata, {}))
 
     def _settle_preempt(self, is_deaf: bool) -> bool:
         if not self.flag or is_deaf or not (self._is_reached or self.run.is_upstream):

@@ -30,7 +30,8 @@ class Recovering:
     def recover(self: Any, failed: Failed, continuous: bool) -> Course:
         """Recover from a failure that was counted; returns where the machine goes."""
         self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
-        decision = yield from self.decide(failed.label, continuous, failed.label)
+        decision = yield from self.decide(failed.label, continuous)
+        self._tell_decision(failed.label, decision)
         if decision.action != 'ask':
             return self._by_itself(failed.label, decision)
         return (yield from self._ask(failed, decision))
@@ -38,7 +39,11 @@ class Recovering:
     def _by_itself(self: Any, label: str, decision: Decision) -> Way:
         self._count_recovery(label)
         self.run.budget['recoveries'] += 1
-        return self.jump(label, decision.target, decision.written)
+        return self.jump(label, self._to(decision))
+
+    def _to(self: Any, decision: Decision, failed: Optional[Failed] = None) -> Goal:
+        return Goal(self, decision.target, failed=failed, written=decision.written,
+                    place=(self.path, decision.target))
 
     def _count_recovery(self: Any, label: str) -> None:
         recoveries = self.memory.recoveries
@@ -51,7 +56,10 @@ class Recovering:
 
     # -- deciding
 
-    def decide(self: Any, label: str, continuous: bool, told: str) -> Course:
+    def _tell_decision(self: Any, label: str, decision: Decision) -> None:
+        self.tell('DECISION', label, decision.action, decision.target, decision.by)
+
+    def decide(self: Any, label: str, continuous: bool) -> Course:
         """What the oracle decides about a failure of its state that was counted."""
         spent = ''
         if self.memory.recoveries.get(label, 0) >= self.limit_of(label):
@@ -75,7 +83,6 @@ class Recovering:
         target = {'revisit': label, 'ask': ''}.get(action)
         if target is None:
             target = self.memory.step_back_target(self.run.plan.policy, label)
-        self.tell('DECISION', told, action, target, by)
         return Decision(action, target, by, written)
 
     def _run_checks(self: Any, label: str, checks: Any, written: Set[str]) -> Course:
@@ -117,10 +124,11 @@ class Recovering:
         if failed.ending is not None and not failed.ending.is_state and self.run.is_foreseen(
                 self, failed.ending.target):
             return self.give_up(failed, failed.ending)
-        if self.run.plan.escalate and decision.by == 'policy' and (
+        would_end = failed.ending is None or not failed.ending.is_state
+        if self.run.plan.escalate and would_end and decision.by == 'policy' and (
                 self.memory.failure_class(failed.label) != 'HIGH'):
             yield from self._ask_above(failed)
-        reply = self._ask_expert(failed)
+        reply = self._ask_expert(failed, decision.written)
         if reply is None:
             return self._fall_back(failed, decision.written)
         return self._obey(failed, reply, decision.written)
@@ -131,24 +139,33 @@ class Recovering:
         while self.run.is_machine(level.parent):
             level, inner = level.parent, level
             outer = level.failed_as(inner.label, ending)
-            decision = yield from level.decide_tentatively(outer, failed)
+            if outer is None:
+                return
+            decision = yield from level.decide_tentatively(outer)
             if decision.action != 'ask':
                 self._count_recovery(failed.label)
                 level._count_recovery(inner.label)
                 self.run.budget['recoveries'] += 1
-                raise Jumping(Goal(level, decision.target, failed=outer, written=decision.written))
+                level.count_failure(outer, level.memory.is_continuous(
+                    self.run.plan.policy, inner.label))
+                level._tell_decision(inner.label, decision)
+                raise Jumping(level._to(decision, outer))
             ending = outer.ending
+            if ending is not None and ending.is_state:
+                return
 
-    def _ask_expert(self: Any, failed: Failed) -> Optional[Reply]:
+    def _ask_expert(self: Any, failed: Failed, written: Set[str]) -> Optional[Reply]:
         if not self.run.plan.has_expert or self.run.is_spent('questions'):
             return None
         self.run.budget['questions'] += 1
         self.tell('QUERY_OPENED', failed.label)
-        reply = self.run.ask(self, failed)
+        reply = self.run.ask(self, failed, written)
         if reply is None:
             self.tell('QUERY_EXPIRED', failed.label)
             return None
-        self.tell('QUERY_ANSWERED', failed.label, reply.kind, reply.name)
+        name = '{}/{}'.format(reply.path, reply.name)
+        self.tell('QUERY_ANSWERED', failed.label, reply.kind,
+                  name if reply.path not in ('', self.path) else reply.name)
         return reply
 
     def _fall_back(self: Any, failed: Failed, written: Set[str]) -> Way:
@@ -197,17 +214,24 @@ class Recovering:
 
     # -- going
 
-    def jump(self: Any, label: str, target: str, written: Set[str]) -> Way:
-        """Go to a state of this container, from the failed one of that label."""
-        how = 'keep'
-        if self.run.plan.userdata == 'restore' and target in self.snapshots:
-            how = 'restore'
-            survives = {key: value for key, value in self.userdata.items() if key in written}
-            self.userdata.clear()
-            self.userdata.update(self.snapshots[target])
-            self.userdata.update(survives)
-        self.tell('JUMP', label, '', target, self.missing(target), how)
-        return Way(target, True)
+    def jump(self: Any, label: str, goal: Goal) -> Way:
+        """Go to a state of this container, from the one of that label."""
+        restores = self.run.plan.userdata == 'restore' and goal.label in self.snapshots
+        after = self.after_jump(goal.label, goal.written)
+        self.userdata.clear()
+        self.userdata.update(after)
+        self._note_begins(goal)
+        self.tell('JUMP', label, '', goal.label, self.run.missing_at(goal, self.userdata),
+                  'restore' if restores else 'keep')
+        self.run.cross_jumps += bool(goal.begins or goal.crosses)
+        return Way(goal.label, True)
+
+    def after_jump(self: Any, target: str, written: Set[str]) -> Dict[str, Any]:
+        """The userdata that a jump to a state leaves."""
+        if self.run.plan.userdata != 'restore' or target not in self.snapshots:
+            return dict(self.userdata)
+        survives = {key: value for key, value in self.userdata.items() if key in written}
+        return {**self.snapshots[target], **survives}
 
     def missing(self: Any, label: str) -> Tuple[str, ...]:
         """Input keys of a state that are not there."""
@@ -221,27 +245,25 @@ class Recovering:
         goal = self.run.goal_of(self, path, label)
         if goal.machine is not self:
             raise Jumping(goal)
-        self._note_begins(goal)
-        return self.jump(failed, goal.label, written)
+        return self.jump(failed, goal._replace(written=written))
 
     def _note_begins(self: Any, goal: Goal) -> None:
         for path, label in goal.begins.items():
             self.run.machine(path).begins_in = label
 
-    def failed_as(self: Any, label: str, ending: Optional[Way]) -> Failed:
-        """The failure of its own state that ends so."""
+    def failed_as(self: Any, label: str, ending: Optional[Way]) -> Optional[Failed]:
+        """The failure of its own state that ends so, None where that is none."""
         if ending is None:
             return Failed(label, 'EXCEPTION', '', None, None)
-        return self.failure_of(label, ending.target, False) or Failed(
-            label, 'FAILING_OUTCOME', ending.target, None, self.way_of(label, ending.target))
+        return self.failure_of(label, ending.target, False)
 
-    def decide_tentatively(self: Any, outer: Failed, failed: Failed) -> Course:
+    def decide_tentatively(self: Any, outer: Failed) -> Course:
         """What this oracle would decide if its state, the container below, had failed."""
         memory = self.memory
         continuous = memory.is_continuous(self.run.plan.policy, outer.label)
         kept = memory.keep()
         memory.fails(outer.label)
-        decision = yield from self.decide(outer.label, continuous, outer.label)
+        decision = yield from self.decide(outer.label, continuous)
         memory.put_back(kept)
         return decision
 
@@ -249,20 +271,21 @@ class Recovering:
         """A jump has left the state of that label and has come here."""
         yield from ()
         if self.flag:
-            return self._end_jump()
+            return self._end_jump(label)
         if goal.gives_up is not None:
             self.memory.ended(label, 'preempted')
+            self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
             self.tell('GIVE_UP', label, goal.gives_up)
             self.settled = True
             return Way(goal.gives_up, False)
         if goal.failed is None:
             self.memory.ended(label, 'preempted')
-        else:
-            continuous = self.memory.is_continuous(self.run.plan.policy, label)
-            self.count_failure(goal.failed, continuous)
-        self._note_begins(goal)
-        return self.jump(label, goal.label, goal.written)
+        self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
+        return self.jump(label, goal._replace(crosses=True))
 
-    def _end_jump(self: Any) -> Way:
+    def _end_jump(self: Any, label: str) -> Way:
         self.flag = False
-        return Way('preempted', False)
+        self.memory.ended(label, 'preempted')
+        self.choose_left_with()
+        self.tell('TRANSITION', label, self.child(label).left_with, self.left_with)
+        return Way(self.left_with, False)
