@@ -102,7 +102,15 @@ def difference_of(plan: TreePlan, model: List[Any], executed: List[Any]) -> Opti
             if not _is_same(one, other):
                 found.append(Difference(path, number, one, other))
                 break
-    return found[0] if found else None
+    return min(found, key=lambda each: _moment(model, is_concurrent, each)) if found else None
+
+
+def _moment(model: List[Any], is_concurrent: bool, difference: Difference) -> int:
+    """Where in the model's whole course a difference comes."""
+    if not is_concurrent:
+        return difference.number
+    places = [place for place, (path, _) in enumerate(model) if path == difference.path]
+    return (places + [len(model)])[min(difference.number, len(places))]
 
 
 def _is_same(one: Any, other: Any) -> bool:

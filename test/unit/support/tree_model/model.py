@@ -4,7 +4,7 @@ from typing import Any, Dict, List, Optional, Set, Tuple
 from .answers import Options, draw_reply
 from .ends import Goal, Reply
 from .machine import MachinePart
-from .parts import ConcurrencePart, Cut, IteratorPart, LeafPart, Part, Raised, View
+from .parts import ConcurrencePart, Cut, IteratorPart, Jumping, LeafPart, Part, Raised, View
 from .plan import CUT, KEYS, MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
 from .scheduling import Scheduler
 
@@ -133,6 +133,19 @@ class Model:
             label = target.label
             target = target.parent
         return Goal(target, label, begins, place=(path, place))
+
+    def depart(self, origin: Part, goal: Goal) -> Jumping:
+        """Have what runs beside the way to a goal preempted; of two jumps the first wins."""
+        way, part = [], origin
+        while part is not goal.machine:
+            if isinstance(part.parent, ConcurrencePart):
+                way.append((part.parent, part.label))
+            part = part.parent
+        goal = next((beside.goal for beside, _ in way if beside.goal is not None), goal)
+        for beside, label in way:
+            if beside.goal is None:
+                beside.leave_for(goal, label)
+        return Jumping(goal)
 
     def missing_at(self, goal: Goal, userdata: Dict[str, Any]) -> Tuple[str, ...]:
         """Input keys of a place that are not there, where a goal's machine has this userdata."""

@@ -133,6 +133,13 @@ class IteratorPart(Part):
         self.settled = False
         try:
             outcome = yield from self._iterate()
+        except Raised:
+            self.settled = self._child.settled
+            raise
+        except Jumping:
+            self.flag = False
+            view.copy_from(self.keys, self.userdata)
+            raise
         finally:
             self._runs = False
         self.flag = False
@@ -165,6 +172,7 @@ class ConcurrencePart(Part):
         self._outcomes: Dict[str, str] = {}
         self._error: Optional[Exception] = None
         self._is_reached = False  # by a preempt while branches run
+        self.goal: Any = None  # of the jump that leaves it
 
     def children(self) -> List[Part]:
         return self._children
@@ -176,6 +184,7 @@ class ConcurrencePart(Part):
         self._outcomes = {}
         self._error = None
         self._is_reached = False
+        self.goal = None
         self.settled = False
         if self.flag and not self.run.is_upstream:
             self._preempt_active()
@@ -183,12 +192,16 @@ class ConcurrencePart(Part):
         is_deaf = any(child.flag for child in self._children)
         for child in self._children:
             child.flag = False
+        self.settled = any(child.settled for child in self._children)
+        if self.goal is not None:
+            self.flag = False
+            view.copy_from(self.keys, self.userdata)
+            raise Jumping(self.goal)
         if self._error is not None:
             self.flag = False
             raise self._error
         serviced = self._settle_preempt(is_deaf)
         outcome = self._outcome(serviced)
-        self.settled = any(child.settled for child in self._children)
         view.copy_from(self.keys, self.userdata)
         return outcome
 
@@ -213,9 +226,10 @@ class ConcurrencePart(Part):
     def child_ended(self, label: str, outcome: Any, error: Optional[Exception]) -> None:
         """A branch has ended."""
         self._active.remove(label)
+        if isinstance(error, Jumping):
+            return
         if error is not None:
-            if self._error is None or isinstance(self._error, Raised):
-                self._error = error
+            self._error = error
             self._preempt_active()
             return
         self._outcomes[label] = outcome
@@ -225,6 +239,14 @@ class ConcurrencePart(Part):
     def request_preempt(self) -> None:
         self.flag = True
         self._preempt_active()
+
+    def leave_for(self, goal: Any, label: str) -> None:
+        """A branch goes elsewhere: the others are preempted."""
+        self.goal = goal
+        self.flag = True
+        for other in self._active:
+            if other != label:
+                self.child(other).request_preempt()
 
     def _preempt_active(self) -> None:
         self._is_reached = self._is_reached or bool(self._active)

@@ -2,7 +2,7 @@
 from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Reply, Way
-from .parts import Jumping, Part, Raised, View
+from .parts import Part, Raised, View
 from .scheduling import Course
 from .words import decided
 
@@ -31,10 +31,21 @@ class Recovering:
         """Recover from a failure that was counted; returns where the machine goes."""
         self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
         decision = yield from self.decide(failed.label, continuous)
+        if self.flag:
+            return self._preempted_ending(failed)
         self._tell_decision(failed.label, decision)
         if decision.action != 'ask':
             return self._by_itself(failed.label, decision)
         return (yield from self._ask(failed, decision))
+
+    def _preempted_ending(self: Any, failed: Failed) -> Way:
+        """A preempt has ended the recovery."""
+        self.flag = False
+        if 'preempted' in self.plan.outcomes:
+            return Way('preempted', False)
+        if failed.ending is None:
+            raise Raised()
+        return failed.ending
 
     def _by_itself(self: Any, label: str, decision: Decision) -> Way:
         self._count_recovery(label)
@@ -91,7 +102,7 @@ class Recovering:
             self.tell('PRECONDITION_START', label, '', check.name)
             is_met = yield from self._check(label, check)
             self.tell('PRECONDITION_END', label, 'met' if is_met else 'not met', check.name)
-            if not is_met:
+            if not is_met or self.flag:
                 self.userdata.clear()
                 self.userdata.update(before)
                 return False
@@ -105,12 +116,13 @@ class Recovering:
                 self.userdata[check.writes] = '{}/{} {}#{}'.format(
                     self.path, label, check.name, number)
             return self.run.plan.holds(self.path, label, check, number)
+        self.current = self.child(check.name)
         try:
-            outcome = yield from self.child(check.name).execute(View(
+            outcome = yield from self.current.execute(View(
                 self.userdata, self.plan.remappings.get(check.name, {})))
         except Raised:
             return False
-        return self.failure_of(check.name, outcome, False) is None
+        return outcome != 'preempted' and self.failure_of(check.name, outcome, False) is None
 
     def _wrote(self: Any, check: Any) -> Set[str]:
         if not check.is_label:
@@ -149,7 +161,7 @@ class Recovering:
                 level.count_failure(outer, level.memory.is_continuous(
                     self.run.plan.policy, inner.label))
                 level._tell_decision(inner.label, decision)
-                raise Jumping(level._to(decision, outer))
+                raise self.run.depart(self, level._to(decision, outer))
             ending = outer.ending
             if ending is not None and ending.is_state:
                 return
@@ -197,7 +209,7 @@ class Recovering:
             return way
         if reply.path in ('', self.path):
             return self.give_up(failed, Way(reply.name, False) if reply.name else failed.ending)
-        raise Jumping(Goal(self.run.machine(reply.path), gives_up=reply.name))
+        raise self.run.depart(self, Goal(self.run.machine(reply.path), gives_up=reply.name))
 
     def give_up(self: Any, failed: Failed, ending: Optional[Way]) -> Way:
         """End as settled, or go the author's way."""
@@ -244,7 +256,7 @@ class Recovering:
         """Go to a place of the tree."""
         goal = self.run.goal_of(self, path, label)
         if goal.machine is not self:
-            raise Jumping(goal)
+            raise self.run.depart(self, goal)
         return self.jump(failed, goal._replace(written=written))
 
     def _note_begins(self: Any, goal: Goal) -> None:
