@@ -1,10 +1,11 @@
 """Trees of SMACH made from a plan."""
 import threading
-from typing import Any, Callable, Dict, List
+import time
+from typing import Any, Callable, Dict, List, Optional
 
 import smach
 
-from .plan import CUT, MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
+from .plan import MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
 from .turns import Turns
 
 LIMIT_S = 0.02  # of states that overrun
@@ -105,20 +106,33 @@ class Scripted(smach.State):
 
     def _await_preempt(self) -> None:
         """Where a Concurrence around passes a preempt on in a thread of its own, wait for it."""
-        if _is_owed(self) and not self.preempt_requested():
+        branches = _owed_branches(self)
+        if branches and not self.preempt_requested():
             self._asked.wait(PREEMPT_S)
+        end = time.monotonic() + PREEMPT_S
+        while not all(branch.preempt_requested() for branch in branches):
+            if time.monotonic() > end:
+                return
+            time.sleep(0.001)  # upstream passes it on in a thread of its own
 
 
-def _is_owed(state: Any) -> bool:
-    """Whether a preempt is on its way; it is delivered once to each branch that runs."""
-    owed = False
+def _owed_branches(state: Any) -> List[Any]:
+    """The branches around, to which a preempt is on its way; it comes once to each that runs."""
+    owed = []
     while state is not None:
         around = getattr(state, 'around', None)
         if isinstance(around, Parallel) and state.plan_label in around.owed:
             around.owed.discard(state.plan_label)
-            owed = True
+            owed.append(state)
         state = around
     return owed
+
+
+class _Impatient(threading.Condition):
+    """Upstream's Concurrence looks every 0.1 s whether its threads have ended."""
+
+    def wait(self, timeout: Optional[float] = None) -> bool:
+        return super().wait(timeout and min(timeout, 0.002))
 
 
 class Parallel(smach.Concurrence):
@@ -132,6 +146,8 @@ class Parallel(smach.Concurrence):
         self._active = set()
         self.owed = set()
         self._child_termination_cb = self._branch_ended
+        if hasattr(self, '_done_cond'):
+            self._done_cond = _Impatient()
 
     def execute(self, *args: Any, **kwargs: Any) -> Any:
         """Run all branches."""

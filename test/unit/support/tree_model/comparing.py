@@ -5,6 +5,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 from .executing import Executed
 from .model import Model
+from .parts import UNSAID
 from .plan import CUT, TOP, Beside, TreePlan, nodes_below
 from .turns import Hang
 
@@ -118,7 +119,7 @@ def _is_same(one: Any, other: Any) -> bool:
     if one is None or other is None or len(one) != len(other):
         return one == other
     return all(abs(mine - theirs) < 1e-9 if isinstance(mine, float) and isinstance(theirs, float)
-               else mine == theirs for mine, theirs in zip(one, other))
+               else mine in (theirs, UNSAID) for mine, theirs in zip(one, other))
 
 
 def _by_path(course: List[Any], is_concurrent: bool) -> Dict[str, List[Any]]:

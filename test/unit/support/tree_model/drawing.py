@@ -28,9 +28,15 @@ class Shape(NamedTuple):
     leaf_branches: bool = False  # leafs directly in Iterators and Concurrences
     preempts: bool = True
     time_limits: bool = True
+    raising_branches: bool = True  # exceptions and strays in Concurrences
 
 
-def draw(seed: object, shape: Shape = Shape()) -> TreePlan:
+ANY = Shape()
+UPSTREAM = Shape(raising_branches=False)
+"""There a branch that raised is left preempted, and so is its next execution."""
+
+
+def draw(seed: object, shape: Shape = ANY) -> TreePlan:
     """The tree of that seed."""
     return _Drawing(str(seed), shape).plan()
 
@@ -96,7 +102,9 @@ class _Drawing:
     def _leaf(self, beside: bool) -> Leaf:
         chance = self._chance
         more = tuple(name for name in BAD + ('again',) if chance.random() < 0.4)
-        kinds = ['end'] * 6 + ['raise', 'stray']
+        kinds = ['end'] * 6
+        if self._shape.raising_branches or not beside:
+            kinds += ['raise', 'stray']
         if self._preempts:
             kinds.append('preempt')
         overruns = not beside and self._shape.time_limits and chance.random() < 0.02

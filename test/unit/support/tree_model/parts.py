@@ -5,6 +5,7 @@ from .plan import Beside, Leaf, Repeated
 from .scheduling import Course, Fork, Turn
 
 OVERRUN = object()
+UNSAID = '(as SMACH preempts)'  # the outcome of an Iterator or a Concurrence that is left
 
 
 class View:
@@ -54,7 +55,7 @@ class Part:
         self.parent = parent
         self.flag = False  # a preempt is requested
         self.settled = False  # its failure
-        self.left_with = 'preempted'
+        self.left_with = ''  # where a jump leaves it
         self.keys: Tuple[str, ...] = getattr(plan, 'keys', ())
 
     def request_preempt(self) -> None:
@@ -114,6 +115,7 @@ class IteratorPart(Part):
 
     def __init__(self, run: Any, plan: Repeated, path: str, parent: Any) -> None:
         super().__init__(run, plan, path, parent)
+        self.left_with = UNSAID
         self._child = run.part_of(plan.child, path, self)
         self.userdata: Dict[str, Any] = {}
         self._runs = False
@@ -166,6 +168,7 @@ class ConcurrencePart(Part):
 
     def __init__(self, run: Any, plan: Beside, path: str, parent: Any) -> None:
         super().__init__(run, plan, path, parent)
+        self.left_with = UNSAID
         self._children = [run.part_of(child, path, self) for child in plan.children]
         self.userdata: Dict[str, Any] = {}
         self._active: List[str] = []
