@@ -28,7 +28,8 @@ OLD_NAME = 'SM_ROOT'  # of machines that were given none, before they had that o
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
 KINDS = {kind.name.lower(): kind for kind in AnswerKind}
 _NAMED_BY = {'goto': 'state', 'supersede': 'outcome', 'interface': 'interface'}
-_FIELDS = ('kind', 'state', 'outcome', 'interface', 'outputs', 'why', 'delay_s', 'confirm')
+_FIELDS = ('kind', 'state', 'outcome', 'interface', 'outputs', 'why', 'delay_s', 'confirm',
+           'container')
 
 
 class _Choice(Protocol):
@@ -36,6 +37,9 @@ class _Choice(Protocol):
 
     @property
     def state(self) -> str: ...
+
+    @property
+    def container(self) -> str: ...
 
     @property
     def repeats(self) -> Sequence[str]: ...
@@ -52,15 +56,21 @@ class Rule(NamedTuple):
     why: str = ''
     delay_s: float = 0.0
     confirm: bool = False  # whether it may have a state repeated that is not repeated by itself
+    container: str = ''  # goto, give_up: path of another container than that of the failed state
 
     def why_not(self, choices: Iterable[_Choice]) -> str:
         """Why it must not answer a question with these choices, '' where it may."""
         repeats = self.kind == 'goto' and any(
-            choice.state == self.state and self.state in choice.repeats for choice in choices)
+            self._names(choice) and any(
+                (each + '/').endswith('/{}/'.format(choice.state)) or each == choice.state
+                for each in choice.repeats) for choice in choices)
         if not repeats or self.confirm:
             return ''
         return ('{} was done in this trial, and only a rule with confirm: true has it '
                 'repeated'.format(self.state))
+
+    def _names(self, choice: _Choice) -> bool:
+        return choice.state == self.state and self.container in ('', choice.container)
 
     def answer(self, by: str) -> Answer:
         """The answer; a rule that ignores has none.
@@ -68,7 +78,7 @@ class Rule(NamedTuple):
         :raises KeyError: for a rule that ignores.
         """
         return Answer(KINDS[self.kind], self.state, self.outcome, self.interface, self.outputs, by,
-                      self.why)
+                      self.why, self.container)
 
 
 class Rules:
@@ -170,7 +180,8 @@ def _parse_rule(key: str, value: object) -> Rule:
                           'a name; {} needs one'.format(kind))
     return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'),
                 _text(key, value, 'interface'), _outputs(key, value), _text(key, value, 'why'),
-                _delay_s(key, value), checks.flag(key + '.confirm', value.get('confirm', False)))
+                _delay_s(key, value), checks.flag(key + '.confirm', value.get('confirm', False)),
+                _text(key, value, 'container'))
 
 
 def _text(key: str, value: Mapping[str, Any], field: str) -> str:

@@ -3,6 +3,7 @@
 Text that a robot has sent comes out of `clean` fit for a terminal; a page shows it as text, never
 as markup.
 """
+import json
 import unicodedata
 from typing import Union
 
@@ -46,11 +47,20 @@ def failure_words(goal: ExpertQueryGoal) -> str:
     }.get(goal.failure_kind, 'failed')
 
 
+def _jumps_to(event: Union[OracleEvent, Event]) -> str:
+    """The state, or its path where it is in a container below."""
+    try:
+        data = json.loads(event.data) if isinstance(event.data, str) else event.data
+        return clean(str(data['to']))
+    except (ValueError, KeyError, TypeError):
+        return clean(event.target)
+
+
 def next_step_words(event: Union[OracleEvent, Event]) -> str:
     """An event that follows an answer, as a sentence; '' for events of other kinds."""
     state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
     return {
-        OracleEvent.JUMP: 'The machine goes to {}.'.format(target),
+        OracleEvent.JUMP: 'The machine goes to {}.'.format(_jumps_to(event)),
         OracleEvent.SUPERSEDE: '{} counts as having ended with {}.'.format(state, outcome),
         OracleEvent.GIVE_UP: '{} gives up{}.'.format(clean(event.path), _with(outcome)),
         OracleEvent.INTERFACE_START: 'Interface {} begins.'.format(target),

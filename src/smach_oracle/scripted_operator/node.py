@@ -141,7 +141,8 @@ class ScriptedOperator:
         self._warn(goal.failed_state, plan, offered)
         facts = QuestionFacts(goal.failed_state,
                               [choice.state
-                               for choice in goal.choices if not choice.blocked], offered, number,
+                               for choice in goal.choices
+                               if not (choice.blocked or choice.container)], offered, number,
                               plan.means != PUT_DOWN or scene.held_by(plan.arm) is not None,
                               plan.means != SHOW or what_to_show(scene) is not None)
         return choose_answer(plan, facts)

@@ -6,7 +6,7 @@ from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames, is_preempted
 
 from .faults import Fault
-from .trial_text import ProbedStep, TrialStep, lines_of, place_of
+from .trial_text import ProbedStep, TrialStep, jump_from, jump_to, lines_of, place_of
 
 
 class TrialEvidence(NamedTuple):
@@ -183,16 +183,18 @@ class ObservedTrial:
     def assert_jumped(self, state: str, to: str) -> 'ObservedTrial':
         """Fail unless the oracle went from a failed state to another (or the same) one.
 
+        Either may be in any container of the tree.
+
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
         self._check_name(state)
         jumps = [event for event in self.events if event.kind is EventKind.JUMP]
         return self._require(
-            any(_is_named(place_of(event), state) and _is_named(event.target, to)
+            any(_is_named(jump_from(event), state) and _is_named(jump_to(event), to)
                 for event in jumps),
             'the oracle was to go from {} to {}; its jumps: {}'.format(state, to, ', '.join(
-                '{} to {}'.format(place_of(event), event.target) for event in jumps) or 'none'))
+                '{} to {}'.format(jump_from(event), jump_to(event)) for event in jumps) or 'none'))
 
     def assert_all_faults_happened(self) -> 'ObservedTrial':
         """Fail where a fault did not happen, since its state or its visit was not reached.

@@ -33,6 +33,17 @@ def place_of(event: Event) -> str:
     return '{}/{}'.format(above, event.state) if above and event.state else event.state or above
 
 
+def jump_from(event: Event) -> str:
+    """Return the failed state of a JUMP, which may be in a container below, as `place_of` does."""
+    return below_top((event.data or {}).get('from', '')) or place_of(event)
+
+
+def jump_to(event: Event) -> str:
+    """Return where a JUMP leads, which may be in a container below, as `place_of` does."""
+    return (below_top((event.data or {}).get('to', ''))
+            or place_of(event._replace(state=event.target)))
+
+
 def lines_of(steps: Sequence[TrialStep]) -> List[str]:
     """Return the lines; those in the middle are left out where there are very many."""
     begin = steps[0].wall_time if steps else 0.0
@@ -126,7 +137,8 @@ _TEXTS: Dict[EventKind, Callable[[Event], str]] = {
     EventKind.PRECONDITION_END: lambda event: 'precondition {}: {}{}'.format(
         event.target, event.outcome, _because(event.text)),
     EventKind.DECISION: lambda event: 'decision: {}'.format(event.text),
-    EventKind.JUMP: lambda event: 'jump to {}{}'.format(event.target, _by(event)),
+    EventKind.JUMP: lambda event: 'jump to {}{}'.format(
+        (event.data or {}).get('to', event.target), _by(event)),
     EventKind.QUERY_OPENED: lambda event: 'question: {}'.format(event.text),
     EventKind.QUERY_ANSWERED: lambda event: 'answer{}: {}'.format(
         _by(event), ' '.join((event.outcome, event.target)).strip()),

@@ -5,6 +5,8 @@ from held import SETTINGS, expected, lacking
 
 HELD = expected('settings')
 TOKENS = 'tokens.txt'
+# defaults that have changed on purpose, as the changelog says; what a file sets itself stays
+CHANGED_DEFAULTS = {'.escalate: it was True, it is False': 'escalate:'}
 
 
 def test_every_file_is_read():
@@ -13,7 +15,10 @@ def test_every_file_is_read():
 
 @pytest.mark.parametrize('name', sorted(set(HELD) - {TOKENS}))
 def test_a_file_has_the_effective_values_that_it_had(name, monkeypatch):
-    assert not list(lacking(HELD[name], readings.settings(name, monkeypatch)))
+    text = (SETTINGS / name).read_text()
+    wrong = [each for each in lacking(HELD[name], readings.settings(name, monkeypatch))
+             if each not in CHANGED_DEFAULTS or CHANGED_DEFAULTS[each] in text]
+    assert not wrong
 
 
 def test_the_tokens_of_the_console_have_the_owners_that_they_had(tmp_path):

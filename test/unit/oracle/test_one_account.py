@@ -173,3 +173,32 @@ def test_where_all_levels_ask_the_question_says_what_each_has_tried():
     assert tried[0] == 'TOP/PICK: ARM failed (its first result): asks too'
     assert tried[1].startswith('TOP: precondition') and tried[2].startswith('TOP: PICK failed')
     assert machine.rate('ARM').failures == 0 and machine.rate('PICK').failures == 0
+
+
+@pytest.mark.parametrize('answers', [[give_up('odd')], [give_up('odd'), goto('PICK')]])
+def test_what_was_given_up_is_settled_whatever_its_outcome_is_called(answers):
+    inner = smach.StateMachine(outcomes=['done', 'odd', 'aborted'])
+    with inner:
+        smach.StateMachine.add('GRASP', Scripted('aborted', outcomes=('ok', 'aborted')),
+                               {'ok': 'done'})
+    outer = smach.StateMachine(outcomes=['done', 'aborted'])
+    with outer:
+        smach.StateMachine.add('PICK', inner, {'odd': 'aborted'})
+    expert = FakeExpert(*answers)
+    machine = Watched(outer, expert=expert, settings={'max_recoveries': 0})
+    assert machine.run() == 'aborted' and len(expert.questions) == 1
+
+
+def test_an_item_that_its_author_passes_over_is_passed_over_with_a_word():
+    grasp = Scripted('aborted')
+    iterator = smach.Iterator(outcomes=list(OUTCOMES), input_keys=[], output_keys=[],
+                              it=[1, 2], it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', chain(GRASP=grasp),
+                                           loop_outcomes=['done', 'aborted'])
+    expert = FakeExpert()
+    machine = Watched(chain(ALL=iterator), name='TOP', expert=expert,
+                      settings={'max_recoveries': 0})
+    assert machine.run() == 'done' and grasp.runs == 2 and not expert.questions
+    assert [event.text for event in machine.of(EventKind.WARNING)] == [
+        'its item is passed over with aborted']

@@ -1,7 +1,7 @@
 """What an expert may answer to a question, and how it is typed. Pure."""
 from typing import List, NamedTuple
 
-from smach_oracle.msg import ExpertDecision, ExpertQueryGoal
+from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, StateChoice
 from smach_oracle.oracle.asking.question import names
 from smach_oracle.oracle.errors import AnswerError
 
@@ -16,21 +16,23 @@ class AnswerOption(NamedTuple):
     kind: int  # as in ExpertDecision.msg
     name: str  # of the state, outcome or interface; '' for giving up as the failure would have
     blocked: str = ''  # why it cannot be chosen now
+    container: str = ''  # of the state, or that ends with the outcome; '': that of the failed state
 
     def decision(self) -> ExpertDecision:
         """A decision without outputs or reason."""
         field = {ExpertDecision.GOTO: 'state',
                  ExpertDecision.INTERFACE: 'interface'}.get(self.kind, 'outcome')
-        return ExpertDecision(kind=self.kind, **{field: self.name})
+        return ExpertDecision(kind=self.kind, container=self.container, **{field: self.name})
 
 
 def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
     """All possible answers, in the order in which they are shown."""
     found = [
-        AnswerOption(str(number), _goto_words(goal, choice.state), ExpertDecision.GOTO,
-                     choice.state, choice.blocked) for number, choice in enumerate(goal.choices, 1)
+        AnswerOption(str(number), _goto_words(goal, choice), ExpertDecision.GOTO,
+                     choice.state, choice.blocked, choice.container)
+        for number, choice in enumerate(goal.choices, 1)
     ]
-    states = {choice.state for choice in goal.choices}
+    states = {choice.state for choice in goal.choices if not choice.container}
     # first those with which the machine goes on: s1 is then seldom the failure itself
     outcomes = sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)
     found += [
@@ -43,19 +45,29 @@ def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
         for number, outcome in enumerate(goal.give_up_outcomes, 1)
     ]
     found += [
+        AnswerOption('g{}'.format(number), 'give_up {}/{}'.format(each.container, each.outcome),
+                     ExpertDecision.GIVE_UP, each.outcome, container=each.container)
+        for number, each in enumerate(goal.give_up_above, 1 + len(goal.give_up_outcomes))
+    ]
+    found += [
         AnswerOption('i{}'.format(number), 'interface ' + offer.name, ExpertDecision.INTERFACE,
                offer.name) for number, offer in enumerate(goal.interfaces, 1)
     ]
     return found
 
 
-def is_wait_on(goal: ExpertQueryGoal, state: str) -> bool:
+def is_wait_on(goal: ExpertQueryGoal, choice: StateChoice) -> bool:
     """Whether to go to a state means to let it run on."""
-    return still_runs(goal) and state == goal.failed_state
+    return still_runs(goal) and (choice.container, choice.state) == ('', goal.failed_state)
 
 
-def _goto_words(goal: ExpertQueryGoal, state: str) -> str:
-    return 'wait on' if is_wait_on(goal, state) else 'goto ' + state
+def path_of(choice: StateChoice) -> str:
+    """Return a state's label, behind its path where it is in another container."""
+    return '{}/{}'.format(choice.container, choice.state) if choice.container else choice.state
+
+
+def _goto_words(goal: ExpertQueryGoal, choice: StateChoice) -> str:
+    return 'wait on' if is_wait_on(goal, choice) else 'goto ' + path_of(choice)
 
 
 def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
@@ -82,7 +94,9 @@ def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
 
 def _matching(typed: str, available: List[AnswerOption]) -> List[AnswerOption]:
     for fits in (lambda option: option.key == typed.lower(), lambda option: option.words == typed,
-                 lambda option: typed != '' and option.name == typed,
+                 lambda option: typed != '' and option.name == typed and not option.container,
+                 lambda option: typed != '' and typed in (
+                     option.name, '{}/{}'.format(option.container, option.name)),
                  lambda option: typed.lower() in ('s', 'i') and option.key[0] == typed.lower()):
         matching = [option for option in available if fits(option)]
         if matching:

@@ -107,7 +107,8 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
 
 
 def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
-    keys = {option.name: option.key for option in found if option.kind == ExpertDecision.GOTO}
+    keys = {(option.container, option.name): option.key
+            for option in found if option.kind == ExpertDecision.GOTO}
     table = _table('', 'state', 'success', 'class', 'visits', 'on arrival')
     for choice in goal.choices:
         dim = 'dim' if choice.blocked else ''
@@ -115,9 +116,11 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
         bar = rate_bar(choice.predicted_success, 6)
         bar.stylize(dim or rate_colour(rate))  # the colour is that of its failure rate
         name = Text(clean(choice.state), dim or 'bold')
-        if is_wait_on(goal, choice.state):
+        if choice.container:
+            name = Text.assemble((clean(choice.container) + '/', 'dim'), name)
+        if is_wait_on(goal, choice):
             name = Text.assemble(('wait on', 'bold green'), ' (', name, ' runs on)')
-        table.add_row(keys[choice.state], name, bar,
+        table.add_row(keys[choice.container, choice.state], name, bar,
                       Text(CLASS_NAMES.get(choice.failure_class, '?'), dim or rate_colour(rate)),
                       str(choice.visits), _arrival(choice))
     return table

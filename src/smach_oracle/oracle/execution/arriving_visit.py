@@ -4,6 +4,7 @@ from typing import Mapping, Optional
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
 from ..places.way import Way
+from ..records.facts import LEFT
 from ..records.state_record import StateRecord
 from ..recovery.arrival_recovery import ArrivalRecovery
 from ..recovery.failure import Failure
@@ -13,6 +14,8 @@ from .oracle_visit import OracleVisit
 
 class ArrivingVisit(OracleVisit):
     """The way through the meta state of a verdict that comes from a container below."""
+
+    _facts = LEFT
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
                  departure: Departure) -> None:

@@ -60,10 +60,11 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     containers is preempted.
     """
     arrives_at = verdict.arrives_at
-    assert arrives_at is not None
-    left = _left_for(node, arrives_at)
-    departure = Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))
-    if not left or not _claim([*left, arrives_at], departure):
+    left = [] if arrives_at is None else _left_for(node, arrives_at)
+    if arrives_at is None or not left:
+        return False
+    if not _claim([*left, arrives_at],
+                  Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))):
         return False
     state = arrives_at.machine._current_state
     where = (verdict.way.down[-1].path if verdict.way is not None

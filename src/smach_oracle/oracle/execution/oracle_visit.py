@@ -27,6 +27,8 @@ from .transitions import go_to, message_of, terminate
 class OracleVisit:
     """The way of one failure into the meta state and out of it."""
 
+    _facts: Mapping[str, Any] = {}  # further fields of the TRANSITION to the meta state
+
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure) -> None:
         self._node = node
         self._machine = node.machine
@@ -81,7 +83,8 @@ class OracleVisit:
         node, label, meta_label = self._node, self._record.label, self._node.settings.oracle_label
         self._record.left_by(what, meta_label)
         save_rates(node)
-        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=meta_label)
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=meta_label,
+                  **self._facts)
 
     def _note_superseded(self, outcome: str) -> None:
         node, record = self._node, self._record
@@ -180,10 +183,9 @@ class OracleVisit:
         ending, text = verdict.ending, verdict.text
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
         node = self._node
-        node.gave_up = ending.error is not None or (
-            ending.outcome is not None and ending.outcome in node.in_force.failing)
+        node.gave_up = ending.state is None
         node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
-                        target=ending.state or '', by=verdict.by, text=told)
+                  target=ending.state or '', by=verdict.by, text=told)
         if ending.error is not None:
             smach.logerr(str(ending.error))
             raise ending.error

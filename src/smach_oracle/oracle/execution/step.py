@@ -1,6 +1,6 @@
 """What happens around a state, off the short way of a plain success in container.py."""
 import time
-from typing import Any, Optional
+from typing import Any, Mapping, Optional
 
 import smach
 
@@ -12,7 +12,7 @@ from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind, FailureKind
-from ..records.facts import UNCOUNTED
+from ..records.facts import LEFT, UNCOUNTED
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery.failure import (
@@ -31,6 +31,8 @@ from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
+
+NO_FACTS: Mapping[str, Any] = {}
 
 
 def before_step(node: TreeNode) -> bool:
@@ -200,7 +202,7 @@ class Step:
         node.records.visit_ended(record, told, departure.result_of(node))
         if departure.arrives_at is not node:
             wanted = leaving_outcome(self._machine, node.in_force.failing, None)
-            return self._advance(told, Route(wanted, False), counted=False)
+            return self._advance(told, Route(wanted, False), facts=LEFT)
         recall_preempts(self._machine._states[record.label])
         failure = Failure(record.label, FailureKind.TIME_LIMIT, told,
                           'was left, as {} failed'.format(departure.failed), None)
@@ -223,7 +225,8 @@ class Step:
         if self._author_recovers(failure):
             if not why:
                 node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
-            return self._end_unrecovered(self._natural_ending(failure), failure, counted=not why)
+            return self._end_unrecovered(self._natural_ending(failure), failure,
+                                         UNCOUNTED if why else NO_FACTS)
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
         return UnwellVisit(node, record, failure, why).run(self._context(), False)
@@ -292,25 +295,24 @@ class Step:
         return self._natural_ending(failure)
 
     def _end_unrecovered(self, ending: ContainerEnding, failure: Failure,
-                         counted: bool = True) -> Optional[str]:
+                         facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:
         if ending.error is not None:
             if isinstance(ending.error, smach.InvalidUserCodeError):
                 smach.logerr("State '{}' ended in an error.".format(self._record.label))
             raise ending.error
         route = (Route(ending.state, True) if ending.state is not None
                  else Route(str(ending.outcome), False))
-        return self._advance(failure.outcome, route, counted=counted)
+        return self._advance(failure.outcome, route, facts=facts)
 
     def _advance(self, outcome: str, route: Route, learn: bool = False,
-                 counted: bool = True) -> Optional[str]:
+                 facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:
         """Make the transition that the author drew; `learn`: take the short way next time.
 
-        `counted`: whether it says how good the state is.
+        `facts`: further fields of the event.
         """
         node, label = self._node, self._record.label
         self._record.left_by(outcome, route.target)
-        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target,
-                  **({} if counted else UNCOUNTED))
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target, **facts)
         if not route.is_state:
             return terminate(node, label, outcome, route.target)
         message = message_of(label, outcome, route.target)

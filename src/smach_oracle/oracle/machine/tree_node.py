@@ -65,7 +65,7 @@ class TreeNode:
         # where a verdict from below or here ends the present state (execution.departure)
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
-        self.gave_up = False  # the latest execution ended so, in a failure
+        self.gave_up = False  # the latest execution ended so
         self.join(tree)
 
     def take_name(self, name: str) -> None:

@@ -16,6 +16,10 @@ NOT_COUNTED = 'not_counted'
 UNCOUNTED: Mapping[str, Any] = {'text': 'not counted, as the robot is not well',
                                 'data': {NOT_COUNTED: True}}
 
+# fields of the TRANSITION of a state that was left for a state of another container
+LEFT: Mapping[str, Any] = {'text': 'left for a state of another container',
+                           'data': {NOT_COUNTED: True}}
+
 _OLD_SPENT = ' spent on it'
 _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
 

@@ -1,5 +1,5 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
-from typing import FrozenSet, List, NamedTuple, Optional
+from typing import Any, FrozenSet, List, NamedTuple, Optional
 
 import smach
 
@@ -17,6 +17,18 @@ from .failure import ContainerEnding, Failure, author_recovers, failure_kind, ro
 from .stop import Stop
 
 
+def passed_over(node: TreeNode, ending: ContainerEnding) -> str:
+    """Return the outcome with which an Iterator around a container goes on, '' for none."""
+    above = next(levels_above(node), None)
+    if above is None or is_direct(node) or ending.outcome is None:
+        return ''
+    around: Any = above.machine._states[node.below[0]]
+    for label in node.below[1:-1]:
+        around = around.get_children()[label]
+    goes_on = isinstance(around, smach.Iterator) and ending.outcome in around._loop_outcomes
+    return ending.outcome if goes_on else ''
+
+
 def foreseen_above(node: TreeNode, ending: ContainerEnding) -> str:
     """Return which transition of the author's recovers from the end of a container, '' for none.
 
@@ -26,8 +38,11 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> str:
     outcome = ending.outcome
     while outcome is not None and node.parent is not None:
         above = node.parent
-        if above not in list(levels_above(node))[:1] or not is_direct(node):
+        if above is not next(levels_above(node), None):
             return ''
+        if not is_direct(node):
+            goes_on = passed_over(node, ContainerEnding(outcome=outcome))
+            return '{} {} -> the next item'.format(node.path, outcome) if goes_on else ''
         label = node.below[0]
         settings = above.settings_of(label)
         route = route_of(above.machine, label, outcome)

@@ -26,6 +26,7 @@ from .levels import (
     failure_above,
     foreseen_above,
     levels_that_may_decide,
+    passed_over,
     runs_as_precondition,
 )
 from .obeying import verdict_of
@@ -95,7 +96,7 @@ class Recovery:
         if outer is not None:
             record.recoveries += 1
             return self._jump(outer.way, outer.written, outer.text, is_failure_above=True)
-        return self._give_up('{}: {}'.format(self._cause, nobody)) if nobody else self._ask()
+        return self._give_way(nobody) if nobody else self._ask()
 
     def _tell_decision(self, decided: Decided) -> None:
         decider, facts = decided
@@ -135,6 +136,13 @@ class Recovery:
             return ''
         foreseen = foreseen_above(self._node, self._natural_ending())
         return 'its author goes on from there ({})'.format(foreseen) if foreseen else ''
+
+    def _give_way(self, why: str) -> Verdict:
+        """End the container, and leave all else to who is above it."""
+        outcome = passed_over(self._node, self._natural_ending())
+        if outcome:
+            self.warn('its item is passed over with {}'.format(outcome))
+        return self._give_up('{}: {}'.format(self._cause, why))
 
     def _levels_that_may_decide(self, decider: Decider) -> List[TreeNode]:
         """Return them, innermost first; none where the failure is to be asked about at once."""

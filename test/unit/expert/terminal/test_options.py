@@ -5,7 +5,7 @@ from expert_fixtures import make_question
 
 from smach_oracle.expert.terminal.options import choose, options
 from smach_oracle.msg import ExpertDecision
-from smach_oracle.oracle.asking.question import OutcomeChoice
+from smach_oracle.oracle.asking.question import LevelOutcome, OutcomeChoice
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.ros.expert.answer_rules import check_decision
@@ -73,3 +73,20 @@ def test_an_answer_is_typed_by_key_by_words_or_by_a_name_of_its_own(typed, kind,
 def test_what_means_nothing_or_too_much_is_told(typed, text):
     with pytest.raises(AnswerError, match=text):
         choose(typed, options(GOAL))
+
+
+def test_states_and_ends_of_other_containers_are_named_by_their_paths():
+    choice = make_question().choices[0]
+    asked = to_goal(make_question(
+        choices=tuple(choice._replace(state=state, container=container) for state, container in (
+            ('GRASP', ''), ('GRASP', 'TASK/PICK'), ('LOOK', 'TASK'))),
+        give_up_outcomes=('aborted',), give_up_above=(LevelOutcome('TASK', 'aborted'),)),
+        '/robot', rospy.Time(1))
+    found = options(asked)
+    assert [option.words for option in found if option.key in ('1', '2', '3', 'g2')] == [
+        'goto GRASP', 'goto TASK/PICK/GRASP', 'goto TASK/LOOK', 'give_up TASK/aborted']
+    for typed, container, state in (('GRASP', '', 'GRASP'), ('LOOK', 'TASK', 'LOOK'),
+                                    ('TASK/PICK/GRASP', 'TASK/PICK', 'GRASP')):
+        decision = choose(typed, found).decision()
+        assert (decision.container, decision.state) == (container, state)
+    assert choose('g2', found).decision().container == 'TASK'

@@ -84,7 +84,7 @@ class QuestionCommands:
     def _answer(self, command: PageCommand, person: Person, listed: ListedQuestion) -> CommandReply:
         arguments = command.arguments
         decision = ExpertDecision(kind=_KIND[arguments['kind']], by=person.expert,
-                                  why=arguments['why'])
+                                  why=arguments['why'], container=arguments['container'])
         setattr(decision, _FIELD[arguments['kind']], arguments['name'])
         decision.outputs = items(arguments['outputs'], listed.goal)
         response = self._front_end.server(listed).answer(listed.goal.query_id, decision)

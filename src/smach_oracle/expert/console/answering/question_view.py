@@ -40,7 +40,9 @@ def question_view(listed: ListedQuestion, epoch_s: float,
             'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')
         } for visit in goal.history], 'choices': _choices(goal, recovery_counts),
         'supersede': _supersede(goal), 'outputs': list(goal.output_keys),
-        'give_up': list(goal.give_up_outcomes), 'interfaces': [
+        'give_up': list(goal.give_up_outcomes), 'give_up_above': [
+            {'container': each.container, 'outcome': each.outcome} for each in goal.give_up_above
+        ], 'interfaces': [
             {'name': offer.name, 'description': offer.description} for offer in goal.interfaces
         ], 'userdata': [_item(item) for item in goal.userdata]
     }
@@ -49,17 +51,18 @@ def question_view(listed: ListedQuestion, epoch_s: float,
 def _choices(goal: ExpertQueryGoal,
              recovery_counts: Callable[[str], RecoveryCounts]) -> List[Dict[str, Any]]:
     return [{
-        'state': choice.state, 'success': number(choice.predicted_success),
+        'state': choice.state, 'container': choice.container,
+        'success': number(choice.predicted_success),
         'class': choice.failure_class, 'visits': choice.visits,
         'missing': list(choice.missing_keys), 'preconditions': list(choice.preconditions),
         'blocked': choice.blocked, 'repeats': list(choice.repeats),
-        'helped': list(recovery_counts(choice.state))
+        'helped': [0, 0] if choice.container else list(recovery_counts(choice.state))
     } for choice in goal.choices]
 
 
 def _supersede(goal: ExpertQueryGoal) -> List[Dict[str, str]]:
     """First those with which the machine goes on."""
-    states = {choice.state for choice in goal.choices}
+    states = {choice.state for choice in goal.choices if not choice.container}
     return [{
         'outcome': choice.outcome, 'target': choice.target
     } for choice in sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)]

@@ -105,7 +105,8 @@ COMMANDS: Dict[str, CommandSpec] = {
     'release': CommandSpec('operator', QUESTION),
     'answer': CommandSpec(
         'operator',
-        dict(QUESTION, kind=one_of(KINDS), name=text(400), outputs=outputs, why=text(2000))),
+        dict(QUESTION, kind=one_of(KINDS), name=text(400), container=text(4000),
+             outputs=outputs, why=text(2000))),
     **MARKING_COMMANDS,
     **DRIVING_COMMANDS,
 }

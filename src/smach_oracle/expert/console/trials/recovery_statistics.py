@@ -46,7 +46,8 @@ class RecoveryStatistics:
         elif event.kind == EventKind.SUPERSEDE:
             trying[event.state] = ''  # the jump that follows is where its outcome leads, and no try
         elif event.kind == EventKind.JUMP and trying.pop(event.state, None) is None:
-            trying[event.state] = event.target
+            if 'from' not in (event.data or {}):  # else the failure was in a container below
+                trying[event.state] = event.target
         elif event.kind == EventKind.TRANSITION and is_counted(event):
             self._count(robot, event.path, event.state, trying.pop(event.state, None), True)
         elif event.kind == EventKind.CONTAINER_END:

@@ -30,7 +30,7 @@ def test_an_answer_is_taken_apart():
         text(**ANSWER, outputs=[{'key': 'grasp', 'value': [1, {'a': None}]}], why='it slipped'))
     assert (command.number, command.name) == (1, 'answer')
     assert command.arguments == {
-        'question': 'q', 'kind': 'goto', 'name': 'PICK', 'why': 'it slipped',
+        'question': 'q', 'kind': 'goto', 'name': 'PICK', 'container': '', 'why': 'it slipped',
         'outputs': [TypedOutput('grasp', [1, {'a': None}], '')]
     }
 
@@ -138,5 +138,6 @@ def test_no_command_names_a_topic_a_service_or_a_type():
     fields = {field for spec in COMMANDS.values() for field in spec.checks}
     assert fields == {
         'xsrf', 'expert', 'trial', 'question', 'kind', 'name', 'outputs', 'why', 'stamp', 'region',
-        'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent', 'arm'
+        'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent', 'arm',
+        'container'
     }

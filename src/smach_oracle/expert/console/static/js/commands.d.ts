@@ -12,7 +12,13 @@ export interface Output { key: string; value: unknown; type: string }
 
 export type AnswerKind = 'goto' | 'supersede' | 'give_up' | 'interface';
 
-export interface Answer { kind: AnswerKind; name: string; outputs: Output[]; why: string }
+export interface Answer {
+  kind: AnswerKind;
+  name: string;
+  container: string; // path of another one than that of the failed state; '': that one
+  outputs: Output[];
+  why: string;
+}
 
 /** A line on an image, px. */
 export interface Stroke { foreground: boolean; width: number; points: Point[] }

@@ -83,6 +83,7 @@ export interface Question {
   supersede: OutcomeChoice[];
   outputs: string[]; // keys of the userdata that the state writes
   give_up: string[]; // outcomes
+  give_up_above: LevelOutcome[]; // of the containers above
   interfaces: InterfaceOffer[];
   userdata: UserdataItem[];
 }
@@ -93,6 +94,7 @@ export interface Visit { state: string; outcome: string; result: VisitResult }
 /** A state to go to. */
 export interface StateChoice {
   state: string;
+  container: string; // path of another one than that of the failed state; '': that one
   success: number | null; // predicted, 0 to 1
   class: FailureClass;
   visits: number; // in this trial
@@ -103,6 +105,7 @@ export interface StateChoice {
   helped: [helped: number, tried: number]; // how often going there helped
 }
 
+export interface LevelOutcome { container: string; outcome: string }
 export interface OutcomeChoice { outcome: string; target: string }
 export interface InterfaceOffer { name: string; description: string }
 

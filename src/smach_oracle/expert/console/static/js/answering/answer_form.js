@@ -77,10 +77,11 @@ export class AnswerForm {
   /**
    * @param {AnswerKind} kind
    * @param {string} name
+   * @param {string} [container] of a state or an outcome that is another container's
    */
-  send(kind, name) {
+  send(kind, name, container = '') {
     const outputs = readOutputs(kind === 'supersede' ? this.outputs : [], this.problem);
-    if (outputs) this.onAnswer({ kind, name, outputs, why: this.why.value });
+    if (outputs) this.onAnswer({ kind, name, container, outputs, why: this.why.value });
   }
 
   /**
@@ -102,11 +103,20 @@ export class AnswerForm {
 
   /** @returns {Child} */
   goTo() {
-    const { choices } = this.question;
+    const choices = this.question.choices.filter(({ container }) => !container);
     const first = choices.length <= MOST_AT_ONCE ? choices : likeliest(this.question);
     const rest = choices.filter((choice) => !first.includes(choice));
     return [h('h4', {}, 'Go to', this.preemptHint()), choicesBox(first.map((choice, index) => (
-      this.state(choice, String(index + 1))))), rest.length > 0 && this.otherStates(rest)];
+      this.state(choice, String(index + 1))))), rest.length > 0 && this.otherStates(rest),
+    this.elsewhere()];
+  }
+
+  /** @returns {Child} */
+  elsewhere() {
+    const choices = this.question.choices.filter(({ container }) => container);
+    return choices.length > 0 && h('div', { class: 'elsewhere' },
+      this.folded(choices, choices.length === 1 ? '1 state of another container'
+        : choices.length + ' states of other containers'));
   }
 
   /** @returns {Child} */
@@ -117,17 +127,24 @@ export class AnswerForm {
   }
 
   /** @param {StateChoice[]} choices */
-  otherStates(choices) {
+  otherStates(choices) { return this.folded(choices, choices.length + ' more states'); }
+
+  /**
+   * States in a list that is opened on demand.
+   * @param {StateChoice[]} choices
+   * @param {string} title
+   */
+  folded(choices, title) {
     const buttons = choices.map((choice) => this.state(choice, ''));
     const filter = h('input', { type: 'search', class: 'state-filter',
       placeholder: 'Part of a name', 'aria-label': 'States whose name has',
       oninput: () => {
         const wanted = filter.value.trim().toLowerCase();
-        choices.forEach(({ state }, index) => {
-          buttons[index].hidden = !state.toLowerCase().includes(wanted);
+        choices.forEach(({ state, container }, index) => {
+          buttons[index].hidden = !(container + '/' + state).toLowerCase().includes(wanted);
         });
       } });
-    return h('details', { class: 'all-states' }, h('summary', {}, choices.length + ' more states'),
+    return h('details', { class: 'all-states' }, h('summary', {}, title),
       filter, choicesBox(buttons));
   }
 
@@ -136,14 +153,19 @@ export class AnswerForm {
    * @param {string} key
    */
   state(choice, key) {
-    const { state, preconditions, blocked } = choice;
+    const { state, container, preconditions, blocked } = choice;
     const words = stateLines(choice, this.question);
-    if (preconditions.length) {
+    if (preconditions.length && !container) {
       const list = new PreconditionList(preconditions);
       this.preconditions.set(state, list);
       words.push(list.root);
     }
-    const button = this.choice('goto', state, key, words);
+    const button = this.choice('goto', state, key, words,
+      () => this.send('goto', state, container));
+    if (container) {
+      button.dataset['container'] = container;
+      button.dataset['deliberate'] = 'goto ' + container + '/' + state;
+    }
     if (blocked) button.dataset['blocked'] = 'yes';
     return button;
   }
@@ -172,7 +194,8 @@ export class AnswerForm {
   makeGiveUp() {
     return new GiveUp(this.question,
       (outcome, key, words, act) => this.choice('give_up', outcome, key, words, act),
-      { send: (outcome) => this.send('give_up', outcome), changed: () => this.enable(this.on) });
+      { send: (outcome, container) => this.send('give_up', outcome, container),
+        changed: () => this.enable(this.on) });
   }
 }
 

@@ -50,11 +50,12 @@ export class FollowUp {
     this.stop = app.store.onEvents((slice) => this.take(slice));
   }
 
-  /** @param {Pick<Answer, 'kind' | 'name'>} answer */
+  /** @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer */
   begin(answer) {
     const { state, running } = this.question;
     const gaveUp = answer.kind === 'give_up';
-    this.waits = running && answer.kind === 'goto' && answer.name === state;
+    this.waits = running && answer.kind === 'goto' && answer.name === state
+      && !answer.container;
     this.title.className = gaveUp ? 'gave-up' : 'done';
     setText(this.title, (gaveUp ? '■ The robot gives up, as you said: '
       : '✓ The robot has your answer: ')
@@ -141,14 +142,15 @@ export class FollowUp {
 }
 
 /**
- * @param {Pick<Answer, 'kind' | 'name'>} answer
+ * @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer
  * @param {Question} question
  */
-function answerWords({ kind, name }, { state, path }) {
-  if (kind === 'goto') return 'go to ' + name;
+function answerWords({ kind, name, container }, { state, path }) {
+  if (kind === 'goto') return 'go to ' + (container ? container + '/' : '') + name;
   if (kind === 'supersede') return state + ' counts as done, with ' + name;
   if (kind === 'give_up') {
-    return path + ' ends ' + (name ? 'with ' + name : 'as the failure would have ended it');
+    return (container || path) + ' ends '
+      + (name ? 'with ' + name : 'as the failure would have ended it');
   }
   return 'interface ' + name;
 }

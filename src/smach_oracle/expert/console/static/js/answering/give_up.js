@@ -17,8 +17,8 @@ export class GiveUp {
   /**
    * @param {Question} question
    * @param {MakeButton} makeButton
-   * @param {{ send: (outcome: string) => void, changed: () => void }} use `changed`: whether it is
-   *   about to be sent
+   * @param {{ send: (outcome: string, container: string) => void, changed: () => void }} use
+   *   `changed`: whether it is about to be sent
    */
   constructor(question, makeButton, use) {
     this.question = question;
@@ -26,6 +26,7 @@ export class GiveUp {
     this.timer = 0;
     this.left = 0; // s until it is sent; 0 where nothing is about to be
     this.outcome = ''; // '': as the failure would have ended it
+    this.container = ''; // that ends; '': that of the failed state
     this.choices = h('div', { class: 'give-up-choices' }, this.buildChoices(makeButton));
     this.asking = h('div', { class: 'give-up-asking', role: 'group', 'aria-label': 'Give up',
       hidden: true });
@@ -46,15 +47,29 @@ export class GiveUp {
       ' would have ended ', path)];
     const others = outcomes.map((outcome) => makeButton(outcome, '',
       h('strong', {}, 'with ', outcome), () => this.ask(outcome)));
+    const above = this.question.give_up_above.map(({ container, outcome }) => {
+      const button = makeButton(outcome, '', h('strong', {}, container, ' with ', outcome),
+        () => this.ask(outcome, container));
+      button.dataset['container'] = container;
+      button.dataset['deliberate'] = 'give_up ' + container + '/' + outcome;
+      return button;
+    });
     return [h('div', { class: 'choices' }, makeButton('', 'g', asFailed, () => this.ask(''))),
       others.length > 0 && h('details', { class: 'other-ends' },
         h('summary', {}, 'Give up, and say that ', path, ' has ended otherwise'),
-        h('div', { class: 'choices short' }, others))];
+        h('div', { class: 'choices short' }, others)),
+      above.length > 0 && h('details', { class: 'ends-above' },
+        h('summary', {}, 'End a container above ', path),
+        h('div', { class: 'choices short' }, above))];
   }
 
-  /** @param {string} outcome */
-  ask(outcome) {
+  /**
+   * @param {string} outcome
+   * @param {string} [container] above that of the failed state
+   */
+  ask(outcome, container = '') {
     this.outcome = outcome;
+    this.container = container;
     const back = h('button', { 'data-action': 'keep', onclick: () => this.cancel() },
       'No, go back');
     replace(this.asking, h('p', {}, 'Give up? ', this.consequence()),
@@ -67,7 +82,8 @@ export class GiveUp {
   }
 
   consequence() {
-    const { path, state } = this.question;
+    const { state } = this.question;
+    const path = this.container || this.question.path;
     return this.outcome
       ? 'The work of ' + state + ' stays undone, and ' + path + ' ends with ' + this.outcome + '.'
       : 'The work of ' + state + ' stays undone, and ' + path
@@ -93,9 +109,9 @@ export class GiveUp {
   }
 
   send() {
-    const { outcome } = this;
+    const { outcome, container } = this;
     this.cancel();
-    this.use.send(outcome);
+    this.use.send(outcome, container);
   }
 
   /** Back to the choices; whether there was anything to take back. */

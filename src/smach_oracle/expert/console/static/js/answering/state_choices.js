@@ -35,8 +35,9 @@ export function likeliest({ choices, state, supersede, history }) {
  * @returns {Child[]}
  */
 export function stateLines(choice, { state: failed, running }) {
-  const same = choice.state === failed;
+  const same = choice.state === failed && !choice.container;
   return [
+    choice.container && h('span', { class: 'dim' }, breakable(choice.container, '/'), ' /'),
     h('span', { class: 'row' },
       h('strong', { class: 'ellipsis' }, same && running && 'Wait on: ',
         breakable(choice.state, '_')),

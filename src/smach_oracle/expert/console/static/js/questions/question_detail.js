@@ -202,14 +202,14 @@ export class QuestionDetail {
   follow() {
     if (this.followUp) return;
     const { now } = this;
-    this.turnTo({ kind: 'interface', name: now ? now.interface : '' });
+    this.turnTo({ kind: 'interface', name: now ? now.interface : '', container: '' });
     this.show();
   }
 
   /**
    * What the robot does takes the place of what it could do; where the page is narrow it comes
    * first.
-   * @param {Pick<Answer, 'kind' | 'name'>} answer
+   * @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer
    */
   turnTo(answer) {
     const followUp = new FollowUp(this.app, this.question, this.ways);
