@@ -143,7 +143,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         browser.click('#tab-trials')
         browser.click('.trial[data-number]', 40.0)
         browser.click('.broken-bags summary')
-        self.assertTrue(browser.says('torn.bag: damaged, or no bag', '.broken-bags li'))
+        self.assertTrue(browser.says('torn.bag: damaged, or ', '.broken-bags li'))
         self.assertIn('Trials in the bags', browser.text('.panel.trials .table-frame'))
         slider = browser.find('.replay [role=slider]')
         self.assertEqual(slider.get_attribute('aria-label'), 'Time in the trial')

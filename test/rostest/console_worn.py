@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""A page does not wear out: a question that was opened and left leaves nothing behind in it."""
+"""A page does not wear out: a question that was opened and left leaves nothing behind in it, and
+the list of trials comes only while somebody looks at it.
+"""
 import os
 import sys
 import unittest
@@ -32,6 +34,18 @@ const until = (selector) => new Promise((resolve) => {
   done();
 })();'''
 
+# everything that the page's sockets get
+LISTEN = '''
+window.heard = [];
+const Socket = window.WebSocket;
+window.WebSocket = class extends Socket {
+  constructor(...given) {
+    super(...given);
+    this.addEventListener("message", ({ data }) => window.heard.push(JSON.parse(data)));
+  }
+};'''
+LISTS = 'return window.heard.filter((each) => each.lists || each.sections?.trials)'
+
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Worn(ConsolePage, unittest.TestCase):
@@ -52,7 +66,25 @@ class Worn(ConsolePage, unittest.TestCase):
         }
         return metrics['Nodes'], metrics['JSEventListeners']
 
-    def test_a_question_that_was_left_leaves_nothing_behind(self):
+    def test_1_the_list_of_trials_comes_while_somebody_looks_at_it(self):
+        driver = self.browser.driver
+        driver.execute_cdp_cmd('Page.addScriptToEvaluateOnNewDocument', {'source': LISTEN})
+        driver.refresh()
+        self.browser.find('.question-row.pending')
+        driver.set_script_timeout(60)
+        driver.execute_async_script(OPEN_AND_LEAVE, 2)
+        self.assertEqual(self.browser.run(LISTS), [], 'the questions are looked at')
+        self.browser.click('#tab-trials')
+        self.browser.find('.trial-list .trial')
+        self.assertTrue(self.browser.run(LISTS)[0]['lists']['trials']['all'])
+        self.browser.click('#tab-questions')
+        driver.execute_async_script(OPEN_AND_LEAVE, 1)  # by then the server knows
+        before = self.browser.run(LISTS)
+        driver.execute_async_script(OPEN_AND_LEAVE, 5)
+        self.assertEqual(self.browser.run(LISTS), before, 'it was looked at before')
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_2_a_question_that_was_left_leaves_nothing_behind(self):
         driver = self.browser.driver
         driver.set_script_timeout(240)
         driver.execute_cdp_cmd('Performance.enable', {})

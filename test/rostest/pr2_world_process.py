@@ -24,6 +24,14 @@ from smach_oracle.srv import ResetWorld
 
 LIMIT_S = 40.0
 RUN = 'from smach_oracle.simulation.node.main import main; main()'
+# as on a machine with so much to do that the world's thread does not get on
+BUSY = """
+import time
+from smach_oracle.simulation.node import main
+judge = main.judge
+main.judge = lambda *of: time.sleep(4.0) or judge(*of)
+main.main()
+"""
 
 
 class Pr2WorldProcess(unittest.TestCase):
@@ -34,11 +42,11 @@ class Pr2WorldProcess(unittest.TestCase):
         os.close(handle)
         self.addCleanup(os.unlink, self.truth)
 
-    def world(self, **parameters: Any) -> Process:
+    def world(self, run: str = RUN, **parameters: Any) -> Process:
         # a name of its own: a master keeps the parameters of nodes that have ended
         arguments = ['__name:=world_of_' + self._testMethodName, '_truth_file:=' + self.truth]
         arguments += ['_{}:={}'.format(*parameter) for parameter in parameters.items()]
-        process = Process([sys.executable, '-c', RUN] + arguments)
+        process = Process([sys.executable, '-c', run] + arguments)
         self.addCleanup(process.stop)
         return process
 
@@ -81,6 +89,13 @@ class Pr2WorldProcess(unittest.TestCase):
                          [(1, 'pick_and_place', False), (2, 'pick_and_place', False)])
         self.assertEqual(self.lines()[0]['sim_s'], 0.0)
         self.assertTrue(0.3 < self.lines()[1]['sim_s'] < 20.0)
+
+    def test_the_last_line_is_waited_for_on_a_busy_machine(self) -> None:
+        process = self.world(run=BUSY, benign=True)
+        self.reset(1)
+        process.signal(signal.SIGINT)
+        process.wait(LIMIT_S)
+        self.assertEqual([line['seed'] for line in self.lines()], [1], process.output())
 
     def test_a_world_without_a_trial_has_no_truth_to_tell(self) -> None:
         process = self.world()

@@ -137,11 +137,10 @@ class IntrospectionTest(unittest.TestCase):
                 self.name + '/smach/container_status', SmachContainerStatus, lambda message:
                 (read.wait(30), self.statuses.append(message)), buff_size=1000)
             self.addCleanup(viewer.unregister)
-            self.assertTrue(wait_for(server._status_pub.get_num_connections))
+            self.assertTrue(wait_for(server._status_pub.is_heard))
             machine.execute()
             self.assertTrue(wait_for(lambda: not server._changes))
-            self.assertTrue(stays(lambda: introspection_server._waiting_bytes(
-                server._status_pub) < 4000000, 0.2))
+            self.assertTrue(stays(lambda: server._waiting_bytes() < 4000000, 0.2))
         self.assertIn('does not keep up', log.text())
         read.set()
         self.assertTrue(

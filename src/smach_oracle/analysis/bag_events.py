@@ -2,6 +2,7 @@
 import json
 import math
 import os
+import stat
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.errors import OracleError
@@ -9,6 +10,9 @@ from smach_oracle.oracle.records.events import Event, EventKind
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
+UNFINISHED = (  # why a bag is not used
+    'still being recorded, or its recorder died: start the recorder again in this folder, or run '
+    '`rosbag reindex` on it and take the .active off its name')
 _EVENTS = '/oracle/events'
 _KINDS = {int(kind): kind for kind in EventKind}
 
@@ -56,11 +60,12 @@ def find_bags(places: Sequence[str]) -> List[str]:
         elif not os.path.isdir(place):
             raise BagError('{}: no such folder'.format(place))
         else:
-            found.update((os.path.realpath(path), None) for path in _walk(place))
+            found.update((os.path.realpath(path), None) for path in walk_bags(place))
     return sorted(found)
 
 
-def _walk(folder: str) -> Iterator[str]:
+def walk_bags(folder: str) -> Iterator[str]:
+    """Paths of what has the name of a bag, in a folder and below; links to folders are left out."""
     for parent, _, names in os.walk(folder):
         for name in names:
             backup_of = name[:-len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
@@ -113,11 +118,10 @@ class EventReader:
         :raises BagError: where it cannot be used.
         """
         if path.endswith('.active'):
-            raise BagError(
-                'still being recorded, or its recorder died: start the recorder again in this '
-                'folder, '
-                'or run `rosbag reindex` on it and take the .active off its name')
+            raise BagError(UNFINISHED)
         try:
+            if not stat.S_ISREG(os.stat(path).st_mode):  # to open a pipe may wait for ever
+                raise BagError('no plain file')
             return self._read(path)
         except BagError:
             raise

@@ -1,8 +1,6 @@
 """Structures of machines, and images of failures, read from bags without ROS."""
 from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
 
-from rosbags.rosbag1 import Reader
-
 from .bag_events import MessageStores
 
 STRUCTURE_TYPE = 'smach_msgs/msg/SmachContainerStructure'
@@ -40,6 +38,7 @@ def read_machines(path: str) -> RecordedMachines:
     containers: Dict[str, RecordedContainer] = {}
     frames: List[FailureImage] = []
     stores = MessageStores()
+    from rosbags.rosbag1 import Reader  # only where bags are read
     with Reader(path) as reader:
         connections = [
             item for item in reader.connections if item.msgtype in (STRUCTURE_TYPE, FRAMES_TYPE)

@@ -15,9 +15,10 @@ from typing import IO, Any, Dict, List, Mapping, Optional
 
 LOG_FILE = 'launch.log'
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
-# s, before roslaunch kills a node that does not end
-NODE_STOP = ['--sigint-timeout', '5', '--sigterm-timeout', '2']
-STOP_S = 30.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
+# s, before roslaunch kills a node that does not end; on a busy machine the world takes some for the
+# last trial's line of truth
+NODE_STOP = ['--sigint-timeout', '15', '--sigterm-timeout', '2']
+STOP_S = 40.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
 KILL_S = 10.0  # for the kernel to take away what was killed
 # of which those are used that the system does not give to others by itself
 PORTS = range(20000, 65536)

@@ -59,10 +59,11 @@ def _jumps_to(event: Union[OracleEvent, Event]) -> str:
 def next_step_words(event: Union[OracleEvent, Event]) -> str:
     """An event that follows an answer, as a sentence; '' for events of other kinds."""
     state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
+    path = clean(event.path)
     return {
         OracleEvent.JUMP: 'The machine goes to {}.'.format(_jumps_to(event)),
         OracleEvent.SUPERSEDE: '{} counts as having ended with {}.'.format(state, outcome),
-        OracleEvent.GIVE_UP: '{} gives up{}.'.format(clean(event.path), _with(outcome)),
+        OracleEvent.GIVE_UP: '{} gives up{}.'.format(path, _with(outcome)),
         OracleEvent.INTERFACE_START: 'Interface {} begins.'.format(target),
         OracleEvent.INTERFACE_END: 'Interface {} ended{}.'.format(target, _with(outcome)),
         OracleEvent.STATE_START: '{} runs.'.format(state),
@@ -72,6 +73,11 @@ def next_step_words(event: Union[OracleEvent, Event]) -> str:
             clean(event.text)),
         OracleEvent.HEALTH_WAIT_END: '{}.'.format(
             clean(event.text[:1].upper() + event.text[1:])),
+        OracleEvent.HOLD_START: '{} waits before {} ({}).'.format(
+            path, state, clean(' by '.join(filter(None, (event.outcome, event.by))))),
+        OracleEvent.HOLD_END: '{} waits no longer before {}: {}.'.format(path, state, outcome),
+        OracleEvent.SENT: '{} was sent to {} instead of {}{}.'.format(
+            path, target, state, ' by ' + clean(event.by) if event.by else ''),
     }.get(event.kind, '')
 
 
@@ -98,6 +104,10 @@ def event_words(event: Event) -> str:
         EventKind.QUERY_EXPIRED: lambda: 'Nobody answered in time.',
         EventKind.QUERY_CANCELLED: lambda: 'The question was taken back.',
         EventKind.PREEMPT: lambda: '{} was asked to stop.'.format(event.path),
+        EventKind.ANNOUNCE: lambda: '{} is about to be entered.'.format(event.state),
+        EventKind.OPERATOR_COMMAND: lambda: 'Operator{}: {}. {}.'.format(
+            ' ' + event.by if event.by else '', event.outcome.replace('_', ' '),
+            clean(event.text[:1].upper() + event.text[1:])),
     }.get(event.kind)
     return sentence() if sentence else next_step_words(event)
 

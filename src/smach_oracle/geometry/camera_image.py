@@ -13,3 +13,7 @@ class CameraImage(NamedTuple):
     depth: np.ndarray
     intrinsics: np.ndarray  # (3, 3)
     base_from_camera: np.ndarray  # 4x4; camera: z forward, x right, y down; base: z up
+
+    def stride(self, columns: int) -> int:
+        """Of how many columns (and rows) to take one, so that about so many columns are left."""
+        return max(1, round(self.depth.shape[1] / columns))

@@ -1,5 +1,6 @@
 """The joints of a URDF, and how each moves the link that it carries: all kinematics begins here."""
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -87,8 +88,16 @@ def placed_parts(joints: Sequence[Joint], places: Sequence[np.ndarray]) -> np.nd
 def read_joints(urdf: str) -> Dict[str, Joint]:
     """The joints of a URDF by the link that each of them carries.
 
+    They are shared by all who ask for those of the same text: leave their arrays as they are.
+
     :raises ValueError: for text that is no URDF, or has no joints.
     """
+    return dict(_joints_of(urdf))
+
+
+@lru_cache(maxsize=4)
+def _joints_of(urdf: str) -> Mapping[str, Joint]:
+    """Of the same text the same: planners ask for those of their one robot again and again."""
     try:
         root = ElementTree.fromstring(urdf)
         joints = [_joint(element) for element in root.findall('joint')]

@@ -1,7 +1,8 @@
 """The executive. It imports smach and the standard library; its pure parts not even smach.
 
-From the top down, each package above all that follow it: `container`, the public face; `execution`,
-`recovery`, `machine`, `asking`, `records`, `settings`, `decision`. Pure are `decision`, `settings`,
+From the top down, each package above all that follow it: `operator_hand`, for operators;
+`container`, the public face; `execution`, `recovery`, `machine`, `control`, `asking`, `records`,
+`settings`, `decision`. Pure are `decision`, `settings`,
 all of `records` but the rates file, the question of `asking`, `errors`, `background` and
 `number_checks`.
 `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
     from .execution.unwrapping import unwrap
     from .machine.oracle import oracle_of
+    from .operator_hand import OperatorHand
     from .settings.settings import Settings
 
 _LAZY = {
@@ -21,10 +23,12 @@ _LAZY = {
     'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
     'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
     'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question',
+    'OperatorHand': 'operator_hand',
     'unwrap': 'execution.unwrapping'
 }
 __all__ = ['Answer', 'AnswerKind', 'Expert', 'ExponentialFailureRate', 'FailureClass',
-           'FailureRate', 'OracleContainer', 'Question', 'Settings', 'oracle_of', 'unwrap']
+           'FailureRate', 'OperatorHand', 'OracleContainer', 'Question', 'Settings',
+           'oracle_of', 'unwrap']
 
 
 def __getattr__(name: str) -> object:

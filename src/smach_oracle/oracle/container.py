@@ -94,7 +94,8 @@ class OracleContainer(smach.StateMachine):
             remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str,
                                                                                        Any]] = None,
             preconditions: Optional[List[Any]] = None, prior: Optional[float] = None,
-            time_limit_s: Optional[float] = None, on_retry: Optional[str] = None) -> smach.State:
+            time_limit_s: Optional[float] = None, on_retry: Optional[str] = None,
+            autonomy: Optional[str] = None) -> smach.State:
         """Add a state, with settings of its own, to the innermost open machine.
 
         The rest is as with `smach.StateMachine.add`.
@@ -105,7 +106,7 @@ class OracleContainer(smach.StateMachine):
             beside stays.
         """
         own = {'preconditions': preconditions, 'prior': prior, 'time_limit_s': time_limit_s,
-               'on_retry': on_retry}
+               'on_retry': on_retry, 'autonomy': autonomy}
         given = {key: value for key, value in own.items() if value is not None}
         machine = smach.StateMachine._currently_opened_container()
         if given and not isinstance(machine, OracleContainer):
@@ -286,8 +287,10 @@ class OracleContainer(smach.StateMachine):
                 record = records.by_label[label]
             except KeyError:
                 record = node.record(label)
-            if (self._preempt_requested or engine.attentive) and before_step(node):
-                return None
+            if self._preempt_requested or engine.attentive:
+                stop = before_step(node)
+                if stop is not None:
+                    return stop.outcome
             state: smach.State = self._current_state  # type: ignore[assignment]
             userdata = self.userdata
             view = record.view

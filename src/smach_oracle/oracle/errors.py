@@ -4,6 +4,7 @@
     +-- SettingsError (also a ValueError): a setting is wrong
     +-- AnswerError (also a ValueError): an expert's answer does not fit its question
     |     +-- InterfaceError: the interface that an expert chose cannot be used
+    +-- OperatorError (also a ValueError): an operator's command cannot be obeyed
     +-- TrialError: the executive was used out of order
 """
 import warnings
@@ -25,6 +26,10 @@ class SettingsError(OracleError, ValueError):
 
 class AnswerError(OracleError, ValueError):
     """An expert's answer does not fit its question; the text says what would."""
+
+
+class OperatorError(OracleError, ValueError):
+    """An operator's command cannot be obeyed; the text says why, and what is allowed."""
 
 
 class InterfaceError(AnswerError):

@@ -2,7 +2,7 @@
 import math
 import threading
 import time
-from typing import Dict, Optional, Sequence
+from typing import Dict, List, Optional, Sequence
 
 import genpy
 import numpy as np
@@ -32,6 +32,7 @@ from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, Gripp
 from .ros_senses import RosSenses
 
 NO_SNAPSHOT = 'none'
+CONNECTED_S = 60.0  # wall s that a simulated robot may take to be there
 
 
 class RosRobot:
@@ -46,6 +47,7 @@ class RosRobot:
 
     def __init__(self, snapshot: str = 'world/snapshot', timeout_s: float = 30.0) -> None:
         self._timeout_s = timeout_s
+        self._simulated = snapshot != NO_SNAPSHOT
         self._senses = RosSenses('' if snapshot == NO_SNAPSHOT else snapshot, timeout_s)
         self._links: Dict[str, GoalLink] = {}
         for side in (arm[0] for arm in ARMS):
@@ -60,6 +62,27 @@ class RosRobot:
 
     def _link(self, name: str, spec: type) -> None:
         self._links[name] = GoalLink(rospy.resolve_name(name), spec)
+
+    def wait_until_connected(self, limit_s: float = CONNECTED_S) -> List[str]:
+        """Wait until everything of a simulated robot is connected, both ways.
+
+        :param limit_s: wall s that it waits at most.
+        :returns: names of what is not there; [] too where the robot gives no snapshots: of a real
+            one some parts may be missing for good.
+        """
+        until = time.monotonic() + limit_s
+        lacking = self._lacking()
+        while lacking and time.monotonic() < until and not rospy.is_shutdown():
+            time.sleep(0.05)
+            lacking = self._lacking()
+        return lacking
+
+    def _lacking(self) -> List[str]:
+        if not self._simulated:
+            return []
+        return self._senses.lacking() + [
+            link.name for link in self._links.values() if not link.ready()
+        ]
 
     def abort(self) -> None:
         """Stop what moves now, and refuse all further calls until resume(); from any thread.

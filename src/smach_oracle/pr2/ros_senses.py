@@ -17,12 +17,13 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import from_quaternion
 from smach_oracle.ros.connections import ConnectionGrace, live_connections
 from smach_oracle.ros.images import ImageError, colour_of, depth_of, intrinsics_of
-from smach_oracle.srv import Snapshot
+from smach_oracle.srv import Snapshot, SnapshotResponse
 
 from .robot import RobotError
 
 KEPT = {Image: 4}  # messages of a topic
 KEPT_OTHERS = 200
+LOOK_S = 0.05  # wall s that a service that is not there is waited for
 AGAIN_S = 3.0  # wall s after which what was asked for is asked for anew
 T = TypeVar('T')
 
@@ -97,7 +98,9 @@ class RosSenses:
 
     def __init__(self, snapshot: str, timeout_s: float) -> None:
         self._timeout_s = timeout_s
-        self._snapshot = rospy.ServiceProxy(snapshot, Snapshot) if snapshot else None
+        self._snapshot_name = rospy.resolve_name(snapshot) if snapshot else ''
+        self._snapshot: Optional[rospy.ServiceProxy] = None  # while it is connected
+        self._calling = threading.Lock()
         self._states = MessageHistory('joint_states', JointState)
         self._starting = threading.Lock()
         # a world that gives snapshots sends images only when asked; a robot's stream is for those
@@ -105,13 +108,35 @@ class RosSenses:
         self._camera = self._subscribe() if snapshot else []
         self._buffer = tf2_ros.Buffer(rospy.Duration(60.0))
         self._listener = tf2_ros.TransformListener(self._buffer, tcp_nodelay=True)
+        self._tree_grace = ConnectionGrace()
+
+    def lacking(self) -> List[str]:
+        """What is not connected: the service for snapshots, topics.
+
+        For those that are, it waits until their publishers send to this node.
+        """
+        lacking = [topic.name for topic in [self._states] + self._camera if not topic.connected()]
+        if not self._tree_connected():
+            lacking.append('/tf')
+        try:
+            if self._snapshot_name:
+                rospy.wait_for_service(self._snapshot_name, LOOK_S)
+        except rospy.ROSException:
+            lacking.append(self._snapshot_name)
+        return lacking
+
+    def _tree_connected(self) -> bool:
+        found = live_connections(self._listener.tf_sub)
+        if found:
+            self._tree_grace.wait(found)
+        return bool(found)
 
     def joints(self) -> Dict[str, float]:
         """Joint positions, rad or m, now.
 
         :raises RobotError: where none come.
         """
-        message = self._states_of_snapshot() if self._snapshot else self._next_states()
+        message = self._states_of_snapshot() if self._snapshot_name else self._next_states()
         return dict(zip(message.name, message.position))
 
     def transform(self, target: str, source: str) -> np.ndarray:
@@ -119,7 +144,7 @@ class RosSenses:
 
         :raises RobotError: where it is not known.
         """
-        stamp = self._shot(False) if self._snapshot else self._next_states().header.stamp
+        stamp = self._shot(False) if self._snapshot_name else self._next_states().header.stamp
         return self._looked_up(target, source, stamp)
 
     def see(self, base: str, camera: str) -> CameraImage:
@@ -128,7 +153,7 @@ class RosSenses:
         :raises RobotError: where none comes, its pose is not known, or it holds no image.
         """
         topics = self._camera_topics()
-        if self._snapshot:
+        if self._snapshot_name:
             colour, depth, info = self._images_of_snapshot(topics)
             stamp = colour.header.stamp
         else:
@@ -194,14 +219,26 @@ class RosSenses:
     def _shot(self, camera: bool) -> rospy.Time:
         """Have the world publish a snapshot; its stamp."""
         self._connected(self._states)
+        self._tree_connected()
         try:
-            self._snapshot.wait_for_service(self._timeout_s)
-            answer = self._snapshot(camera)
+            answer = self._snapped(camera)
         except (rospy.ServiceException, rospy.ROSException) as err:
-            raise RobotError('{}: {}'.format(self._snapshot.resolved_name, err)) from err
+            raise RobotError('{}: {}'.format(self._snapshot_name, err)) from err
         if not answer.ok:
-            raise RobotError('{}: {}'.format(self._snapshot.resolved_name, answer.message))
+            raise RobotError('{}: {}'.format(self._snapshot_name, answer.message))
         return answer.stamp
+
+    def _snapped(self, camera: bool) -> SnapshotResponse:
+        """Ask for a snapshot over the connection of the last time, where that is still there."""
+        with self._calling:
+            if self._snapshot is not None:
+                try:
+                    return self._snapshot(camera)
+                except (rospy.ServiceException, rospy.ROSException):
+                    self._snapshot.close()  # the world has been started again, or is gone
+            rospy.wait_for_service(self._snapshot_name, self._timeout_s)
+            self._snapshot = rospy.ServiceProxy(self._snapshot_name, Snapshot, persistent=True)
+            return self._snapshot(camera)
 
     def _connected(self, topic: MessageHistory) -> None:
         until = time.monotonic() + self._timeout_s

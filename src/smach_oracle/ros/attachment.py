@@ -29,13 +29,14 @@ from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, Ora
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.settings.paths import path_of
 
-from . import introspection
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
 from .goal_tracking import track_goals_from_the_start
+from .hand.hand_server import HandServer
 from .health.health_port import listen_to_health
 from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
+from .introspection.container_watch import CALLBACK_LISTS, is_watched
 from .introspection.introspection_server import IntrospectionServer
 from .main_thread import keep_log_from_master
 from .master_watch import start_master_watch
@@ -78,6 +79,7 @@ class Attachments:
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
+        self._hand: Optional[HandServer] = None
         # bound once: a machine listens anew where it is given another one
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
@@ -126,6 +128,8 @@ class Attachments:
             self._on_ros.discard(machine)
             if self._rates is not None:
                 self._rates.forget(machine)
+            if self._hand is not None:
+                self._hand.forget(machine)
             path = oracle_of(machine).path
             shown = self._shown.get(path)
             if shown is not None and shown() is machine:
@@ -156,6 +160,7 @@ class Attachments:
         start_master_watch()
         self._events = EventPublisher()
         self._rates = RatesPublisher()
+        self._hand = HandServer()
 
     def _attach_to_node(self, machine: OracleContainer) -> None:
         introspect = private_flag('introspection', True)  # first, since it may raise
@@ -169,6 +174,8 @@ class Attachments:
             self._rates.watch(machine)
         if introspect and not has_introspection(machine):
             self._introspect(machine)
+        if self._hand is not None:
+            self._hand.watch(machine)
 
     def _introspect(self, machine: OracleContainer) -> None:
         """Show the machine in place of an earlier one of its name.
@@ -240,16 +247,19 @@ class Attachments:
 
 
 def has_introspection(machine: OracleContainer) -> bool:
-    """Whether an IntrospectionServer of smach_ros already listens to this machine.
+    """Whether a running IntrospectionServer, ours or upstream's, already listens to this machine.
 
     Told by its callbacks: the server of a script that was made before the machine first ran.
     """
-    callbacks: List[Tuple[Callable[..., None], Any]] = []
-    for name in ('_start_cbs', '_transition_cbs', '_termination_cbs'):
-        callbacks += getattr(machine, name, [])
-    owners = [getattr(callback[0], '__self__', callback[0]) for callback in callbacks]
-    return any(type(owner).__module__.startswith(('smach_ros.', introspection.__name__ + '.'))
-               for owner in owners)
+    callbacks = [each[0] for name in CALLBACK_LISTS for each in getattr(machine, name, ())]
+    return is_watched(machine) or any(
+        _is_running_proxy(getattr(callback, '__self__', None)) for callback in callbacks)
+
+
+def _is_running_proxy(owner: Any) -> bool:
+    """Whether this is upstream's proxy of a container, and its server was not stopped."""
+    return (type(owner).__module__ == 'smach_ros.introspection'
+            and getattr(owner, '_keep_running', True))
 
 
 def start_introspection(machine: OracleContainer) -> IntrospectionServer:

@@ -7,6 +7,7 @@ from .true_scene import TrueBody, TrueScene
 
 LEAST_VISIBLE = 0.35  # share of a thing's outline that must be free, to show it
 LEAST_PIXELS = 12  # px of its width and height
+_USUAL_WIDTH = 640.0  # px of an image, for which these are
 _EDGE_SIGMA = 2.5  # px, by which a person misses each edge of the rectangle
 _MARGIN = 6  # px that a person leaves around it
 _TOO_FAR = 0.025  # m between the marked and the true middle that a person lets pass
@@ -70,11 +71,12 @@ def show(segment: SegmentCall, thing: TrueBody, image: Tuple[int, int],
 def rectangle(region: Region, image: Tuple[int, int], generator: np.random.Generator) -> Region:
     """A rectangle about a region (px), drawn by hand, within the image."""
     left, top, width, height = region
-    missed = generator.normal(0.0, _EDGE_SIGMA, 4)
+    scale = image[0] / _USUAL_WIDTH  # a small image is shown as large as any
+    missed, margin = scale * generator.normal(0.0, _EDGE_SIGMA, 4), scale * _MARGIN
     x, right = (int(np.clip(round(edge), 0, image[0]))
-                for edge in (left - _MARGIN + missed[0], left + width + _MARGIN + missed[1]))
+                for edge in (left - margin + missed[0], left + width + margin + missed[1]))
     y, bottom = (int(np.clip(round(edge), 0, image[1]))
-                 for edge in (top - _MARGIN + missed[2], top + height + _MARGIN + missed[3]))
+                 for edge in (top - margin + missed[2], top + height + margin + missed[3]))
     return x, y, max(right - x, 1), max(bottom - y, 1)
 
 

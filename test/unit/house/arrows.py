@@ -11,7 +11,8 @@ ARROWS: Dict[str, Set[str]] = {
     'oracle': set(),
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
-            'oracle.settings', 'oracle.OracleContainer', 'oracle.oracle_of'},
+            'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
+            'oracle.oracle_of'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -41,16 +42,18 @@ Layer = Union[str, Set[str]]
 # below it alone: names in one set do not know each other.
 LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
-        'prospects', 'container', 'question', 'execution', 'recovery', 'places', 'machine',
-        'asking', 'records', 'settings', 'decision', 'number_checks', 'background', 'errors'
+        'prospects', 'operator_hand', 'container', 'question', 'execution', 'recovery', 'places',
+        'machine', 'control', 'asking', 'records', 'settings', 'decision', 'number_checks',
+        'background', 'errors'
     ],
     'ros': [
-        'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health'},
+        'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
+                                                 'hand'},
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
-        {'event_messages', 'userdata_codec', 'images', 'connections', 'master_watch', 'shutdown',
+        {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
-        {'sendable_text', 'strict_json'}
+        {'sendable_text', 'strict_json', 'master_watch'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',

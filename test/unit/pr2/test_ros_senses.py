@@ -18,13 +18,17 @@ COLOUR, DEPTH, INFO = ('head_camera/rgb/image_raw', 'head_camera/depth_registere
                        'head_camera/rgb/camera_info')
 
 
+def connection():
+    return SimpleNamespace(socket=object())
+
+
 class World:
     """Publishes a snapshot for each time it is asked, in vain on the topics that are `lost`."""
 
-    resolved_name = '/world/snapshot'
-
     def __init__(self):
         self.listeners = {}  # topic -> callback
+        self.connections = {}  # topic -> those of its subscriber
+        self.tree = SimpleNamespace(impl=SimpleNamespace(connections=[connection()]))
         self.asked = []  # whether for a camera frame
         self.lost = []  # for each time it is asked, the topics that reach nobody; then none
         self.late = []  # (topic, message) that arrive when it is asked for the second time
@@ -32,11 +36,11 @@ class World:
 
     def subscribe(self, topic, kind, callback, **_):
         self.listeners[topic] = callback
-        connection = SimpleNamespace(socket=object())
-        return SimpleNamespace(impl=SimpleNamespace(connections=[connection]))
+        self.connections[topic] = [connection()]
+        return SimpleNamespace(impl=SimpleNamespace(connections=self.connections[topic]))
 
-    def wait_for_service(self, timeout):
-        """It is there."""
+    def close(self):
+        """The connection to its service."""
 
     def __call__(self, camera):
         self.asked.append(camera)
@@ -71,11 +75,13 @@ def world(monkeypatch):
     still = SimpleNamespace(transform=Transform())
     still.transform.rotation.w = 1.0
     monkeypatch.setattr(rospy, 'Subscriber', made.subscribe)
-    monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind: made)
+    monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind, persistent: made)
+    monkeypatch.setattr(rospy, 'wait_for_service', lambda name, timeout: None)
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     monkeypatch.setattr(ros_senses, 'tf2_ros', SimpleNamespace(
         Buffer=lambda *_: SimpleNamespace(lookup_transform=lambda *_: still),
-        TransformListener=lambda *_, **__: None, TransformException=LookupError))
+        TransformListener=lambda *_, **__: SimpleNamespace(tf_sub=made.tree),
+        TransformException=LookupError))
     monkeypatch.setattr(ros_senses, 'AGAIN_S', 0.05)
     monkeypatch.setattr(connections, 'GRACE_S', 0.0)
     return made
@@ -125,3 +131,21 @@ def test_a_world_that_refuses_is_asked_for_a_frame_once(world):
     with pytest.raises(RobotError, match='/world/snapshot: the world has stopped'):
         RosSenses('world/snapshot', 20.0).see('base', 'eye')
     assert world.asked == [True]
+
+
+def test_what_is_not_connected_yet_is_named(world, monkeypatch):
+    senses = RosSenses('world/snapshot', 20.0)
+    assert senses.lacking() == []
+    world.connections[DEPTH].clear()
+    assert senses.lacking() == ['/' + DEPTH]
+    world.tree.impl.connections.clear()
+    world.connections['joint_states'].clear()
+    assert senses.lacking() == ['/joint_states', '/' + DEPTH, '/tf']
+
+    def absent(name, timeout):
+        raise rospy.ROSException('timeout')
+    monkeypatch.setattr(rospy, 'wait_for_service', absent)
+    assert senses.lacking()[-1] == '/world/snapshot'
+    for topic in ('joint_states', DEPTH):
+        world.connections[topic].append(connection())
+    assert senses.lacking() == ['/tf', '/world/snapshot']

@@ -20,6 +20,7 @@ from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials
 from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.expert.console.web.access import AccessTokens, AllowedHosts
 from smach_oracle.expert.console.web.access_control import AccessControl
+from smach_oracle.expert.console.web.connections import LimitedServer
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.console.web.settings import ConsoleSettings
 
@@ -121,6 +122,11 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
             'ssl_options': tls_context(self.access.settings), 'max_body_size': MOST_BYTES,
             'max_header_size': 16384
         }
+
+    def get_http_server(self):
+        limited = LimitedServer(self._app, **self.get_httpserver_options())
+        limited.connections = self.access.connections
+        return limited
 
     @property
     def origin(self):

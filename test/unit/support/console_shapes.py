@@ -32,7 +32,6 @@ from smach_oracle.expert.console.sensors import sample_handlers
 from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
 from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStream
-from smach_oracle.expert.console.trials import bag_catalogue
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
 from smach_oracle.expert.console.web.audit import Person
@@ -164,7 +163,6 @@ def put_trials(sections, log, folder):
     assert recorder.close(30.0)
     Path(folder, 'torn.bag').write_bytes(b'#ROSBAG V2.0\n')
     catalogue = BagCatalogue([folder], sections)
-    catalogue._reader = bag_catalogue.EventReader(bag_catalogue.MOST_EVENTS)
     catalogue.scan()
     return catalogue
 

@@ -19,6 +19,7 @@ from .web import sessions
 from .web.access import RateLimit, SocketRateLimits, may
 from .web.audit import Person
 from .web.handlers import access_of, set_security_headers
+from .web.row_lists import SentLists
 from .web.sections import PageSections
 
 MOST_SOCKETS = 64
@@ -47,6 +48,7 @@ class OpenPages:
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
         self.numbers = itertools.count(1)
+        self._trials_version = -1  # of the list of live trials
         self.workers = ThreadPoolExecutor(8, 'command')
 
     def close(self, session: sessions.BrowserSession) -> None:
@@ -57,6 +59,14 @@ class OpenPages:
         for socket in list(self.open):
             if socket.session is not None and socket.session.id == session.id:
                 socket.end(SIGNED_OUT, 'signed out')
+
+    def write_trials(self) -> None:
+        """Bring the list of live trials up to date, if anybody looks and something has changed."""
+        version = self.log.version
+        if version != self._trials_version and any(
+                socket.lists.looks for socket in list(self.sockets)):
+            self._trials_version = version
+            self.sections.put('trials', self.log.overview())
 
     def push(self) -> None:
         """Send every page what is new."""
@@ -80,6 +90,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._sent_version = 0
         self._watched = ''
         self._watched_from = 0
+        self.lists = SentLists()
         self._writing = False
         self._at_work = 0  # commands that wait for a robot, or for their turn
         self._turn = asyncio.Lock()
@@ -202,6 +213,10 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if command.name == 'watch':
             self._watched, self._watched_from = command.arguments['trial'], 0
             return self._note(command, CommandReply(True))
+        if command.name == 'look':
+            self.lists.looks = bool(command.arguments['at'])
+            self._pages.write_trials()
+            return self._note(command, CommandReply(True))
         if command.name == 'drive':
             return self._pages.teleoperation.drive(command, self._number)
         if command.name in STOPPING_COMMANDS:  # whatever else is at work
@@ -272,7 +287,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         events = self._pages.log.events(self._watched,
                                          self._watched_from) if self._watched else None
         new = events.events[:MOST_EVENTS_AT_ONCE] if events else []
-        if not changed and not new:
+        lists = self.lists.changes(self._pages.sections.lists)
+        if not changed and not new and not lists:
             return
         parts = ['"now":{:.3f}'.format(time.time())]
         if changed:
@@ -281,6 +297,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
                 parts.append('"all":true')
             parts.append('"sections":{%s}' % ','.join('{}:{}'.format(json.dumps(name), text)
                                                       for name, text in changed))
+        if lists:
+            parts.append('"lists":' + lists)
         if new:
             parts.append('"events":{}'.format(
                 json.dumps({'trial': self._watched, 'from': self._watched_from, 'events': new},

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import List, Optional
 
 import rospy
-import tornado.httpserver
 import tornado.ioloop
 import tornado.netutil
 import tornado.web
@@ -38,6 +37,7 @@ from .trials.recorded_trials import RecordedTrials
 from .trials.trial_log import TrialLog
 from .web.access_control import AccessControl
 from .web.audit import Audit
+from .web.connections import LimitedServer
 from .web.handlers import NotFoundHandler, PageFileHandler, SessionHandler
 from .web.sections import PageSections
 from .web.settings import ConsoleSettings, read_settings
@@ -108,13 +108,13 @@ class Console:
             QuestionCommands(self._front_end, self._audit,
                  InterfaceCommands(self._teleoperation.is_interface).commands), self._teleoperation)
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
-        app = make_app(AccessControl(settings._replace(port=port), secret, self._audit),
-                       self._pages, self._discovery.sensors,
+        access = AccessControl(settings._replace(port=port), secret, self._audit)
+        app = make_app(access, self._pages, self._discovery.sensors,
                        HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files))
-        server = tornado.httpserver.HTTPServer(app, ssl_options=tls, max_body_size=MOST_BYTES,
-                                               max_header_size=16384, body_timeout=10.0,
-                                               idle_connection_timeout=60.0,
-                                               max_buffer_size=4 * MOST_BYTES)
+        server = LimitedServer(app, ssl_options=tls, max_body_size=MOST_BYTES,
+                               max_header_size=16384, body_timeout=10.0,
+                               idle_connection_timeout=60.0, max_buffer_size=4 * MOST_BYTES)
+        server.connections = access.connections
         server.add_sockets(sockets)
         self._overview_s = -OVERVIEW_PERIOD_S
 
@@ -140,7 +140,7 @@ class Console:
         if time.monotonic() - self._overview_s > OVERVIEW_PERIOD_S:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)
-            self._sections.put('trials', self._log.overview())
+            self._pages.write_trials()
 
 
 def _listen(settings: ConsoleSettings) -> List[socket.socket]:

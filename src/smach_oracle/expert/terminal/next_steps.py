@@ -10,7 +10,8 @@ from ..robot_topics import RobotTopic
 _SHOWN_KINDS = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
                 OracleEvent.INTERFACE_START, OracleEvent.WARNING, OracleEvent.STATE_START,
                 OracleEvent.TRIAL_END, OracleEvent.HEALTH_WAIT_START,
-                OracleEvent.HEALTH_WAIT_END)
+                OracleEvent.HEALTH_WAIT_END, OracleEvent.HOLD_START, OracleEvent.HOLD_END,
+                OracleEvent.SENT)
 _LAST_KINDS = (OracleEvent.STATE_START, OracleEvent.TRIAL_END, OracleEvent.INTERFACE_START)
 
 

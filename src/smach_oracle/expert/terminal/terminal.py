@@ -22,6 +22,7 @@ from ..wording import clean, next_step_words
 from . import render
 from .interface_dialog import InterfaceDialog
 from .next_steps import NextSteps
+from .operator_commands import OPERATOR_WORDS, OperatorCommands
 from .options import AnswerOption, choose, options
 from .precondition_status import PreconditionStatusListener
 from .prompts import Choice, JsonValidator, LeaveQuestion, PromptInterrupted, Prompts, QuitTerminal
@@ -44,12 +45,13 @@ class Terminal:
                  next_steps: Callable[[str, str], NextSteps] = NextSteps,
                  interface: Callable[[ListedQuestion, str], RunningInterface] = RunningInterface,
                  preconditions: Callable[[str, str],
-                                         PreconditionStatusListener] = PreconditionStatusListener
-                 ) -> None:
+                                         PreconditionStatusListener] = PreconditionStatusListener,
+                 operator: Optional[OperatorCommands] = None) -> None:
         self._next_steps = next_steps
         self._interface = interface
         self._listen_to_preconditions = preconditions
         self._preconditions: Optional[PreconditionStatusListener] = None
+        self._operator = operator or OperatorCommands(front_end.expert)
         self._front_end = front_end
         self._console = console
         self._prompts = prompts
@@ -92,8 +94,16 @@ class Terminal:
         self._say('No open questions; waiting. (q quits)', 'dim')
         while True:
             line = self._prompts.ask('', self._servers_line, lambda: 'a question'
-                                     if self._waiting() else None)
+                                     if self._waiting() else None, OPERATOR_WORDS)
             _quit_on(line)
+            self._operate(line)
+
+    def _operate(self, line: str) -> bool:
+        """Do what an operator commands; whether it was that."""
+        told = self._operator.carry_out(line)
+        for text, style in told or ():
+            self._say(text, style)
+        return told is not None
 
     def _pick_from(self, waiting: Sequence[ListedQuestion]) -> Optional[ListedQuestion]:
         self._console.print(render.overview(waiting, time.monotonic()))
@@ -102,8 +112,10 @@ class Terminal:
             'question [1-{}]: '.format(len(waiting)), self._servers_line,
             lambda: 'changed' if [each.key for each in self._waiting()] != keys else None,
             [(str(number), '{} {}'.format(each.goal.robot, each.goal.failed_state))
-             for number, each in enumerate(waiting, 1)] + [('q', 'quit')])
+             for number, each in enumerate(waiting, 1)] + [('q', 'quit')] + OPERATOR_WORDS)
         _quit_on(line)
+        if self._operate(line):
+            return None
         if line.isdigit() and 1 <= int(line) <= len(waiting):
             return waiting[int(line) - 1]
         self._say('{!r} is not one of 1 to {}, q'.format(line, len(waiting)), 'red')
@@ -159,7 +171,8 @@ class Terminal:
         """Ask for one line and act on it; whether that has settled the question."""
         available = options(listed.goal)
         line = self._ask(listed, '\nanswer: ',
-                         [(option.key, option.words) for option in available] + _COMMANDS)
+                         [(option.key, option.words) for option in available] + _COMMANDS
+                         + OPERATOR_WORDS)
         try:
             if self._command(listed, line):
                 return False
@@ -183,7 +196,7 @@ class Terminal:
                 self._say(text, style)
         elif line == 'r':
             self._console.print(render.question(listed.goal, time.monotonic() - listed.asked_s))
-        return line in ('', 't', 'p', 'r')
+        return line in ('', 't', 'p', 'r') or self._operate(line)
 
     def _decide(self, listed: ListedQuestion, option: AnswerOption) -> Optional[ExpertDecision]:
         """The decision with its outputs and reason; None where Ctrl-C went back."""

@@ -15,6 +15,7 @@ from std_msgs.msg import Header
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
 from smach_oracle.geometry.transforms import from_quaternion
+from smach_oracle.ros.connections import ConnectionGrace, live_connections
 from smach_oracle.ros.images import ImageError, cloud_message, colour_of, depth_of, intrinsics_of
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import Snapshot, SnapshotRequest
@@ -23,7 +24,7 @@ SAME_MOMENT_S = 0.02  # between the stamps of colour and depth
 # wall time after which another snapshot is asked for: the first may have come before we listened
 ATTEMPT_S = 3.0
 POLL_S = 0.01
-CLOUD_STRIDE = 3
+CLOUD_COLUMNS = 213  # of the image that the cloud has points of, about
 NO_SNAPSHOT = 'none'
 KEPT = 5  # messages of a topic
 
@@ -125,6 +126,7 @@ class _CameraSubscriptions:
             name: {}
             for name in topics
         }
+        self._grace = ConnectionGrace()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._transforms = tf2_ros.TransformListener(self._buffer)
         self._subscribers = [
@@ -138,12 +140,20 @@ class _CameraSubscriptions:
         self._transforms.unregister()
 
     def connected(self) -> bool:
-        trees = (self._transforms.tf_sub, self._transforms.tf_static_sub)
-        return not self.unpublished() and any(each.get_num_connections() for each in trees)
+        """Whether every topic has a publisher; waits until new ones send to this node."""
+        trees = [
+            each for tree in (self._transforms.tf_sub, self._transforms.tf_static_sub)
+            for each in live_connections(tree)
+        ]
+        cameras = [live_connections(each) for each in self._subscribers]
+        if not trees or not all(cameras):
+            return False
+        self._grace.wait(trees + [each for camera in cameras for each in camera])
+        return True
 
     def unpublished(self) -> List[str]:
         """Topics without a publisher."""
-        return [each.resolved_name for each in self._subscribers if not each.get_num_connections()]
+        return [each.resolved_name for each in self._subscribers if not live_connections(each)]
 
     def of_one_moment(self, stamp: Optional[rospy.Time]) -> List[CameraMessages]:
         """Colour images with their depth and a calibration, newest first.
@@ -209,10 +219,11 @@ def _camera_image(messages: CameraMessages, base_from_camera: np.ndarray) -> Cam
 
 
 def cloud_of(taken: TakenImage, base_frame: str) -> PointCloud2:
-    """An image as a coloured cloud in the frame of the base, of every CLOUD_STRIDE-th pixel."""
+    """An image as a coloured cloud in the frame of the base, of about CLOUD_COLUMNS columns."""
     image = taken.image
-    points = points_of(image.depth[::CLOUD_STRIDE, ::CLOUD_STRIDE], image.intrinsics,
-                       image.base_from_camera, stride=CLOUD_STRIDE)
+    stride = image.stride(CLOUD_COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics,
+                       image.base_from_camera, stride=stride)
     known = np.isfinite(points[..., 2])
     header = Header(stamp=taken.message.header.stamp, frame_id=base_frame)
-    return cloud_message(points[known], header, image.colour[::CLOUD_STRIDE, ::CLOUD_STRIDE][known])
+    return cloud_message(points[known], header, image.colour[::stride, ::stride][known])

@@ -11,7 +11,7 @@ from smach_oracle.geometry.pieces import largest_patch, standing_on
 
 from .segmentation import SegmentedObject
 
-STRIDE = 2
+COLUMNS = 320  # that are looked at
 OFF_SURFACE = 0.012  # m that a point of the surface may seem to lie off it
 LOWEST = 0.02  # m above the surface: lower things are noise
 HIGHEST = 0.8
@@ -40,11 +40,12 @@ def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
     plane = segmented.surface
     if plane is None:
         raise MarkedSceneError('what the object stands on cannot be made out around it')
-    depth = image.depth[::STRIDE, ::STRIDE].copy()
-    depth[ndimage.binary_dilation(segmented.mask, iterations=GROWN)[::STRIDE, ::STRIDE] |
+    stride = image.stride(COLUMNS)
+    depth = image.depth[::stride, ::stride].copy()
+    depth[ndimage.binary_dilation(segmented.mask, iterations=GROWN)[::stride, ::stride] |
           (depth > REACH)] = np.nan
     points = points_of(depth, image.intrinsics, image.base_from_camera,
-                       stride=STRIDE).reshape(-1, 3)
+                       stride=stride).reshape(-1, 3)
     points = points[np.isfinite(points[:, 2])]
     patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SURFACE])
     if len(patch) < 3:

@@ -27,6 +27,7 @@ from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
 from .arriving_visit import ArrivingVisit
+from .boundary import Stop, pass_boundary
 from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
 from .transitions import go_to, message_of, terminate
@@ -35,21 +36,25 @@ from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 NO_FACTS: Mapping[str, Any] = {}
 
 
-def before_step(node: TreeNode) -> bool:
+def before_step(node: TreeNode) -> Optional[Stop]:
     """Before the first state of an execution, and before any state under a preempt request.
 
-    Under a request the state is preempted too, unless the last one has serviced the request.
+    Likewise before any state while an operator has a say. Under a request the state is preempted
+    too, unless the last one has serviced the request.
 
-    :returns: whether the machine has to stop here, since the state around it was abandoned.
+    :returns: None where the state is executed now.
     """
-    if not node.engine.stepped:
+    if node.engine.stepped:
+        node.tree.control.calm(node.engine)
+    else:
         node.begin_stepping()
     if node.is_left_behind():
         stop_left_behind(node)
-        return True
-    if node.machine.preempt_requested():
+        return Stop()
+    was_preempted = node.machine.preempt_requested()
+    if was_preempted:
         _heed_preempt(node)
-    return False
+    return pass_boundary(node, was_preempted) if node.engine.attentive else None
 
 
 def stop_left_behind(node: TreeNode) -> None:
@@ -239,6 +244,9 @@ class Step:
     def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
+        state = self._machine._states[record.label]
+        if isinstance(state, smach.Container):
+            recall_preempts(state)  # a Concurrence that has failed has preempted its branches
         context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)

@@ -13,6 +13,7 @@ from ..machine.tree_node import TreeNode, WrappedMachine
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
+from .sending import tell_dropped
 from .wrapping import adopt, bring_up_to_date
 
 
@@ -43,6 +44,7 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional
     node.emit(EventKind.TRIAL_START, data={
         'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
         'settings': _settings(node)})
+    node.tree.control.begin_trial()
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
     try:
@@ -52,6 +54,7 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional
         error = err
         raise
     finally:
+        node.tree.control.end_trial()
         node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
                   data={ENDED_BY: _trial_end(node, outcome, error).value, **_learned(node)})
         save_rates(node)
@@ -99,6 +102,9 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
         error = err
         raise
     finally:
+        dropped = node.tree.control.leave(node.engine, node.path)
+        if dropped is not None:
+            tell_dropped(node, dropped)
         node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=_why(outcome, error))
         node.runs_around = ()
         node.records.drop_snapshots()

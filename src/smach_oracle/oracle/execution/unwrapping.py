@@ -7,6 +7,7 @@ from ..errors import TrialError
 from ..machine.nesting import machines_below, nodes_of
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
+from .item_gates import remove_gates
 from .wrapped_classes import two_classes
 
 
@@ -41,6 +42,7 @@ def _strip(machine: WrappedMachine) -> None:
         else:
             _stand_alone(wrapped)
     machine._remove_oracle()
+    remove_gates(cast(smach.StateMachine, machine))
     stripped: Any = machine
     made_of = two_classes(type(machine))
     if made_of is not None:

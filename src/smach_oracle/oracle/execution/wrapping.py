@@ -10,6 +10,7 @@ from ..machine.protocols import Labels
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..settings.settings import Settings
+from .item_gates import place_gates, remove_gates
 from .settings_check import check_preconditions, check_state_names
 from .wrapped_classes import change_class, two_classes
 
@@ -63,6 +64,7 @@ def bring_up_to_date(node: TreeNode) -> None:
     :raises SettingsError: where the settings do not fit them.
     """
     node.machine._sync_oracle()
+    place_gates(node)
     if len(node.machine._states) != node.checked_states:
         check_preconditions(node)
         node.checked_states = len(node.machine._states)
@@ -105,6 +107,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
         made_of = two_classes(type(container))
         if made_of is not None and (container is machine or container._oracle.inherits):
             container._remove_oracle()
+            remove_gates(cast(smach.StateMachine, container))
             unwrapped: Any = container
             unwrapped.__class__ = made_of[1]
             del unwrapped.__dict__['_oracle']

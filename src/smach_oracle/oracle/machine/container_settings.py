@@ -3,7 +3,7 @@ from typing import Any, Dict
 
 from ..decision.policy import Policy, policy_named
 from ..settings.failing_outcomes import FailingNames
-from ..settings.settings import ALLOW, Settings, StateSettings
+from ..settings.settings import ALLOW, RUN, Settings, StateSettings
 
 
 class ContainerSettings:
@@ -22,9 +22,16 @@ class ContainerSettings:
 
     def guards_states(self) -> bool:
         """Whether a state may be guarded: whether `on_retry` is set, for all or for one."""
+        return self._sets('on_retry', ALLOW)
+
+    def limits_autonomy(self) -> bool:
+        """Whether a state may not simply be entered: whether `autonomy` is set for all or one."""
+        return self._sets('autonomy', RUN)
+
+    def _sets(self, key: str, usual: str) -> bool:
         given = list(self.of_machine.states.values()) + list(self.given_with_add.values())
-        return self.of_machine.defaults.on_retry != ALLOW or any(
-            each.get('on_retry', ALLOW) != ALLOW for each in given)
+        return getattr(self.of_machine.defaults, key) != usual or any(
+            each.get(key, usual) != usual for each in given)
 
     def of_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state of the container at `path`, relative to the top machine.

@@ -10,18 +10,20 @@ class EngineProbe:
     """Looked at when an execution comes to its first state.
 
     `lock_is_held`: whether the engine holds the machine's lock around a step. `attentive`: whether
-    a step begins with a closer look at preempt requests. `tells_transitions`: whether the machine's
+    a step begins with a closer look at preempt requests and at what an operator wants.
+    `stays_attentive`: whether it does so in any case. `tells_transitions`: whether the machine's
     class wants every transition told. `has_own_loop`: whether the engine itself calls for the next
     step, and no class of a user's. `stepped`: whether this execution has come to a state.
     """
 
-    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'tells_transitions',
+    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'stays_attentive', 'tells_transitions',
                  'has_own_loop')
 
     def __init__(self) -> None:
         self.stepped = False
         self.lock_is_held = False
         self.attentive = True
+        self.stays_attentive = True
         self.tells_transitions = True
         self.has_own_loop = False
 
@@ -41,7 +43,8 @@ class EngineProbe:
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
         cls = type(machine)
-        self.attentive = cls.preempt_requested is not smach.State.preempt_requested
+        self.stays_attentive = cls.preempt_requested is not smach.State.preempt_requested
+        self.attentive = self.stays_attentive
         self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
         self.has_own_loop = _has_own_loop(machine)
 

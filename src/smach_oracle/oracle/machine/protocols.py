@@ -60,6 +60,9 @@ class Machine(Protocol):
     def preempt_requested(self) -> bool:
         """Whether somebody has asked it to stop."""
 
+    def request_preempt(self) -> None:
+        """Ask it to stop."""
+
     def service_preempt(self) -> None:
         """Note that the request was obeyed."""
 

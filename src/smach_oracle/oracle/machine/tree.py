@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, Optional
 import smach
 
 from ..asking.question import Expert
+from ..control.control import Control
 from ..records.events import EventSource
 from ..settings.health import HealthFunction
 from .alarm_clock import AlarmClock
@@ -51,6 +52,7 @@ class Tree:
         self._visits = itertools.count(1)
         self.health = HealthWatch(health)
         self.clock = AlarmClock()
+        self.control = Control()
         self.trial_id = ''
         self.rates_lock = threading.Lock()
         self.departures_lock = threading.Lock()

@@ -1,6 +1,6 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 import copy
-from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Tuple
+from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, Tuple
 
 import smach
 
@@ -31,6 +31,9 @@ class WrappedMachine(Machine, Protocol):
 
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
+
+    def set_initial_state(self, initial_states: Sequence[str]) -> None:
+        """Begin at this label (one, in a list) from now on."""
 
 
 def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
@@ -218,6 +221,8 @@ class TreeNode:
     def begin_stepping(self) -> None:
         """At the first state of an execution, look at what the engine is like."""
         self.engine.look(self.machine)
+        self.engine.stays_attentive |= self.in_force.limits_autonomy()
+        self.tree.control.attend(self.engine)
         self.abandoned = self.tree.workers.abandoned
 
     def snapshot(self) -> Dict[str, Any]:

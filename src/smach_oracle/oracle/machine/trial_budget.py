@@ -1,7 +1,8 @@
 """What is left of a trial's budget, for all containers of a tree."""
+import contextlib
 import threading
 from time import monotonic
-from typing import Any, Optional, Tuple
+from typing import Any, Iterator, Optional, Tuple
 
 from ..settings.budget import Budget
 
@@ -16,6 +17,7 @@ class TrialBudget:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._standing = 0  # how many let the minutes stand still now
         self.begin(Budget())
 
     def begin(self, limits: Budget) -> None:
@@ -23,7 +25,27 @@ class TrialBudget:
         with self._lock:
             self._limits = limits
             self._recoveries = self._questions = 0
-            self._begun_s = monotonic()
+            self._begun_s = self._stands_since_s = monotonic()
+            self._stood_s = 0.0
+
+    @contextlib.contextmanager
+    def stands_still(self) -> Iterator[None]:
+        """Let the minutes stand still; several may do so at once."""
+        with self._lock:
+            self._note()
+            self._standing += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._note()
+                self._standing -= 1
+
+    def _note(self) -> None:
+        now_s = monotonic()
+        if self._standing:
+            self._stood_s += now_s - self._stands_since_s
+        self._stands_since_s = now_s
 
     def why_over(self) -> str:
         """Say that the minutes are over."""
@@ -39,7 +61,9 @@ class TrialBudget:
         minutes = self._limits.minutes
         if minutes is None:
             return None
-        return max(0.0, self._begun_s + 60.0 * minutes - monotonic())
+        with self._lock:
+            self._note()
+            return max(0.0, self._begun_s + self._stood_s + 60.0 * minutes - monotonic())
 
     def within(self, deadline_s: float) -> Tuple[float, bool]:
         """Return a deadline that is not beyond the minutes, and whether they cut it.

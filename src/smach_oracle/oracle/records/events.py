@@ -43,6 +43,11 @@ class EventKind(IntEnum):
     WARNING = 23
     HEALTH_WAIT_START = 24
     HEALTH_WAIT_END = 25
+    OPERATOR_COMMAND = 26
+    HOLD_START = 27
+    HOLD_END = 28
+    ANNOUNCE = 29
+    SENT = 30
 
 
 class FailureKind(IntEnum):

@@ -8,6 +8,7 @@ from typing import Any, Iterator, Optional
 
 import smach
 
+from ..control.hold import Place
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
@@ -16,8 +17,9 @@ from ..machine.write_watch import WriteWatch
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
-from ..settings.settings import StateSettings
+from ..settings.settings import RUN, StateSettings
 from .failure import failure_kind, route_of
+from .operator_wait import wait_for_operator
 
 
 class NotMet(Exception):
@@ -81,7 +83,14 @@ class PreconditionRunner:
         else:
             self._run_label(spec.target)
 
+    def _wait_for_operator(self, name: str, label: str = '') -> None:
+        """Wait where an operator holds the tree; `label`: of a state of the container."""
+        node = self._node
+        autonomy = node.settings_of(label).autonomy if label else RUN
+        wait_for_operator(node, Place(node.path, name), autonomy, self._stopped)
+
     def _call(self, spec: PreconditionSpec) -> None:
+        self._wait_for_operator(spec.name)
         self._check_free(spec.target)
         gate = self._gate.branch()
         ended = self._node.tree.workers.call(spec.target, behind(gate), gate,
@@ -145,6 +154,7 @@ class PreconditionRunner:
                 note_precondition(self._node, label)
 
     def _execute(self, state: smach.State, label: str) -> object:
+        self._wait_for_operator(label or type(state).__name__, label)
         self._check_free(state)
         with self._lock:
             if self._cancelled:

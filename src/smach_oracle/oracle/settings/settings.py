@@ -19,6 +19,8 @@ from .interfaces import checked_interfaces
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
+RUN, ANNOUNCE, CONFIRM_FIRST = 'run', 'announce', 'confirm'  # autonomy
+AUTONOMY_LEVELS = (RUN, ANNOUNCE, CONFIRM_FIRST)
 _MAX_HISTORY = 1000000  # visits; each question carries them all
 _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
 
@@ -34,6 +36,7 @@ class StateSettings:
     estimator: str = 'window'
     max_recoveries: int = 5  # per trial; beyond it the oracle asks
     on_retry: str = ALLOW  # whether it may be repeated
+    autonomy: str = RUN  # whether it is entered by itself
     failure_outcomes: Tuple[str, ...] = ()  # outcomes that are failures whatever they lead to
     author_recoveries: str = 'keep'
     time_limit_s: Optional[float] = None  # of each execution; None: no limit
@@ -49,6 +52,7 @@ _STATE_CHECKS: Dict[str, values.Check] = {
     'estimator': values.choice(sorted(ESTIMATORS)),
     'max_recoveries': values.whole(0, 'a whole number from 0'),
     'on_retry': values.choice((ALLOW, CONFIRM, NEVER)),
+    'autonomy': values.choice(AUTONOMY_LEVELS),
     'failure_outcomes': values.words,
     'author_recoveries': values.choice(('keep', 'override')),
     'time_limit_s': values.time_limit,

@@ -19,7 +19,7 @@ from ..planning.collision import CollisionModel, installed_model, model_from
 from ..ros_robot import RosRobot
 from .collision_map_publisher import CollisionMapPublisher
 from .kitchen_skills import KitchenSkills
-from .perception_node import kitchen_at, snapshot_service
+from .perception_node import await_robot, kitchen_at, snapshot_service
 from .skill_server import SkillServer
 
 
@@ -57,6 +57,7 @@ def main() -> None:
     except (ValueError, ModelError) as err:
         rospy.logfatal('pr2_manipulation: %s', err)
         raise SystemExit(2) from err
+    await_robot(robot)
     server = SkillServer(robot.abort, robot.resume)
     serve(KitchenSkills(SkillContext(robot, model), kitchen), server)
     rospy.loginfo('pr2_manipulation: %d actions ready', server.names())

@@ -146,6 +146,13 @@ def robot_links(limit_s: float = MODEL_WAIT_S) -> Dict[str, Joint]:
     return read_joints(text)
 
 
+def await_robot(robot: RosRobot) -> None:
+    """Wait until a simulated robot is connected, so that nothing of the first goal gets lost."""
+    lacking = robot.wait_until_connected()
+    if lacking and not rospy.is_shutdown():
+        rospy.logwarn('%s: not connected yet: %s', rospy.get_name(), ', '.join(lacking))
+
+
 def main() -> None:
     """Entry point of the node."""
     parameters_only(
@@ -159,6 +166,7 @@ def main() -> None:
         rospy.logfatal('pr2_perception: %s', err)
         raise SystemExit(2) from err
     robot = RosRobot(snapshot=snapshot)
+    await_robot(robot)
     perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort, robot.resume)
     server.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,))
     server.offer('detect_drink', DetectDrinkAction, perception.detect_drink, (NotSeen,))

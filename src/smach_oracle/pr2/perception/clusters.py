@@ -11,8 +11,8 @@ from smach_oracle.geometry.depth import points_of
 from smach_oracle.geometry.pieces import standing_on
 from smach_oracle.geometry.plane import Plane
 
-# every second row and column: a quarter of the work, and objects still have hundreds of points
-STRIDE = 2
+# that are looked at: enough for objects to have hundreds of points
+COLUMNS = 320
 MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
@@ -50,15 +50,16 @@ class Cluster(NamedTuple):
 def cloud_of(image: CameraImage, limbs: Sequence[Capsule] = (),
              reach: float = 2.5) -> OrganizedCloud:
     """The points of an image within `reach` m of depth, without those of the robot's own limbs."""
-    depth = image.depth[::STRIDE, ::STRIDE]
+    stride = image.stride(COLUMNS)
+    depth = image.depth[::stride, ::stride]
     measured = np.isfinite(depth) & (depth > 0)
     near = np.where(measured & (depth < reach), depth, np.nan)
-    points = points_of(near, image.intrinsics, image.base_from_camera, stride=STRIDE)
+    points = points_of(near, image.intrinsics, image.base_from_camera, stride=stride)
     hidden = np.full(depth.shape, -1)
     for index, limb in enumerate(limbs):
         hidden[_distance(points, limb) < limb.radius] = index
     points[hidden >= 0] = np.nan
-    return OrganizedCloud(points, image.colour[::STRIDE, ::STRIDE], hidden,
+    return OrganizedCloud(points, image.colour[::stride, ::stride], hidden,
                           tuple(limb.name for limb in limbs), float(measured.mean()))
 
 

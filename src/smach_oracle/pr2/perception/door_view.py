@@ -9,7 +9,7 @@ from smach_oracle.geometry.transforms import apply, from_rpy, inverse
 
 from ..kitchen import Kitchen, door_frame
 
-STRIDE = 3
+COLUMNS = 213  # that are looked at
 MOST_OPEN = np.radians(125.0)
 STEP = np.radians(1.0)
 SLACK = 0.12  # m that the map may be wrong across the door
@@ -50,8 +50,9 @@ def find_door(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray
 def _points_of_door(image: CameraImage, kitchen: Kitchen,
                     base_from_fridge: np.ndarray) -> np.ndarray:
     """(n, 3) points at the handle's height, within the door's swing, in the fridge's frame."""
-    points = points_of(image.depth[::STRIDE, ::STRIDE], image.intrinsics, inverse(base_from_fridge)
-                       @ image.base_from_camera, stride=STRIDE).reshape(-1, 3)
+    stride = image.stride(COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics, inverse(base_from_fridge)
+                       @ image.base_from_camera, stride=stride).reshape(-1, 3)
     points = points[np.isfinite(points[:, 2])]
     low, high = kitchen.handle_span
     level = (points[:, 2] > low + 0.02) & (points[:, 2] < high - 0.02)

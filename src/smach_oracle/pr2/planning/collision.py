@@ -1,79 +1,33 @@
 """What an arm would touch: the robot at its encoder readings among boxes, in a PyBullet client.
 
-The client is apart from the world's: it knows what the robot has measured. It is made anew for each
-skill, so that no answer depends on what was asked before. Lengths in m, angles in rad, frame:
+The client is apart from the world's: it knows what the robot has measured. It is cleaned before
+each skill, so that no answer depends on what was asked before. Lengths in m, angles in rad, frame:
 base_footprint.
 """
 import contextlib
-import os
-import tempfile
-import xml.etree.ElementTree as ElementTree
-from typing import (
-    Dict,
-    FrozenSet,
-    Iterable,
-    Iterator,
-    List,
-    Mapping,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Set,
-    Tuple,
-)
+from typing import Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 import pybullet
 
 from smach_oracle.geometry.chain import JointChain
-from smach_oracle.geometry.joints import read_joints
 from smach_oracle.geometry.transforms import VectorLike, quaternion
 
 from ..kitchen import MapBox
-from ..model.pr2_model import pr2_urdf, srdf_pairs
-from ..robot import ARM_JOINTS, ARMS, BASE_FRAME, TOOL_FRAME
+from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
+from .collision_body import BodyPool, CollisionBody, CollisionModel, installed_model, model_from
 
+__all__ = ['CollisionModel', 'CollisionWorld', 'installed_model', 'model_from']
 TOUCH = 0.001  # m that hulls may overlap: they are somewhat larger than the links
-_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION
-_MOVING, _RESTING = 1, 64  # collision groups; 1 is what PyBullet gives to all that moves
 _FAR = (0.0, 0.0, -50.0)
-
-
-class CollisionModel(NamedTuple):
-    """The robot's body as collision checks need it."""
-
-    urdf: str  # XML text with absolute names of mesh files
-    allowed: FrozenSet[FrozenSet[str]]  # pairs of links that may touch
-
-
-def installed_model() -> CollisionModel:
-    """The PR2 as derived from the installed description.
-
-    :raises ModelError: where there is none.
-    """
-    return CollisionModel(pr2_urdf().read_text(), srdf_pairs())
-
-
-def model_from(urdf: str, srdf: str) -> CollisionModel:
-    """A model out of robot_description and robot_description_semantic.
-
-    :raises ValueError: for text that is not XML.
-    """
-    read_joints(urdf)
-    try:
-        pairs = ElementTree.fromstring(srdf).iter('disable_collisions')
-    except ElementTree.ParseError as err:
-        raise ValueError('robot_description_semantic: {}'.format(err)) from err
-    return CollisionModel(
-        urdf,
-        frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs))
+_POOL = BodyPool()
 
 
 class CollisionWorld:
     """One arm among everything else: the rest of the robot, boxes, and what the hand holds."""
 
     def __init__(self, model: CollisionModel, arm: str, joints: Mapping[str, float]) -> None:
-        """Load the robot into a client of its own.
+        """Put the robot into a client of its own.
 
         :param arm: the arm that moves, 'left' or 'right'; all other joints stay as in `joints`.
         :param joints: encoder readings; joints that are missing stand at 0.
@@ -88,29 +42,16 @@ class CollisionWorld:
         self._boxes: Dict[str, int] = {}
         self._held: Optional[Tuple[int, np.ndarray]] = None
         self._touchable: Set[int] = set()
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._key = (model, arm)
+        self._lent: Optional[CollisionBody] = _POOL.lend(model, arm)
+        self._client, self._robot, self._arm = (self._lent.client, self._lent.robot, self._lent.arm)
+        self._links, self._pairs = self._lent.links, self._lent.pairs
+        self._moving, self._hand = self._lent.moving, self._lent.hand
         try:
-            self._build(model, arm)
             self.place_rest(joints)
         except Exception:
             self.close()
             raise
-
-    def _build(self, model: CollisionModel, arm: str) -> None:
-        self._robot = self._load(model.urdf)
-        self._links = {
-            pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[12].decode(): k
-            for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))
-        }
-        self._joints = {
-            pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
-            for k in range(len(self._links))
-        }
-        self._arm = [self._joints[name] for name in ARM_JOINTS[arm]]
-        self._moving = _below(model.urdf, arm[0] + '_shoulder_pan_link')
-        self._moving_links = {self._links[name] for name in self._moving}
-        self._hand = {self._links[name] for name in self._moving if '_gripper_' in name}
-        self._pairs = self._filter(model.allowed)
 
     def __enter__(self) -> 'CollisionWorld':
         return self
@@ -119,18 +60,18 @@ class CollisionWorld:
         self.close()
 
     def close(self) -> None:
-        """Drop the client. The object cannot be used afterwards."""
-        if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
-            self._client = -1
+        """Give the client back. The object cannot be used afterwards."""
+        lent, self._lent = self._lent, None
+        if lent is not None:
+            for name in self.names():
+                self.remove(name)
+            self.detach()
+            _POOL.take_back(*self._key, lent)
 
     def place_rest(self, joints: Mapping[str, float]) -> None:
         """Set the joints of everything but the arm (and of the gripper) to encoder readings."""
-        known = [(self._joints[name], value) for name, value in sorted(joints.items())
-                 if name in self._joints]
-        pybullet.resetJointStatesMultiDof(self._robot, [index for index, _ in known],
-                                          [[value] for _, value in known],
-                                          physicsClientId=self._client)
+        if self._lent is not None:
+            self._lent.place(joints)
 
     def add_box(self, name: str, box: MapBox) -> None:
         """An obstacle. A box of the same name is replaced."""
@@ -209,7 +150,7 @@ class CollisionWorld:
         return least
 
     def _nearest(self, one: int, other: int, least: float, moving_only: bool = False) -> float:
-        moving = self._moving_links if moving_only else None
+        moving = self._moving if moving_only else None
         points = pybullet.getClosestPoints(one, other, least, physicsClientId=self._client)
         return min([least] + [point[8] for point in points if moving is None or point[3] in moving])
 
@@ -246,40 +187,6 @@ class CollisionWorld:
                                                      quaternion(pose).tolist(),
                                                      physicsClientId=self._client)
 
-    def _load(self, urdf: str) -> int:
-        """PyBullet reads robots from files only."""
-        handle, path = tempfile.mkstemp(suffix='.urdf')
-        try:
-            with os.fdopen(handle, 'w') as stream:
-                stream.write(urdf)
-            return int(
-                pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS,
-                                  physicsClientId=self._client))
-        except pybullet.error as err:
-            raise ValueError('robot description: {}'.format(err)) from err
-        finally:
-            os.remove(path)
-
-    def _filter(self, allowed: FrozenSet[FrozenSet[str]]) -> List[Tuple[int, int]]:
-        """Leave on the pairs with a moving link that must not touch; they are returned."""
-        solid = [(name, index) for name, index in self._links.items()
-                 if pybullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)
-                 ]
-        moving = [each for each in solid if each[0] in self._moving]
-        resting = [each for each in solid if each[0] not in self._moving]
-        for _, index in resting:  # they meet what moves, not each other, nor the boxes
-            pybullet.setCollisionFilterGroupMask(self._robot, index, _RESTING, _MOVING,
-                                                 physicsClientId=self._client)
-        pairs = []
-        for k, (one, first) in enumerate(moving):
-            for other, second in moving[k + 1:] + resting:
-                if frozenset((one, other)) not in allowed:
-                    pairs.append((first, second))
-                else:
-                    pybullet.setCollisionFilterPair(self._robot, self._robot, first, second, 0,
-                                                    physicsClientId=self._client)
-        return pairs
-
     def _body(self, half: VectorLike, mass: float, position: VectorLike,
               xyzw: Sequence[float]) -> int:
         shape = pybullet.createCollisionShape(pybullet.GEOM_BOX,
@@ -289,13 +196,3 @@ class CollisionWorld:
             pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
                                      [float(each) for each in xyzw], physicsClientId=self._client))
 
-
-def _below(urdf: str, link: str) -> Set[str]:
-    """A link and all that hang on it."""
-    joints = read_joints(urdf).values()
-    found = {link}
-    while True:
-        more = {joint.child for joint in joints if joint.parent in found} - found
-        if not more:
-            return found
-        found |= more

@@ -17,7 +17,7 @@ LEAST_POINTS = 150
 LEAST_EXTENT = 0.09  # m that a palm extends; a sleeve is narrower
 LEAST_HALF = 0.11  # m: part of it may be hidden
 THICK = 0.03  # m of a hand
-STRIDE = 2
+COLUMNS = 320  # that are looked at
 
 
 def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:
@@ -45,8 +45,9 @@ def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
     :param expected: (3,) m in base_footprint, as for hand_over().
     :raises SkillError: where there is none near.
     """
-    points = points_of(image.depth[::STRIDE, ::STRIDE], image.intrinsics, image.base_from_camera,
-                       stride=STRIDE)
+    stride = image.stride(COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
+                       stride=stride)
     points = points.reshape(-1, 3)
     with np.errstate(invalid='ignore'):
         near = ((np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) &

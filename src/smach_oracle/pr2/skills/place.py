@@ -36,6 +36,7 @@ SLACK = 0.10  # m that the height asked for may differ from the one at which the
 NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
 LEAST_POINTS = 40
+COLUMNS = 320  # of an image that are looked at
 
 
 class _PlacePath(NamedTuple):
@@ -105,8 +106,9 @@ def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject) -> bo
 
     :param centre: (3,) m in base_footprint, where the object's centre should be.
     """
-    points = points_of(image.depth[::2, ::2], image.intrinsics, image.base_from_camera,
-                       stride=2).reshape(-1, 3)
+    stride = image.stride(COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
+                       stride=stride).reshape(-1, 3)
     beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
     bottom = centre[2] - held.half[2]
     there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) &

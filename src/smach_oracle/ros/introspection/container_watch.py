@@ -5,6 +5,8 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import smach
 
+CALLBACK_LISTS = ('_start_cbs', '_transition_cbs', '_termination_cbs')
+"""Of a container, on either engine; SMACH has no way to take a callback back."""
 Report = Callable[['ContainerWatch', str, List[str], Any], None]
 """``report(watch, info, active_states, userdata)``: a container starts, makes a transition or has
 ended.
@@ -24,6 +26,11 @@ class _Hook(object):
     def __reduce__(self) -> Tuple[Any, ...]:
         return _Hook, (None, self._info)
 
+    def is_live(self) -> bool:
+        """Whether the watch that it calls still reports."""
+        watch = self._watch() if self._watch is not None else None
+        return watch is not None and watch.is_attached()
+
     def __call__(self, userdata: Any, states: Sequence[str], *args: Any) -> None:
         watch = self._watch() if self._watch is not None else None
         if watch is not None and (watch.jump_to is not None or watch.is_heard()):
@@ -31,7 +38,7 @@ class _Hook(object):
 
 
 class ContainerWatch(object):
-    """One container of the tree, at one or more paths."""
+    """One container of the tree, at one or more paths, until it is detached."""
 
     def __init__(self, container: Any, report: Report, is_heard: Callable[[], bool]) -> None:
         self.is_heard = is_heard
@@ -39,17 +46,32 @@ class ContainerWatch(object):
         self.paths: List[str] = []
         self.jump_to: Optional[str] = None
         self._report: Optional[Report] = report
-        container.register_start_cb(_Hook(self, 'START'), [])
-        container.register_transition_cb(_Hook(self, 'TRANSITION'), [])
-        container.register_termination_cb(_Hook(self, 'TERMINATION'), [])
+        self._hooks = [_Hook(self, info) for info in ('START', 'TRANSITION', 'TERMINATION')]
+        self._register(*self._hooks)
+
+    def _register(self, start: _Hook, transition: _Hook, termination: _Hook) -> None:
+        try:
+            self.container.register_start_cb(start, [])
+            self.container.register_transition_cb(transition, [])
+            self.container.register_termination_cb(termination, [])
+        except Exception as err:
+            # One whose class never called Container.__init__ is shown with each heartbeat.
+            smach.logdebug('Introspection cannot follow %r: %r' % (self.container, err))
+
+    def is_attached(self) -> bool:
+        """Whether it reports."""
+        return self._report is not None
 
     def detach(self) -> None:
-        """Report nothing any more."""
+        """Report nothing any more, and take the callbacks out of the container."""
         self._report = None
-
-    def attach(self, report: Report) -> None:
-        """Report again after ``detach``."""
-        self._report = report
+        for name in CALLBACK_LISTS:
+            callbacks = getattr(self.container, name, None)
+            if callbacks:
+                # another list: the machine may be in the midst of this one
+                setattr(self.container, name,
+                        [each for each in callbacks
+                         if not any(each[0] is hook for hook in self._hooks)])
 
     def happened(self, info: str, userdata: Any, states: Sequence[str],
                  args: Sequence[Any]) -> None:
@@ -74,13 +96,23 @@ class ContainerWatch(object):
         return [str(label)]
 
 
+def is_watched(container: Any) -> bool:
+    """Whether a server of ours follows what this container does."""
+    return any(isinstance(each[0], _Hook) and each[0].is_live()
+               for name in CALLBACK_LISTS for each in getattr(container, name, ()))
+
+
 def _children(container: Any) -> Dict[str, Any]:
-    # A machine that is being built in another thread may grow while we look.
+    # A machine that is being built in another thread may grow while we look. One that is half built
+    # may raise anything: what is around it is shown all the same.
     for _ in range(10):
         try:
             return dict(container.get_children())
         except RuntimeError:
             continue
+        except Exception as err:
+            smach.logdebug('Introspection cannot see into %r: %r' % (container, err))
+            break
     return {}
 
 
@@ -119,11 +151,19 @@ class ContainerTree(object):
             found: Dict[str, Any] = {}
             for path, root in self._roots:
                 self._collect(path, root, found, ())
-            for watch in self._known.values():
-                watch.paths = []
-            self.by_path = {path: self._watch(path, container) for path, container in found.items()}
-            for key in [key for key, watch in self._known.items() if not watch.paths]:
-                self._known[key].detach()
+            known, self._known = self._known, {}
+            paths: Dict[int, List[str]] = {}
+            for path, container in found.items():
+                paths.setdefault(id(container), []).append(path)
+                self._known[id(container)] = known.get(id(container)) or ContainerWatch(
+                    container, self._report, self._is_heard)
+            for key, watch in self._known.items():
+                watch.paths = paths[key]
+            self.by_path = {
+                path: self._known[id(container)] for path, container in found.items()
+            }
+            for key in set(known).difference(self._known):
+                known[key].detach()
 
     def _collect(self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int,
                                                                                   ...]) -> None:
@@ -131,13 +171,4 @@ class ContainerTree(object):
             return
         found[path] = state
         for label, child in _children(state).items():
-            self._collect(path.rstrip('/') + '/' + label, child, found, above + (id(state),))
-
-    def _watch(self, path: str, container: Any) -> ContainerWatch:
-        watch = self._known.get(id(container))
-        if watch is None:
-            watch = self._known[id(container)] = ContainerWatch(container, self._report,
-                                                                self._is_heard)
-        watch.attach(self._report)
-        watch.paths = watch.paths + [path]
-        return watch
+            self._collect('%s/%s' % (path.rstrip('/'), label), child, found, above + (id(state),))

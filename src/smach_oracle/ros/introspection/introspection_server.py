@@ -7,7 +7,19 @@ import collections
 import functools
 import threading
 import time
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import (
+    Any,
+    Callable,
+    Counter,
+    Deque,
+    Dict,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+)
 
 import rospy
 
@@ -19,17 +31,18 @@ from smach_msgs.msg import (
 )
 
 from .container_watch import ContainerTree, ContainerWatch
+from .heartbeat_rounds import HeartbeatRounds
 from .plain_pickle import RefusedDataError, decode_userdata, encode_userdata
+from .viewer_jump import send_running, sender_of
+from .wire_topic import LatestMessages, WireMessage, WireTopic, waiting_bytes
 
 STATUS_TOPIC = '/smach/container_status'
 INIT_TOPIC = '/smach/container_init'
 STRUCTURE_TOPIC = '/smach/container_structure'
-HEARTBEAT_S = 2.0
 LONGEST_BACKLOG = 5000
 """Status changes that may wait to be published; beyond it the oldest are dropped (and the log says
 so).
 """
-SUBSCRIBER_QUEUE = 5000
 LARGE_DATA = 10000
 BACKLOG_BYTES = 32 * 1024 * 1024
 """With that much waiting for a subscriber that does not read, statuses leave out userdata of
@@ -40,26 +53,11 @@ LARGE_DATA characters.
 class _Change(NamedTuple):
     """A status as it was in the executing thread."""
     watch: ContainerWatch
+    paths: Sequence[str]
     info: str
     active_states: List[str]
     data: Dict[str, Any]
     stamp: Any
-
-
-class _Greeter(rospy.SubscribeListener):
-    """Sends a new subscriber everything at once."""
-
-    def __init__(self, make_messages: Any) -> None:
-        super().__init__()
-        self._make_messages = make_messages
-
-    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
-        try:
-            for message in self._make_messages():
-                peer_publish(message)
-        except Exception as err:
-            # An error here would cost rospy the connection; the next heartbeat tries again.
-            smach.logdebug('Introspection could not greet a subscriber: %r' % err)
 
 
 class IntrospectionServer(object):
@@ -82,13 +80,17 @@ class IntrospectionServer(object):
         self._state = state
         self._path = path
         self._tree = ContainerTree(self._note_change, self._is_heard)
+        self._rounds = HeartbeatRounds(self._begin_round)
+        self._latest_structures = LatestMessages(SmachContainerStructure)
+        self._latest_statuses = LatestMessages(SmachContainerStatus)
         self._changes: Deque[_Change] = collections.deque(maxlen=LONGEST_BACKLOG)
         self._wake = threading.Event()
         self._thread: Optional[threading.Thread] = None
-        self._status_pub: Optional[rospy.Publisher] = None
-        self._structure_pub: Optional[rospy.Publisher] = None
+        self._status_pub: Optional[WireTopic] = None
+        self._structure_pub: Optional[WireTopic] = None
         self._init_sub: Optional[rospy.Subscriber] = None
         self._left_out: Set[Tuple[str, str]] = set()
+        self._failures: Counter[str] = collections.Counter()  # to make a message, by path
         self._dropped = 0
         self._said_heavy = False
 
@@ -97,12 +99,9 @@ class IntrospectionServer(object):
         if self._thread is not None:
             return
         name = self._server_name
-        self._structure_pub = rospy.Publisher(name + STRUCTURE_TOPIC, SmachContainerStructure,
-                                              subscriber_listener=_Greeter(self._structures),
-                                              queue_size=SUBSCRIBER_QUEUE)
-        self._status_pub = rospy.Publisher(name + STATUS_TOPIC, SmachContainerStatus,
-                                           subscriber_listener=_Greeter(self._heartbeat_statuses),
-                                           queue_size=SUBSCRIBER_QUEUE)
+        self._structure_pub = WireTopic(name + STRUCTURE_TOPIC, SmachContainerStructure,
+                                        self._greet)
+        self._status_pub = WireTopic(name + STATUS_TOPIC, SmachContainerStatus, self._greet)
         self._tree.add_root(self._path, self._state)
         self._init_sub = rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd,
                                           self._on_init_command)
@@ -111,7 +110,7 @@ class IntrospectionServer(object):
         self._thread.start()
 
     def stop(self) -> None:
-        """Publish what is still to be said, then nothing more."""
+        """Publish what is still to be said, then nothing more; take callbacks and topics back."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
@@ -119,8 +118,9 @@ class IntrospectionServer(object):
         self._wake.set()
         if thread is not threading.current_thread():
             thread.join(2.0)
-        for topic in (self._status_pub, self._structure_pub, self._init_sub):
-            topic.unregister()  # type: ignore[union-attr]
+        for topic in (self._status_pub, self._structure_pub):
+            topic.close()  # type: ignore[union-attr]
+        self._init_sub.unregister()  # type: ignore[union-attr]
         self._status_pub = self._structure_pub = self._init_sub = None
 
     def clear(self) -> None:
@@ -133,7 +133,12 @@ class IntrospectionServer(object):
 
     def _is_heard(self) -> bool:
         status_pub = self._status_pub
-        return status_pub is not None and bool(status_pub.impl.connections)
+        return status_pub is not None and status_pub.is_heard()
+
+    def _greet(self) -> None:
+        """Tell a new subscriber of everything at once."""
+        self._rounds.greet()
+        self._wake.set()
 
     def _note_change(self, watch: ContainerWatch, info: str, active_states: List[str],
                      userdata: Any) -> None:
@@ -144,80 +149,93 @@ class IntrospectionServer(object):
                               self._server_name)
             self._dropped += 1
         self._changes.append(
-            _Change(watch, info, active_states, dict(getattr(userdata, '_data', {})),
+            _Change(watch, watch.paths, info, active_states, dict(getattr(userdata, '_data', {})),
                     rospy.get_rostime()))
         self._wake.set()
 
     def _run(self) -> None:
         me = threading.current_thread()
-        heartbeat_at = time.monotonic()
         while not rospy.is_shutdown():
-            self._wake.wait(max(0.0, heartbeat_at - time.monotonic()))
+            self._wake.wait(self._rounds.wait_s(time.monotonic()))
             self._wake.clear()
             self._publish_changes()
             if self._thread is not me:
                 return
-            if time.monotonic() >= heartbeat_at:
-                self._publish_heartbeat()
-                heartbeat_at = time.monotonic() + HEARTBEAT_S
+            self._publish_heartbeats(self._rounds.due(time.monotonic()))
 
     def _publish_changes(self) -> None:
         while self._changes:
             change = self._changes.popleft()
-            self._publish(self._status_pub, functools.partial(self._status_messages, change))
+            for path in change.paths:
+                self._publish(self._status_pub, path,
+                              functools.partial(self._status, path, change))
 
-    def _publish_heartbeat(self) -> None:
-        self._tree.refresh()
-        for topic, make_messages in ((self._structure_pub, self._structures),
-                                     (self._status_pub, self._heartbeat_statuses)):
-            if topic is not None and topic.get_num_connections():
-                self._publish(topic, make_messages)
-
-    def _publish(self, topic: Any, make_messages: Callable[[], List[Any]]) -> None:
+    def _begin_round(self) -> List[str]:
+        """Look what there is to be told of; nothing while nobody listens."""
         try:
-            for message in make_messages():
-                topic.publish(message)
+            self._tree.refresh()
         except Exception as err:
-            # A machine half built, a label that is no text, a topic closed by stop(): never the end
-            # of the publisher.
-            smach.logdebug('Introspection could not publish: %r' % err)
+            # what was found before is shown, and the thread goes on
+            smach.logdebug('Introspection could not look for containers: %r' % err)
+        paths = list(self._tree.by_path)
+        for latest in (self._latest_structures, self._latest_statuses):
+            latest.keep_only(paths)
+        topics = (self._structure_pub, self._status_pub)
+        return paths if any(topic is not None and topic.is_heard() for topic in topics) else []
 
-    def _status_messages(self, change: _Change) -> List[SmachContainerStatus]:
-        return [self._status_message(path, change) for path in change.watch.paths]
+    def _publish_heartbeats(self, paths: Sequence[str]) -> None:
+        stamp, by_path = rospy.get_rostime(), self._tree.by_path
+        shown = [path for path in paths if path in by_path]  # else cleared meanwhile
+        for topic, make in ((self._structure_pub, self._structure),
+                            (self._status_pub, self._heartbeat)):
+            if topic is not None and topic.is_heard():
+                made = (self._made(path, functools.partial(make, path, by_path[path], stamp))
+                        for path in shown)
+                topic.send([message for message in made if message is not None], to_lagging=False)
 
-    def _status_message(self, path: str, change: _Change) -> SmachContainerStatus:
-        message = SmachContainerStatus()
-        message.header.stamp = change.stamp
-        message.path = path
-        message.initial_states = [
-            str(label) for label in change.watch.container.get_initial_states()
-        ]
-        message.active_states = change.active_states
-        message.local_data = encode_userdata(change.data,
-                                             lambda key, err: self._tell_left_out(path, key, err))
-        if len(message.local_data) > LARGE_DATA and _waiting_bytes(
-                self._status_pub) > BACKLOG_BYTES:
+    def _publish(self, topic: Optional[WireTopic], path: str,
+                 make: Callable[[], WireMessage]) -> None:
+        message = self._made(path, make)
+        if message is not None and topic is not None:
+            topic.send([message])
+
+    def _made(self, path: str, make: Callable[[], WireMessage]) -> Optional[WireMessage]:
+        """Return a message; None for a container that cannot be shown. The others still are."""
+        try:
+            return make()
+        except Exception as err:
+            # once: a machine that grew meanwhile; twice: a container of somebody's own
+            self._failures[path] += 1
+            if self._failures[path] == 2:
+                smach.logwarn("Introspection cannot show '%s': %r" % (path, err))
+            return None
+
+    def _status(self, path: str, change: _Change) -> WireMessage:
+        initial_states = [str(label) for label in change.watch.container.get_initial_states()]
+        data = encode_userdata(change.data, lambda key, err: self._tell_left_out(path, key, err))
+        if len(data) > LARGE_DATA and self._waiting_bytes() > BACKLOG_BYTES:
             self._tell_heavy()
-            message.local_data = encode_userdata({}, lambda key, err: None)
-        message.info = change.info
-        return message
+            data = encode_userdata({}, lambda key, err: None)
+        return self._latest_statuses.make(change.stamp, path, initial_states, change.active_states,
+                                          data, change.info)
 
-    def _current_status(self, path: str, watch: ContainerWatch, info: str) -> SmachContainerStatus:
+    def _current_status(self, path: str, watch: ContainerWatch, info: str,
+                        stamp: Optional[rospy.Time] = None) -> WireMessage:
         container = watch.container
         active = [str(label) for label in container.get_active_states()]
         data = dict(getattr(container.userdata, '_data', {}))
-        return self._status_message(path, _Change(watch, info, active, data, rospy.get_rostime()))
+        return self._status(
+            path, _Change(watch, (), info, active, data, stamp or rospy.get_rostime()))
 
-    def _heartbeat_statuses(self) -> List[SmachContainerStatus]:
-        return [
-            self._current_status(path, watch, 'HEARTBEAT')
-            for path, watch in self._tree.by_path.items()
-        ]
+    def _heartbeat(self, path: str, watch: ContainerWatch, stamp: rospy.Time) -> WireMessage:
+        return self._current_status(path, watch, 'HEARTBEAT', stamp)
 
-    def _structures(self) -> List[SmachContainerStructure]:
-        return [
-            structure_message(path, watch.container) for path, watch in self._tree.by_path.items()
-        ]
+    def _structure(self, path: str, watch: ContainerWatch, stamp: rospy.Time) -> WireMessage:
+        return self._latest_structures.make(stamp, path, *structure_fields(watch.container))
+
+    def _waiting_bytes(self) -> int:
+        impl = self._status_pub.impl if self._status_pub is not None else None
+        return waiting_bytes(impl.connections) if impl is not None else 0
 
     def _tell_heavy(self) -> None:
         if not self._said_heavy:
@@ -226,12 +244,12 @@ class IntrospectionServer(object):
                 "A viewer of '%s' does not keep up; large userdata is left out of its statuses" %
                 self._server_name)
 
-    def _tell_left_out(self, path: str, key: str, err: Exception) -> None:
+    def _tell_left_out(self, path: str, key: str, err: BaseException) -> None:
         if (path, key) not in self._left_out:
             self._left_out.add((path, key))
             smach.logwarn(
                 "Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s" %
-                (key, path, err))
+                (key, path, _text_of(err)))
 
     def _on_init_command(self, command: SmachContainerInitialStatusCmd) -> None:
         watch = self._tree.by_path.get(command.path)
@@ -243,32 +261,37 @@ class IntrospectionServer(object):
         except RefusedDataError as err:
             smach.logerr("Initial state of '%s' not set: %s" % (command.path, err))
             return
-        if set_initial_states(watch, list(command.initial_states), data):
-            confirmation = self._current_status(command.path, watch, 'REMOTE_INIT')
-            self._publish(self._status_pub, lambda: [confirmation])
+        if set_initial_states(watch, list(command.initial_states), data, sender_of(command)):
+            confirm = functools.partial(self._current_status, command.path, watch, 'REMOTE_INIT')
+            self._publish(self._status_pub, command.path, confirm)
 
 
-def _waiting_bytes(topic: Optional[rospy.Publisher]) -> int:
-    """What rospy keeps for subscribers that have not read it yet.
-
-    A hung one must not eat the robot's memory.
-    """
-    connections = topic.impl.connections if topic is not None and topic.impl is not None else ()
-    return sum(
-        len(data) for connection in connections for data in list(getattr(connection, '_queue', ())))
+def _text_of(err: BaseException) -> str:
+    """Its text; that of an object of somebody's own may raise."""
+    try:
+        return str(err)
+    except Exception:
+        return type(err).__name__
 
 
-def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any]) -> bool:
-    """Let the container start in ``labels`` with ``data`` from now on.
+def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any],
+                       by: str = '') -> bool:
+    """Let the container start in ``labels`` with ``data`` from now on, as ``by`` has asked.
 
     Returns False, and logs why, where it has no such states or refuses them. A StateMachine that
-    runs now goes there at its next transition, as soon as its active state has ended.
+    runs now goes there at its next transition, as soon as its active state has ended; or as a
+    sender of viewer_jump sends it.
     """
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]
     if unknown:
         smach.logerr('Initial state %s not set: the container has only the states %s'
                      % (unknown, sorted(container.get_children())))
+        return False
+    goes_there = len(labels) == 1 and isinstance(
+        container, smach.StateMachine) and container.is_running()
+    is_sent = send_running(container, labels[0], data, by) if goes_there else None
+    if is_sent is False:
         return False
     userdata = smach.UserData()
     for key, value in data.items():
@@ -278,21 +301,17 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
     except smach.InvalidStateError as err:
         smach.logerr('Initial state %s not set: %s' % (labels, err))
         return False
-    if len(labels) == 1 and isinstance(container, smach.StateMachine) and container.is_running():
+    if goes_there:
         container.userdata.update(userdata)
-        watch.jump_to = labels[0]
+        watch.jump_to = None if is_sent else labels[0]
     return True
 
 
-def structure_message(path: str, container: Any) -> SmachContainerStructure:
-    """The graph of ``container`` as it is shown under ``path``."""
-    message = SmachContainerStructure()
-    message.header.stamp = rospy.get_rostime()
-    message.path = path
-    message.children = [str(label) for label in container.get_children()]
-    for outcome, source, target in container.get_internal_edges():
-        message.internal_outcomes.append(str(outcome))
-        message.outcomes_from.append(str(source))
-        message.outcomes_to.append(str(target))
-    message.container_outcomes = [str(outcome) for outcome in container.get_registered_outcomes()]
-    return message
+def structure_fields(container: Any) -> Tuple[List[str], ...]:
+    """The graph of ``container``: the fields of SmachContainerStructure behind its path."""
+    edges = [(str(outcome), str(source), str(target))
+             for outcome, source, target in container.get_internal_edges()]
+    return ([str(label) for label in container.get_children()],
+            [outcome for outcome, _, _ in edges], [source for _, source, _ in edges],
+            [target for _, _, target in edges],
+            [str(outcome) for outcome in container.get_registered_outcomes()])

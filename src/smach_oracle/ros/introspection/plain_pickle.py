@@ -13,6 +13,8 @@ from typing import Any, Callable, Dict, Mapping
 PROTOCOL = 2
 """What Python 2 viewers can read too."""
 LONGEST_TEXT = 16 * 1024 * 1024
+UNPICKLABLE = (Exception, SystemExit, GeneratorExit)
+"""What the classes of a script may raise where they are pickled."""
 
 
 class RefusedDataError(ValueError):
@@ -74,25 +76,26 @@ def decode_userdata(text: str) -> Dict[str, Any]:
     return data
 
 
-def encode_userdata(data: Mapping[str, Any], leave_out: Callable[[str, Exception], None]) -> str:
+def encode_userdata(data: Mapping[str, Any],
+                    leave_out: Callable[[str, BaseException], None]) -> str:
     """Return ``data`` as ``local_data``.
 
     A key that cannot be pickled is left out and handed to ``leave_out(key, error)``.
     """
     try:
         return _encode(dict(data))
-    except Exception:
+    except UNPICKLABLE:
         # Which key it was, and whether the others are well, only shows one by one.
         picklable = {}
         for key, value in dict(data).items():
             try:
                 pickle.dumps(value, PROTOCOL)
                 picklable[key] = value
-            except Exception as err:
+            except UNPICKLABLE as err:
                 leave_out(key, err)
     try:
         return _encode(picklable)
-    except Exception as err:
+    except UNPICKLABLE as err:
         leave_out('*', err)
         return _encode({})
 

@@ -18,9 +18,10 @@ from .bag_writer import MessageType
 
 # Of the definition that `_pack_directly` is written for; with any other, events go through the
 # message object.
-PACKED_MD5 = '67052263768e7d7c201c9b0c957ecc48'
+PACKED_MD5 = '4c206e77494b4db5d73e95d9218b3cb0'
 # Of earlier definitions with the same fields, which had fewer kinds of event.
-EARLIER_MD5S = frozenset(['04f09f94edfdd6b539964b195d7837e8'])
+EARLIER_MD5S = frozenset(['04f09f94edfdd6b539964b195d7837e8',
+                          '67052263768e7d7c201c9b0c957ecc48'])
 EVENT_TYPE = MessageType(OracleEvent._type, OracleEvent._md5sum, OracleEvent._full_text)
 
 _HEAD = struct.Struct('<BIIII')  # kind; header: seq, stamp, no frame_id

@@ -20,22 +20,24 @@ class WorldStopped(Exception):
 
 
 class Stopwatch:
-    """Wall time (s) by what it went into."""
+    """Wall time and processor time (s) of one thread, by what they went into."""
 
     def __init__(self) -> None:
-        self.spent: Dict[str, float] = {}
-        self._since = time.monotonic()
+        self.spent: Dict[str, float] = {}  # wall s
+        self.used: Dict[str, float] = {}  # processor s
+        self._since, self._used_since = time.monotonic(), time.thread_time()
 
     def add_time(self, what: str) -> None:
         """The time since the last call went into `what`."""
-        now = time.monotonic()
+        now, used = time.monotonic(), time.thread_time()
         self.spent[what] = self.spent.get(what, 0.0) + now - self._since
-        self._since = now
+        self.used[what] = self.used.get(what, 0.0) + used - self._used_since
+        self._since, self._used_since = now, used
 
     def restart(self) -> None:
-        """Begin anew."""
-        self.spent = {}
-        self._since = time.monotonic()
+        """Begin anew; in the thread whose time it takes."""
+        self.spent, self.used = {}, {}
+        self._since, self._used_since = time.monotonic(), time.thread_time()
 
 
 class WorldLoop:
@@ -86,6 +88,7 @@ class WorldLoop:
         :param closed: called at the end, in this thread.
         """
         self._thread = threading.current_thread()
+        self.watch.restart()
         try:
             if self._settings.lock_step:
                 self._run_in_lock_step()
@@ -143,7 +146,9 @@ class WorldLoop:
             job = self._jobs.get(block=timeout_s > 0, timeout=max(timeout_s, 1e-4))
         except queue.Empty:
             return False
+        self.watch.add_time('idle')
         job()
+        self.watch.add_time('jobs')
         return True
 
 

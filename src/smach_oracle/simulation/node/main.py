@@ -1,6 +1,7 @@
 """The world node: physics, controllers, camera, and the record of each trial's truth."""
 import sys
 import threading
+import time
 import traceback
 from typing import Optional
 
@@ -43,8 +44,13 @@ from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
 from .truth import TrialTruth, append_line
 
+# simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
+# wakes every action server of every node.
+CLOCK_S = {False: 0.05, True: 0.2}
 REST_S = 1.0  # after a trial, before it is judged
-LAST_WORDS_S = 1.5  # for the last trial's line, at the end
+# for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
+# sends a second signal; it takes a tenth of a second where nothing else is done
+LAST_WORDS_S = 12.0
 UNREGISTERING_S = 0.7  # for taking back some sixty topics from a master that may be busy, or gone
 SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
 
@@ -60,10 +66,12 @@ class WorldNode:
         """
         self._settings = settings
         self.exit_code = 0  # of the process; 1 where the world failed
-        self._world = World(draw(settings.task, settings.seed, settings.benign))
+        self._world = World(draw(settings.task, settings.seed, settings.benign),
+                            settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
-        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))))
+        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
+                               CLOCK_S[settings.lock_step])
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
         self._state = StatePublisher(publish_description(), list(self._world.joints()),
@@ -135,9 +143,11 @@ class WorldNode:
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
         self._finish_trial()
-        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
-        self._truth = TrialTruth(self._world.scene, self._world.time)
         self._loop.watch.restart()
+        began_s = time.monotonic()
+        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
+        self._loop.watch.add_time('reset')
+        self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
         causes = self._world.scene.causes
         self._cause.publish(
             TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
@@ -155,7 +165,8 @@ class WorldNode:
         sim_s = self._world.time
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent)
+        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent,
+                              self._loop.watch.used)
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
@@ -202,7 +213,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
-        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate; see '
+        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate, '
+        '~camera_binning; see '
         'doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:

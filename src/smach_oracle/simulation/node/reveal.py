@@ -15,7 +15,7 @@ from smach_oracle.geometry.transforms import inverse, quaternion
 from smach_oracle.msg import RevealedBody
 from smach_oracle.pr2.robot import BASE_FRAME, CAMERA_FRAME
 
-from ..physics.camera import HEIGHT, INTRINSICS, WIDTH, RenderedView
+from ..physics.camera import RenderedView, intrinsics_of, size_of
 from ..physics.world import World
 from ..scenes.fridge import DOOR_JOINT
 
@@ -40,7 +40,7 @@ def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[Reveal
     if unknown:
         raise ValueError('no body {!r} in this scene; there: {}'.format(
             unknown[0], ', '.join(parts) or 'none'))
-    seen = RenderedView(world, world.link_pose(CAMERA_FRAME)).bodies
+    seen = RenderedView(world, world.link_pose(CAMERA_FRAME), size_of(world)).bodies
     return [_message(world, name, parts[name], seen, stamp) for name in names or parts]
 
 
@@ -94,12 +94,13 @@ def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfIn
     corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * part.size
     camera = world.link_pose(CAMERA_FRAME)
     points = corners @ part.pose[:3, :3].T + part.pose[:3, 3]
-    pixels = pixels_of(points, INTRINSICS, camera)
+    pixels = pixels_of(points, intrinsics_of(world), camera)
     if (pixels[:, 2] <= 0).any():
         return RegionOfInterest(), 0.0
+    width, height = size_of(world)
     left, top = np.maximum(np.floor(pixels[:, :2].min(axis=0)).astype(int), 0)
     right, bottom = np.minimum(
-        np.ceil(pixels[:, :2].max(axis=0)).astype(int), (WIDTH - 1, HEIGHT - 1))
+        np.ceil(pixels[:, :2].max(axis=0)).astype(int), (width - 1, height - 1))
     if right < left or bottom < top:
         return RegionOfInterest(), 0.0
     window = seen[top:bottom + 1, left:right + 1]

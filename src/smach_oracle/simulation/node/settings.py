@@ -28,6 +28,8 @@ class WorldSettings(NamedTuple):
     state_rate: float = 10.0
     # images per simulated s for those who subscribe; at factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
+    # columns and rows of the camera's sensor that make one pixel of its images
+    camera_binning: int = 1
 
     @property
     def lock_step(self) -> bool:
@@ -58,7 +60,14 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
         state_rate=number('state_rate', 10.0 if factor else 4.0, 0.1, 60.0),
-        camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0))
+        camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
+        camera_binning=taken('camera_binning', 1, _one_or_two))
+
+
+def _one_or_two(key: str, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value not in (1, 2):
+        raise SettingsError(key, value, '1 or 2')
+    return value
 
 
 def _writable_file(key: str, value: object) -> str:

@@ -2,7 +2,7 @@
 import json
 import os
 import time
-from typing import Any, Dict, Mapping
+from typing import Any, Dict, Mapping, Optional
 
 from ..scenes.scene import Scene
 
@@ -11,18 +11,20 @@ class TrialTruth:
     """The record of a trial that is under way.
 
     :param sim_s: simulated s that have passed in the world when it begins.
+    :param began_s: wall s at which its reset was asked for, of time.monotonic(); None: now.
     """
 
-    def __init__(self, scene: Scene, sim_s: float) -> None:
+    def __init__(self, scene: Scene, sim_s: float, began_s: Optional[float] = None) -> None:
         self._scene = scene
         self._sim_s = sim_s
-        self._began = time.monotonic()
+        self._began = time.monotonic() if began_s is None else began_s
 
-    def record(self, success: bool, why: str, sim_s: float,
-               spent: Mapping[str, float]) -> Dict[str, Any]:
+    def record(self, success: bool, why: str, sim_s: float, spent: Mapping[str, float],
+               used: Mapping[str, float]) -> Dict[str, Any]:
         """What is to be written at its end.
 
         :param spent: wall s by what the world's process did in them.
+        :param used: processor s of the world's thread, likewise.
         """
         wall = time.monotonic() - self._began
         return {
@@ -31,7 +33,8 @@ class TrialTruth:
             'sim_s': round(sim_s - self._sim_s, 3), 'wall_s': round(wall, 3), 'share': {
                 what: round(seconds / max(wall, 1e-9), 4)
                 for what, seconds in sorted(spent.items())
-            }
+            }, 'cpu_s': {what: round(seconds, 4)
+                         for what, seconds in sorted(used.items())}
         }
 
 

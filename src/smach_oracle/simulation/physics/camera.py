@@ -13,18 +13,36 @@ from smach_oracle.pr2.robot import CAMERA_FRAME
 from ..scenes.scene import CameraQuality
 from .world import World
 
-WIDTH, HEIGHT = 640, 480
+WIDTH, HEIGHT = 640, 480  # pixels of the sensor
 FIELD_OF_VIEW = 45.0  # degrees, from top to bottom
 NEAR, FAR = 0.2, 5.0  # m
 FOCAL = HEIGHT / 2 / math.tan(math.radians(FIELD_OF_VIEW) / 2)  # pixels
-INTRINSICS = np.array([[FOCAL, 0.0, (WIDTH - 1) / 2], [0.0, FOCAL, (HEIGHT - 1) / 2],
-                       [0.0, 0.0, 1.0]])
+
+
+def _intrinsics(binning: int) -> np.ndarray:
+    focal = FOCAL / binning
+    return np.array([[focal, 0.0, (WIDTH // binning - 1) / 2],
+                     [0.0, focal, (HEIGHT // binning - 1) / 2], [0.0, 0.0, 1.0]])
+
+
+INTRINSICS = _intrinsics(1)  # of the sensor
 LIGHT = {'lightDirection': [1.0, 1.5, 3.0], 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.5,
          'lightSpecularCoeff': 0.05, 'shadow': 0}
 IMAGE_PERIODS = 2  # control periods that an image takes
 BASELINE = 0.075  # m, between projector and sensor: gives the steps in which depth comes
 EDGE = 0.03  # m: a jump of depth between neighbours from which the edge is lost, mostly
+LOST_EDGE = 0.7  # share of the sensor's pixels beside a jump that are lost
 DIMMED = 0.6  # brightness below which depth suffers, too
+
+
+def size_of(world: World) -> Tuple[int, int]:
+    """Width and height of the head camera's images, pixels."""
+    return WIDTH // world.binning, HEIGHT // world.binning
+
+
+def intrinsics_of(world: World) -> np.ndarray:
+    """(3, 3), of the head camera's images."""
+    return _intrinsics(world.binning)
 
 
 class RenderedView:
@@ -87,10 +105,11 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
     """
     quality = world.disturbances.camera_quality(world.scene.camera)
     pose = world.link_pose(CAMERA_FRAME)
-    rendered = RenderedView(world, pose)
+    rendered = RenderedView(world, pose, size_of(world))
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
     image = CameraImage(world.time, noisy_colour(rendered.colour, quality, generator),
-                        noisy_depth(rendered.depth, quality, generator), INTRINSICS.copy(),
+                        noisy_depth(rendered.depth, quality, generator, world.binning),
+                        intrinsics_of(world),
                         inverse(world.true_base()) @ pose)
     if counted:
         world.disturbances.image_taken()
@@ -105,11 +124,12 @@ def noisy_colour(colour: np.ndarray, quality: CameraQuality,
     return np.clip(colour * np.float32(quality.brightness) + noise, 0, 255).astype(np.uint8)
 
 
-def noisy_depth(depth: np.ndarray, quality: CameraQuality,
-                generator: np.random.Generator) -> np.ndarray:
+def noisy_depth(depth: np.ndarray, quality: CameraQuality, generator: np.random.Generator,
+                binning: int = 1) -> np.ndarray:
     """(h, w) float32 m, with a Kinect's noise, steps, lost edges and lost pixels.
 
-    NaN beyond FAR. Dim light adds to all of these.
+    NaN beyond FAR. Dim light adds to all of these. Of an edge as much is lost, in m, whatever the
+    size of the pixels.
     """
     known = np.asarray(depth, np.float32)
     dark = max(0.0, 1.0 - quality.brightness / DIMMED)
@@ -119,6 +139,7 @@ def noisy_depth(depth: np.ndarray, quality: CameraQuality,
     found = steps / np.round(steps / np.maximum(found, NEAR))
     chance = generator.random(depth.shape, np.float32)
     jumps = ndimage.maximum_filter(known, 3) - ndimage.minimum_filter(known, 3) > EDGE
-    lost = (jumps & (chance < 0.7)) | (chance > 1.0 - min(1.0, quality.dropout + 0.9 * dark ** 2))
+    at_edge = jumps & (chance < LOST_EDGE / binning)
+    lost = at_edge | (chance > 1.0 - min(1.0, quality.dropout + 0.9 * dark ** 2))
     found[lost | (known > 0.999 * FAR)] = np.nan
     return found.astype(np.float32)

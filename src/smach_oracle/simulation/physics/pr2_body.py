@@ -95,6 +95,13 @@ class Pr2Body:
         for arm in ARMS:
             self._grips[arm] = (sum(wanted[jaw] for jaw in FINGER_JOINTS[arm]), GRIP)
 
+    def never_meets(self, floor: int) -> None:
+        """Leave out the collisions of all but the arms with the floor, which they cannot reach."""
+        for name, number in self.links.items():
+            if name[:2] not in ('l_', 'r_'):
+                pybullet.setCollisionFilterPair(self.index, floor, number, -1, 0,
+                                                physicsClientId=self._client)
+
     def refusal(self, name: str, position: float) -> str:
         """Why a joint cannot be sent to a position, or ''."""
         if name not in self.numbers:

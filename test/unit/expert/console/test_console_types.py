@@ -77,12 +77,12 @@ class WhatIsSent(console_case.ConsoleCase):
         for number, command in enumerate((
                 {'do': 'hello', 'xsrf': said['xsrf'], 'expert': 'ann'},
                 {'do': 'watch', 'trial': 't'}, {'do': 'claim', 'question': 'q'},
-                {'do': 'take_wheel', 'question': 'q'}), 1):
+                {'do': 'take_wheel', 'question': 'q'}, {'do': 'look', 'at': 'trials'}), 1):
             await socket.write_message(json.dumps(dict(command, id=number)))
         pushing = tornado.ioloop.PeriodicCallback(self.pages.push, 20)
         pushing.start()
         seen = set()
-        while not {1, 2, 3, 4, 'sections', 'events'} <= seen:
+        while not {1, 2, 3, 4, 5, 'sections', 'events', 'lists'} <= seen:
             message = json.loads(await socket.read_message())
             reply = 'Reply<"take_wheel">' if message.get('re') == 4 else 'Reply'
             found.append((reply if 're' in message else 'Batch', message))
@@ -104,7 +104,8 @@ class WhatIsSent(console_case.ConsoleCase):
 
     def test_everything_that_is_sent_and_taken_has_its_declared_shape(self):
         samples = self.samples()
-        names = {name.split()[0] for _, value in samples for name in value.get('sections', {})}
+        names = {name.split()[0] for _, value in samples for part in ('sections', 'lists')
+                 for name in value.get(part, {})}
         assert names == SECTIONS, 'all of them are looked at'
         assert compile_samples(self.folder, samples) == (set(), '')
 

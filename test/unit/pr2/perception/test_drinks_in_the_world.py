@@ -15,9 +15,9 @@ from smach_oracle.simulation.scenes.kitchen_scene import draw
 from smach_oracle.tasks.drink_retrieval import IN_THE_FRIDGE, TORSO_HEIGHT
 
 
-@pytest.fixture(scope='module', name='world')
-def _world():
-    made = World()
+@pytest.fixture(scope='module', name='world', params=[1, 2], ids=['whole', 'binned'])
+def _world(request):
+    made = World(binning=request.param)
     yield made
     made.close()
 

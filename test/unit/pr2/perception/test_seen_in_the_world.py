@@ -22,9 +22,9 @@ IN_VIEW = tuple(
         (0.25, 0.5, -0.3, -1.3, 0.0, -0.5, 0.0)))
 
 
-@pytest.fixture(scope='module')
-def world():
-    made = World()
+@pytest.fixture(scope='module', params=[1, 2], ids=['whole', 'binned'])
+def world(request):
+    made = World(binning=request.param)
     yield made
     made.close()
 

@@ -7,8 +7,10 @@ import pytest
 from arms import REST, box, clutter, deepest, model, right_arm
 
 from smach_oracle.geometry.transforms import from_rpy
+from smach_oracle.pr2.planning import collision
 from smach_oracle.pr2.planning.arm import READY, Arm, SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import CollisionWorld, model_from
+from smach_oracle.pr2.planning.collision_body import BodyPool
 from smach_oracle.pr2.planning.planner import ACCELERATION, PlanningError, plan, straight, timed
 from smach_oracle.pr2.skills.arms_aside import ASIDE
 
@@ -172,16 +174,20 @@ def clients():
 
 
 def test_what_cannot_be_built_leaves_no_physics_client_behind(monkeypatch):
+    monkeypatch.setattr(collision, '_POOL', BodyPool())
     robot = SimpleNamespace(joints=lambda: REST)
-    before = clients()
+    with right_arm({}):
+        pass
+    before = clients()  # that of the robot that waits to be lent again among them
     with pytest.raises(ValueError):
         Arm(SkillContext(robot, model()), 'right',
             {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])}, 1)
-    assert clients() == before
+    with right_arm({}) as space:
+        assert clients() == before and space.names() == []
 
     def broken(*_, **__):
         raise pybullet.error('Cannot load URDF file.')
     monkeypatch.setattr(pybullet, 'loadURDF', broken)
     with pytest.raises(SkillError, match='robot description: Cannot load'):
-        Arm(SkillContext(robot, model()), 'right', {}, 1)
+        Arm(SkillContext(robot, model()), 'left', {}, 1)
     assert clients() == before

@@ -1,12 +1,19 @@
 """Which containers are seen, under which paths, and what is reported of them."""
+import copy
+import gc
 import pickle
+import weakref
 
 import pytest
 
 import smach
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import ContainerTree
+from smach_oracle.ros.introspection.container_watch import (
+    CALLBACK_LISTS,
+    ContainerTree,
+    is_watched,
+)
 
 
 class Step(smach.State):
@@ -118,3 +125,85 @@ def test_jump_is_taken_once_and_forgotten_at_the_end(tree, seen):
     del seen[:]
     machine.execute()
     assert [states for _, _, states in seen] == [['A'], ['B'], ['C'], ['None']]
+
+
+def callbacks_of(*containers):
+    return [list(getattr(each, name)) for each in containers for name in CALLBACK_LISTS]
+
+
+def test_what_is_cleared_has_its_own_callbacks_again_and_no_others(tree):
+    inner = chain('X')
+    machine = holding('IN', inner)
+    heard = []
+    machine.register_start_cb(lambda ud, states: heard.append(states))
+    before = callbacks_of(machine, inner)
+    other = ContainerTree(lambda *args: None)
+    for _ in range(3):
+        tree.add_root('/R', machine)
+        other.add_root('/OTHER', machine)
+        assert is_watched(machine)
+        tree.clear()
+        assert is_watched(machine), 'the other tree follows it still'
+        other.clear()
+    assert not is_watched(machine)
+    assert callbacks_of(machine, inner) == before
+    machine.execute()
+    assert heard == [['IN']]
+
+
+def test_a_callback_that_takes_another_tree_away_keeps_no_callback_from_its_turn(tree):
+    machine, heard = chain('A'), []
+    machine.register_start_cb(lambda ud, states: tree.clear())
+    tree.add_root('/R', machine)
+    machine.register_start_cb(lambda ud, states: heard.append(states))
+    machine.execute()
+    assert heard == [['A']]
+
+
+def test_a_container_that_is_taken_out_is_let_go(tree):
+    machine, inner = holding('IN', chain('X')), chain('Y')
+    tree.add_root('/R', machine)
+    gone = weakref.ref(machine['IN'])
+    machine._states['IN'] = inner
+    tree.refresh()
+    gc.collect()
+    assert gone() is None
+    assert tree.by_path['/R/IN'].container is inner
+
+
+def test_a_copy_of_a_watched_machine_is_not_watched(tree):
+    machine = chain('A')
+    tree.add_root('/R', machine)
+    assert is_watched(machine)
+    assert not is_watched(copy.deepcopy(machine))
+
+
+class Broken(smach.StateMachine):
+    """Cannot say what is in it."""
+
+    def get_children(self):
+        raise AttributeError('not yet built')
+
+
+class Uninitialised(smach.Container):
+    """Never called Container.__init__."""
+
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['next'])
+
+    def get_children(self):
+        return {}
+
+
+@pytest.mark.parametrize('kind', [lambda: Broken(outcomes=['next']), Uninitialised])
+def test_a_broken_container_hides_no_other(kind, tree, seen):
+    machine = chain('A', 'B')
+    with machine:
+        smach.StateMachine.add('BROKEN', kind(), {'next': 'next'})
+        smach.StateMachine.add('FINE', chain('X'), {'next': 'next'})
+    tree.add_root('/R', machine)
+    assert sorted(tree.by_path) == ['/R', '/R/BROKEN', '/R/FINE']
+    machine['FINE'].execute()
+    assert [info for _, info, _ in seen] == ['START', 'TERMINATION next']
+    tree.clear()
+    assert not is_watched(machine)

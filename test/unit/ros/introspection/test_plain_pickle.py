@@ -98,3 +98,16 @@ def test_values_that_cannot_be_pickled_are_left_out_and_named():
     text = plain_pickle.encode_userdata(data, lambda key, err: left_out.append(key))
     assert plain_pickle.decode_userdata(text) == {'good': 1}
     assert sorted(left_out) == ['deep', 'function', 'lock']
+
+
+@pytest.mark.parametrize('error', [SystemExit, GeneratorExit, RecursionError, MemoryError])
+def test_whatever_a_class_raises_the_other_keys_are_written(error):
+    class Raises(object):
+        def __reduce__(self):
+            raise error()
+
+    left_out = []
+    text = plain_pickle.encode_userdata({'good': 1, 'bad': Raises()},
+                                        lambda key, err: left_out.append((key, type(err))))
+    assert plain_pickle.decode_userdata(text) == {'good': 1}
+    assert left_out == [('bad', error)]

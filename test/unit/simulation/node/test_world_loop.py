@@ -202,7 +202,8 @@ def test_the_settings_of_a_world_without_limit_differ_from_those_of_a_paced_one(
                                          ('~real_time_factor', 'fast'), ('~seed', -1),
                                          ('~seed', 1.5), ('~benign', 'yes'), ('~truth_file', ''),
                                          ('~state_rate', 0), ('~idle_speed', float('nan')),
-                                         ('~camera_rate', True)])
+                                         ('~camera_rate', True), ('~camera_binning', 3),
+                                         ('~camera_binning', True)])
 def test_a_bad_parameter_is_named(name, value):
     with pytest.raises(SettingsError, match=name):
         read_settings(lambda asked, default: value if asked == name else default)

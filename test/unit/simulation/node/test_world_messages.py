@@ -151,10 +151,11 @@ def test_the_truth_is_a_line_for_each_trial(tmp_path):
     path = tmp_path / 'truth.jsonl'
     for seconds in (12.0, 14.0):
         append_line(str(path),
-                    TrialTruth(scene(), 10.0).record(True, 'stands', seconds, {'physics': 0.5}))
+                    TrialTruth(scene(), 10.0).record(True, 'stands', seconds, {'physics': 0.5},
+                                                     {'physics': 0.25}))
     lines = [json.loads(line) for line in path.read_text(encoding='utf-8').splitlines()]
     assert [line['sim_s'] for line in lines] == [2.0, 4.0]
     assert lines[0]['causes'] == [{'kind': 'crowded', 'text': 'by much'}]
     assert {key: lines[0][key] for key in ('seed', 'task', 'success', 'why')} == {
         'seed': 7, 'task': 'test', 'success': True, 'why': 'stands'}
-    assert lines[0]['share']['physics'] > 0
+    assert lines[0]['share']['physics'] > 0 and lines[0]['cpu_s'] == {'physics': 0.25}

@@ -155,3 +155,26 @@ def test_a_portrait_shows_the_robot_and_is_lit(world):
     robot = picture[40:100, 60:130].astype(int)
     assert np.ptp(robot.sum(axis=2)) > 200 and (robot.max(axis=2) > 150).mean() > 0.1
     assert (picture.max(axis=2) < 15).mean() < 0.02  # no black meshes
+
+
+def test_a_binned_camera_sees_the_same_in_fewer_pixels(world):
+    images = []
+    for binning in (1, 2):
+        world.binning = binning
+        try:
+            world.reset(scene(camera=CameraQuality(noise=0.0, colour_noise=0.0), robot=BOWED))
+            images.append(DirectRobot(world).see())
+        finally:
+            world.binning = 1
+    whole, binned = images
+    assert binned.depth.shape == binned.colour.shape[:2] == (HEIGHT // 2, WIDTH // 2)
+    # the middle of four pixels has the mean of their depths, but for edges
+    fours = whole.depth.reshape(HEIGHT // 2, 2, WIDTH // 2, 2).mean(axis=(1, 3))
+    known = np.isfinite(fours) & np.isfinite(binned.depth)
+    assert known.mean() > 0.5 and np.median(np.abs(fours - binned.depth)[known]) < 2e-3
+    points = [points_of(image.depth, image.intrinsics, image.base_from_camera)
+              for image in (whole, binned)]
+    ends = [np.nanpercentile(each.reshape(-1, 3), [5, 95], axis=0) for each in points]
+    assert np.abs(ends[0] - ends[1]).max() < 0.02
+    lost = [np.isnan(image.depth).mean() for image in images]
+    assert lost[1] == pytest.approx(lost[0], rel=0.25)

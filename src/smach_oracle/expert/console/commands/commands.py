@@ -100,6 +100,7 @@ def _person(value: object) -> str:
 COMMANDS: Dict[str, CommandSpec] = {
     'hello': CommandSpec('viewer', {'xsrf': text(200, 1), 'expert': _person}),
     'watch': CommandSpec('viewer', {'trial': text(400)}),
+    'look': CommandSpec('viewer', {'at': one_of(('', 'trials'))}),
     'claim': CommandSpec('operator', QUESTION),
     'take_over': CommandSpec('operator', QUESTION),
     'release': CommandSpec('operator', QUESTION),

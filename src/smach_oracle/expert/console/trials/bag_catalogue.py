@@ -1,8 +1,8 @@
 """Trials of bags in some folders: found, counted, and read again when somebody opens one.
 
 Bags are files that may come from anywhere: their content is read as messages by their own
-definitions, bounded, and never as code. A browser knows a trial by the number that it was given
-here.
+definitions, by a process with limits, and never as code. A browser knows a trial by the number
+that it was given here.
 """
 import fcntl
 import itertools
@@ -13,14 +13,16 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tu
 
 import rospy
 
-from smach_oracle.analysis.bag_events import BagContent, BagError, EventReader, find_bags
-from smach_oracle.analysis.trials import TrialSummary, summarise
+from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
+from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
+from smach_oracle.analysis.trials import TrialSummary
 from smach_oracle.analysis.variants import Count, count_variants
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.oracle.records.events import Event
 from smach_oracle.packages import lacking
 
 from ..web.sections import PageSections
+from .bag_folders import BagFolders, FileState
+from .bag_process import read_bags
 
 SECTION = 'bags'
 SCAN_PERIOD_S = 5.0
@@ -29,6 +31,8 @@ MOST_BYTES = 2 ** 30  # of a bag
 MOST_EVENTS = 200000  # in a bag
 SHOWN_TRIALS = 300
 SHOWN_BROKEN = 50
+MOST_BAGS_OF_A_TRIAL = 20  # the newest that were read
+MOST_REPLY = 64 * 10 ** 6  # bytes, of all that is replayed of a trial
 BEING_WRITTEN_S = 60.0
 _COUNTS = {
     'failures': 'failures of states', 'recoveries': 'oracle recoveries',
@@ -55,22 +59,22 @@ class BagCatalogue:
 
     def __init__(self, folders: Sequence[str], sections: PageSections) -> None:
         """`folders`: with bags in them or below."""
-        self._folders = list(folders)
+        self._folders = BagFolders(folders)
         self._sections = sections
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
         self._trials: Dict[str, BagTrial] = {}
-        self._read: Dict[str, Tuple[int, int]] = {}  # path -> size and ns of the last change
-        self._broken: Dict[str, str] = {}
+        self._read: Dict[str, FileState] = {}  # by path
+        self._broken: Dict[str, str] = {}  # why, by path
+        self._refused: Dict[str, str] = {}  # what is not even opened: why, by path
         self._notes: List[str] = []
-        self._reader: Optional[EventReader] = None
 
     def run(self) -> None:
         """Scan again and again until the node goes down; return at once without folders."""
         if not self._folders:
             return
         try:
-            self._reader = EventReader(MOST_EVENTS)
+            EventReader()
         except ImportError as err:  # it needs rosbags, which not every robot has
             self._notes = [lacking(err) or str(err)]
             self.write_sections(0)
@@ -84,7 +88,7 @@ class BagCatalogue:
 
     def scan(self) -> None:
         """Read the bags that are new or have changed."""
-        waiting = self._fresh(self._found())
+        waiting = self._fresh()
         drawn_s = -SCAN_PERIOD_S
         for position, (path, state) in enumerate(waiting):
             began_s = time.monotonic()
@@ -101,7 +105,7 @@ class BagCatalogue:
         """Bring the section up to date; `waiting`: so many bags are still to be read."""
         with self._lock:
             trials = sorted(self._trials.values(), key=lambda each: -each.summary.start_time)
-            broken = sorted(self._broken.items())
+            broken = sorted({**self._refused, **self._broken}.items())
         notes = self._notes + ([
             'Of {} trials the latest {} are listed.'.format(len(trials), SHOWN_TRIALS)
         ] if len(trials) > SHOWN_TRIALS else [])
@@ -110,61 +114,44 @@ class BagCatalogue:
                 'waiting': waiting, 'note': ' '.join(notes), 'table': _table(
                     [each.summary
                      for each in trials]), 'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
-                'broken': [{'name': self._short(path), 'reason': reason[:300]}
+                'broken': [{'name': self._folders.name_of(path), 'reason': reason[:300]}
                            for path, reason in broken[:SHOWN_BROKEN]]
             })
 
-    def events(self, number: int) -> Tuple[BagTrial, List[Event]]:
-        """A trial with all its events, in order; read now.
+    def find(self, number: int) -> BagTrial:
+        """A trial by its number.
 
-        :raises RecordedTrialError: for no such trial, or bags that cannot be read any more.
+        :raises RecordedTrialError: for no such trial.
         """
         with self._lock:
             trial = next((each for each in self._trials.values() if each.number == number), None)
         if trial is None:
             raise RecordedTrialError(
                 'There is no trial {} any more; choose it again.'.format(number))
-        by_number: Dict[int, Event] = {}
-        for path in trial.summary.bags:
-            for event in self._content(path).events:
-                if event.trial_id == trial.summary.trial_id:
-                    by_number[event.seq] = event
-        return trial, [by_number[seq] for seq in sorted(by_number)]
+        return trial
 
-    def _content(self, path: str) -> BagContent:
-        try:
-            return self._read_events(path)
-        except BagError as err:
-            raise RecordedTrialError('{}: {}'.format(self._short(path), err)) from err
+    def replayed(self, trial: BagTrial, most_events: int) -> BagReply:
+        """The first events of a trial, in order, and its machines; read now.
 
-    def _read_events(self, path: str) -> BagContent:
-        """Everything in a bag.
-
-        :raises BagError: where it cannot be read.
+        :raises RecordedTrialError: where its bags cannot be read any more.
         """
-        if self._reader is None:
-            raise BagError('no bag can be read here: rosbags is missing')
-        return self._reader.read(path)
+        paths = list(trial.summary.bags)
+        try:
+            return read_bags(self._folders, _request(
+                paths, [trial.summary.trial_id], shown_events=most_events, reply_bytes=MOST_REPLY))
+        except BagReadError as err:
+            name = self._folders.name_of(paths[err.position])
+            raise RecordedTrialError('{}: {}'.format(name, err)) from err
+        except FileNotFoundError as err:
+            raise RecordedTrialError('A bag of this trial is gone.') from err
 
-    def _found(self) -> List[str]:
-        self._notes, paths = [], []
-        for folder in self._folders:
-            try:
-                paths += find_bags([folder])
-            except BagError as err:
-                self._notes.append('{}.'.format(err))
-        return list(dict.fromkeys(paths))
-
-    def _fresh(self, paths: Iterable[str]) -> List[Tuple[str, Tuple[int, int]]]:
+    def _fresh(self) -> List[Tuple[str, FileState]]:
         """The bags that are to be read, newest first; forgets those that are gone."""
-        states: Dict[str, Tuple[int, int]] = {}
-        for path in paths:
-            try:
-                found = os.stat(path)
-            except OSError:
-                continue
-            states[path] = (found.st_size, found.st_mtime_ns)
-        kept = sorted(states, key=lambda path: -states[path][1])
+        found = self._folders.find()
+        self._notes, states = found.missing, found.states
+        with self._lock:
+            self._refused = found.refused
+        kept = sorted(states, key=lambda path: -states[path].changed_ns)
         if len(kept) > MOST_BAGS:
             self._notes.append('Of {} bags the newest {} are read.'.format(len(kept), MOST_BAGS))
         kept = kept[:MOST_BAGS]
@@ -183,22 +170,23 @@ class BagCatalogue:
         for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
             del self._trials[trial_id]
 
-    def _read_bag(self, path: str, state: Tuple[int, int]) -> None:
+    def _read_bag(self, path: str, state: FileState) -> None:
         """Read one bag."""
         self._read[path] = state
         reason = ''
         try:
-            if path.endswith('.active') and (time.time() - state[1] / 1e9 < BEING_WRITTEN_S
-                                             or _is_written(path)):
-                del self._read[path]
-                return  # its trial runs; it is shown live
-            if state[0] > MOST_BYTES:
-                raise RecordedTrialError('it has {:.1f} GiB; at most {:.0f} are read'.format(
-                    state[0] / 2**30, MOST_BYTES / 2**30))
+            if path.endswith('.active'):
+                if self._is_written(path, state):
+                    del self._read[path]
+                    return  # its trial runs; it is shown live
+                raise BagReadError(UNFINISHED)
+            if state.size > MOST_BYTES:
+                raise BagReadError('it has {:.1f} GiB; at most {:.0f} are read'.format(
+                    state.size / 2**30, MOST_BYTES / 2**30))
             self._count(path)
-        except OracleError as err:
-            reason = str(err).replace(path, self._short(path))
-        except OSError:
+        except BagError as err:
+            reason = str(err)
+        except FileNotFoundError:
             del self._read[path]  # it has just got its final name, or is gone: the next scan shows
         with self._lock:
             self._broken.pop(path, None)
@@ -206,43 +194,49 @@ class BagCatalogue:
                 self._broken[path] = reason
                 self._drop(path)
 
-    def _count(self, path: str) -> None:
-        content = self._read_events(path)
-        by_trial: Dict[str, Dict[int, Event]] = {}
-        for event in content.events:
-            by_trial.setdefault(event.trial_id, {})[event.seq] = event
-        for trial_id, events in by_trial.items():
-            known = self._trials.get(trial_id)
-            others = [each for each in known.summary.bags if each != path] if known else []
-            for other in others:  # its record is in several bags, as after a full disk
-                events.update((event.seq, event) for event in self._content(other).events
-                              if event.trial_id == trial_id)
-            summary = summarise(list(events.values()), tuple(others + [path]))
-            with self._lock:
-                self._trials[trial_id] = BagTrial(known.number if known else next(self._numbers),
-                                                    content.nodes.get(trial_id, ''), summary)
-
-    def _short(self, path: str) -> str:
-        """A bag's name below its folder."""
-        return short_name(path, self._folders)
-
-
-def _is_written(path: str) -> bool:
-    """Whether a living recorder of this machine holds it."""
-    with open(path, 'rb') as bag:
+    def _is_written(self, path: str, state: FileState) -> bool:
+        """Whether it grows, or a living recorder of this machine holds it."""
+        if time.time() - state.changed_ns / 1e9 < BEING_WRITTEN_S:
+            return True
+        descriptor = self._folders.open(path)
         try:
-            fcntl.flock(bag.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except OSError:
             return True
-    return False
+        finally:
+            os.close(descriptor)
+        return False
+
+    def _count(self, path: str) -> None:
+        by_bags: Dict[Tuple[str, ...], List[ReadTrial]] = {}
+        for read in read_bags(self._folders, _request([path])).trials:
+            by_bags.setdefault(self._bags_of(read.summary.trial_id, path), []).append(read)
+        for bags, trials in by_bags.items():
+            if len(bags) > 1:  # their record is in several bags, as after a full disk
+                trials = self._together(bags, [read.summary.trial_id for read in trials])
+            for read in trials:
+                known = self._trials.get(read.summary.trial_id)
+                number = known.number if known else next(self._numbers)
+                with self._lock:
+                    self._trials[read.summary.trial_id] = BagTrial(
+                        number, read.node, read.summary._replace(bags=bags))
+
+    def _bags_of(self, trial_id: str, path: str) -> Tuple[str, ...]:
+        """The bags that a trial is in, that of `path` last."""
+        known = self._trials.get(trial_id)
+        others = [each for each in known.summary.bags if each != path] if known else []
+        return tuple(others[1 - MOST_BAGS_OF_A_TRIAL:] + [path])
+
+    def _together(self, bags: Sequence[str], trial_ids: List[str]) -> List[ReadTrial]:
+        try:
+            return read_bags(self._folders, _request(list(bags), trial_ids)).trials
+        except BagReadError as err:
+            raise BagReadError('{}: {}'.format(
+                self._folders.name_of(bags[err.position]), err)) from err
 
 
-def short_name(path: str, folders: Sequence[str]) -> str:
-    """A bag's path below the folder that it was found in."""
-    for folder in (os.path.realpath(each) for each in folders):
-        if path.startswith(folder + os.sep):
-            return path[len(folder) + 1:]
-    return os.path.basename(path)
+def _request(paths: List[str], trials: Sequence[str] = (), **more: int) -> BagRequest:
+    return BagRequest(paths, list(trials), most_events=MOST_EVENTS, **more)
 
 
 def _row(trial: BagTrial) -> Dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any, Counter, Dict, List, Sequence, Set, Tuple
 import rospy
 from sensor_msgs.msg import CompressedImage
 
+from smach_oracle.analysis.bag_machines import FailureImage, RecordedMachines
 from smach_oracle.oracle.records.events import Event, EventKind
 
 from ..feeds.views import event_view
@@ -21,13 +22,12 @@ from ..graphs.container_graph import (
 )
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.question_images import ImageStore, image_view, stored_images
-from .bag_catalogue import BagCatalogue, RecordedTrialError
+from .bag_catalogue import BagCatalogue, BagTrial, RecordedTrialError
 
 MOST_EVENTS = 20000  # of a trial: the first ones
 LAYOUT_WAIT_S = 8.0
 REMEMBERED = 4
 MOST_BYTES = 20000000  # of what is sent
-MOST_TEXT = 4000000  # of all events' texts, in characters
 ImagesByQuestion = Dict[str, List[Dict[str, Any]]]  # as of image_view
 
 
@@ -47,12 +47,10 @@ class RecordedTrials:
         :raises RecordedTrialError: where it cannot be had.
         """
         with self._lock:  # one at a time: reading takes memory
-            trial, events = self._catalogue.events(number)
+            trial = self._catalogue.find(number)
             key = (number, trial.summary.bags)
             if key not in self._known:
-                text = json.dumps(
-                    self._content(trial.summary.bags, _shortened(events[:MOST_EVENTS])),
-                    allow_nan=False)
+                text = json.dumps(self._content(trial), allow_nan=False)
                 if len(text) > MOST_BYTES:
                     raise RecordedTrialError(
                         'The trial is too large to be shown: {:.0f} MB.'.format(len(text) / 1e6))
@@ -61,41 +59,29 @@ class RecordedTrials:
                     self._known.popitem(last=False)
             return self._known[key]
 
-    def _content(self, bags: Sequence[str], events: List[Event]) -> Dict[str, Any]:
-        containers, images = self._machines(bags,
-                                            {event.query_id
-                                             for event in events if event.query_id})
+    def _content(self, trial: BagTrial) -> Dict[str, Any]:
+        read = self._catalogue.replayed(trial, MOST_EVENTS)
+        if read.problem:
+            rospy.logwarn('Machines in %s cannot be read: %s', trial.summary.bags, read.problem)
+        containers, events = _structures(read.machines), read.events
         structures = {path: containers.get(path) or graph_from_events(path, events)
                       for path in sorted({event.path for event in events if event.path})[:200]}
         return {
-            'events': [event_view(event) for event in events], 'graphs': self._graphs(structures),
-            'images': images
+            'events': [event_view(event) for event in events],
+            'graphs': self._graphs(structures), 'images': self._images(
+                read.machines.frames, {event.query_id for event in events if event.query_id})
         }
 
-    def _machines(self, bags: Sequence[str],
-                  questions: Set[str]) -> Tuple[Dict[str, ContainerGraph], ImagesByQuestion]:
-        """Containers by path, and images by query id."""
-        from smach_oracle.analysis.bag_machines import read_machines  # it needs rosbags
-        containers: Dict[str, ContainerGraph] = {}
+    def _images(self, frames: Sequence[FailureImage], questions: Set[str]) -> ImagesByQuestion:
+        """Images by query id."""
         images: ImagesByQuestion = {}
-        for bag in bags:
-            try:
-                found = read_machines(bag)
-            except Exception as err:
-                # a damaged file can make rosbags raise anything; the events are there
-                rospy.logwarn('The machines in %s cannot be read: %r', bag, err)
-                continue
-            for path, graph in found.containers.items():
-                containers[path] = make_structure(path, graph.children,
-                                                  [GraphEdge(*edge) for edge in graph.edges],
-                                                  graph.outcomes)
-            for frame in found.frames:
-                if frame.query_id in questions:
-                    image = CompressedImage(format=frame.format, data=frame.data)
-                    images.setdefault(frame.query_id, []).extend(
-                        image_view(each)
-                        for each in stored_images(self._files, [frame.topic], [image]))
-        return containers, images
+        for frame in frames:
+            if frame.query_id in questions:
+                image = CompressedImage(format=frame.format, data=frame.data)
+                images.setdefault(frame.query_id, []).extend(
+                    image_view(each)
+                    for each in stored_images(self._files, [frame.topic], [image]))
+        return images
 
     def _graphs(self, structures: Dict[str, ContainerGraph]) -> Dict[str, Any]:
         """Drawings of the containers, after waiting a little for dot."""
@@ -110,13 +96,10 @@ class RecordedTrials:
         return found
 
 
-def _shortened(events: Sequence[Event]) -> List[Event]:
-    """With the ends of long texts, the longer the fewer events there are."""
-    longest = max(200, MOST_TEXT // max(1, len(events)))
-    return [
-        event if len(event.text) <= longest else event._replace(text='…' + event.text[-longest:])
-        for event in events
-    ]
+def _structures(machines: RecordedMachines) -> Dict[str, ContainerGraph]:
+    """Containers by path."""
+    return {path: make_structure(path, graph.children, [GraphEdge(*edge) for edge in graph.edges],
+                                 graph.outcomes) for path, graph in machines.containers.items()}
 
 
 def graph_from_events(path: str, events: Sequence[Event]) -> ContainerGraph:

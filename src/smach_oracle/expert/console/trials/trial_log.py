@@ -52,11 +52,18 @@ class TrialLog:
         self._lock = threading.Lock()
         self._trials: 'OrderedDict[str, _LoggedTrial]' = OrderedDict()
         self._recoveries = RecoveryStatistics()
+        self._version = 0
+
+    @property
+    def version(self) -> int:
+        """Grows with every change."""
+        return self._version
 
     def add(self, robot: str, event: Event) -> None:
         """Take in one event of a robot."""
         ended = event.kind in (EventKind.CONTAINER_END, EventKind.TRIAL_END)
         with self._lock:
+            self._version += 1
             trial = self._trials.get(event.trial_id)
             if trial is None:
                 trial = self._trials[event.trial_id] = _LoggedTrial(robot)
@@ -71,6 +78,7 @@ class TrialLog:
     def end_missing(self, robot: str) -> None:
         """A robot is gone: what still ran there has ended without a word."""
         with self._lock:
+            self._version += 1
             for trial in self._trials.values():
                 if trial.robot == robot and not trial.ended:
                     trial.robot_gone = True

@@ -17,6 +17,7 @@ from smach_oracle.oracle.settings.paths import path_of
 ROLES = ('viewer', 'operator', 'teleoperator')  # each may do what those before it may
 SHORTEST_TOKEN = 20  # characters
 MOST_KEYS = 1000
+RESERVE = 0.1  # of a client's share
 
 
 class Identity(NamedTuple):
@@ -141,15 +142,26 @@ class RateLimit:
         return True
 
 
+class _ClientRateLimit(NamedTuple):
+    """The limits of one client."""
+
+    all: RateLimit
+    reserve: RateLimit  # the part of it that others cannot use up
+
+
 class ClientRateLimits:
-    """One limit a client, for as many clients as are remembered, and one for all together."""
+    """One limit a client, for as many clients as are remembered, and one for all strangers.
+
+    A client that asks for little has it, however much others ask for: a tenth of its share is its
+    own, and does not count for that of all.
+    """
 
     def __init__(self, rate: float, burst: float, for_all: float,
                  clock: Callable[[], float] = time.monotonic) -> None:
-        """`for_all`: how many times one client's share all clients together may have."""
+        """`for_all`: how many times one client's share all strangers together may have."""
         self._make = lambda factor: RateLimit(rate * factor, burst * factor, clock)
         self._all = self._make(for_all)
-        self._by_key: 'OrderedDict[str, RateLimit]' = OrderedDict()
+        self._by_key: 'OrderedDict[str, _ClientRateLimit]' = OrderedDict()
 
     def take(self, key: str, known: bool = False) -> bool:
         """Whether one more of this client may pass now.
@@ -157,10 +169,12 @@ class ClientRateLimits:
         :param known: it has come with a token: the limit for all together is for strangers.
         """
         if key not in self._by_key:
-            self._by_key[key] = self._make(1.0)
+            self._by_key[key] = _ClientRateLimit(self._make(1.0), self._make(RESERVE))
             if len(self._by_key) > MOST_KEYS:
                 self._by_key.popitem(last=False)
-        return self._by_key[key].take() and (known or self._all.take())
+        self._by_key.move_to_end(key)
+        own = self._by_key[key]
+        return own.all.take() and (known or own.reserve.take() or self._all.take())
 
 
 class SocketRateLimits(NamedTuple):
@@ -169,6 +183,18 @@ class SocketRateLimits(NamedTuple):
     commands: RateLimit
     driving: RateLimit  # commands of a page that drives
     unruly: RateLimit  # how often the others may be exceeded before the socket is closed
+
+
+def network_of(address: str) -> str:
+    """For whose limits an address counts: with IPv6 a whole /64, all of which one machine has."""
+    try:
+        given = ipaddress.ip_address(address.split('%')[0])
+    except ValueError:
+        return address
+    if given.version == 4:
+        return str(given)
+    mapped = given.ipv4_mapped
+    return str(mapped or ipaddress.ip_network((int(given) >> 64 << 64, 64)))
 
 
 def may(role: str, needed: str) -> bool:

@@ -2,11 +2,13 @@
 import time
 from typing import Dict, Optional, Tuple
 
+import tornado.httputil
 import tornado.web
 
 from . import sessions
-from .access import ClientRateLimits, Identity
+from .access import ClientRateLimits, Identity, network_of
 from .audit import Audit
+from .connections import OpenConnections
 from .sessions import BrowserSession
 from .settings import ConsoleSettings
 
@@ -18,11 +20,14 @@ class AccessControl:
         self.settings = settings
         self.secret = secret
         self.audit = audit
+        self.connections = OpenConnections()
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
         # a page has some 80; a browser may open many pages
         self.files = ClientRateLimits(rate=100.0, burst=1500.0, for_all=5.0)
+        # wrong tokens: those that are answered as such, and those that are heard at all
         self.sign_ins = ClientRateLimits(rate=0.2, burst=5.0, for_all=4.0)
+        self.wrong_tokens = ClientRateLimits(rate=2.0, burst=20.0, for_all=5.0)
         # id of a session -> when, s; of those whose cookie might still be good
         self._ended: Dict[str, float] = {}
 
@@ -55,29 +60,34 @@ class AccessControl:
         return Identity(session.role, session.name) if session and signed_in else None
 
     def refusal(self, handler: tornado.web.RequestHandler,
-                limits: Optional[ClientRateLimits] = None) -> int:
+                limits: Optional[ClientRateLimits] = None, limited: bool = True) -> int:
         """The status with which a request is refused; 0 where it may go on.
 
         :param limits: of its own, where it has any.
+        :param limited: False: it is never too fast.
         """
         request = handler.request
         if not self.settings.hosts.allows(request.headers.get('Host', '')):
             return 421
-        if not (limits or self.requests).take(*self._share_of(handler)):
+        session = self.session(handler)
+        known = session.id if session is not None and self.identity(session) else ''
+        if not self.connections.heard(request, known):
+            return 503
+        if limited and not (limits or self.requests).take(*self._share_of(request, known)):
             return 429
         if not self.from_own_page(handler, must_say=request.method not in ('GET', 'HEAD')):
             return 403
         return 0
 
-    def _share_of(self, handler: tornado.web.RequestHandler) -> Tuple[str, bool]:
+    def _share_of(self, request: tornado.httputil.HTTPServerRequest,
+                  known: str) -> Tuple[str, bool]:
         """For whose limit a request counts, and whether that one has come with a token.
 
         Strangers of the same address, or very many of them, take nothing from who has a token.
         """
-        session = self.session(handler)
-        if self.settings.tokens is not None and session is not None and self.identity(session):
-            return 'session ' + session.id, True
-        return handler.request.remote_ip or '', False
+        if self.settings.tokens is not None and known:
+            return 'session ' + known, True
+        return network_of(request.remote_ip or ''), False
 
     def from_own_page(self, handler: tornado.web.RequestHandler, must_say: bool) -> bool:
         """Whether the Origin is this console; `must_say`: a request without one is refused, too."""

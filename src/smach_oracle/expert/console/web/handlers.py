@@ -5,7 +5,7 @@ from typing import Any, Callable, Dict, Optional, Protocol
 import tornado.web
 
 from . import sessions
-from .access import ClientRateLimits, Identity
+from .access import ClientRateLimits, Identity, network_of
 from .access_control import AccessControl
 from .audit import Person
 from .sessions import BrowserSession
@@ -46,9 +46,10 @@ class CheckedHandler(tornado.web.RequestHandler):
         """Before anything else."""
         self.demand_admission()
 
-    def demand_admission(self, limits: Optional[ClientRateLimits] = None) -> None:
+    def demand_admission(self, limits: Optional[ClientRateLimits] = None,
+                         limited: bool = True) -> None:
         """Let a request pass the access control, or answer it with the status of the refusal."""
-        status = self.access.refusal(self, limits)
+        status = self.access.refusal(self, limits, limited)
         if status:
             raise tornado.web.HTTPError(status)
 
@@ -126,6 +127,16 @@ class SessionHandler(CheckedHandler):
         """Called by Tornado. `close`: the sockets of a session."""
         self._close = close
 
+    def prepare(self) -> None:
+        """Check access; who comes with a right token is never too fast, whatever others try.
+
+        Wrong ones have limits of their own, and so take nothing from those who load the page.
+        """
+        if self.request.method == 'POST':
+            self.demand_admission(self.access.wrong_tokens, limited=not self._is_right())
+        else:
+            super().prepare()
+
     def get(self) -> None:
         """Answer with what the page needs before it opens the socket.
 
@@ -140,11 +151,9 @@ class SessionHandler(CheckedHandler):
         """Take a token."""
         session = self.demand_xsrf(self.access.session(self))
         person = Person(self.request.remote_ip or '', session.short, '', '')
-        tokens = self.access.settings.tokens
-        identity = tokens.identify(self._token()) if tokens is not None else None
+        identity = self._given()
         if identity is None:
-            # who comes with a right token is let in, whatever others have tried
-            slow = not self.access.sign_ins.take(person.client)
+            slow = not self.access.sign_ins.take(network_of(person.client))
             self.access.audit.record(person, 'sign_in', False,
                                      'too many tries' if slow else 'no such token')
             raise tornado.web.HTTPError(429 if slow else 401)
@@ -185,6 +194,17 @@ class SessionHandler(CheckedHandler):
         self.set_header('Content-Type', 'application/json')
         self.set_header('Cache-Control', 'no-store')
         self.finish(json.dumps(known))
+
+    def _given(self) -> Optional[Identity]:
+        """Whose token comes with the request; None for a wrong one."""
+        tokens = self.access.settings.tokens
+        return tokens.identify(self._token()) if tokens is not None else None
+
+    def _is_right(self) -> bool:
+        try:
+            return self._given() is not None
+        except tornado.web.HTTPError:  # it is no token at all: `post` answers
+            return False
 
     def _token(self) -> str:
         try:

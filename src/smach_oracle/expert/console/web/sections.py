@@ -6,6 +6,8 @@ import json
 import threading
 from typing import Any, Dict, List, NamedTuple, Tuple
 
+from .row_lists import LISTS, RowLists
+
 _MOST_GONE = 2000  # that are remembered, for pages that do not know yet
 
 
@@ -21,6 +23,7 @@ class PageSections:
         self._lock = threading.Lock()
         self._sections: Dict[str, _PageSection] = {}
         self._version = 0
+        self.lists = RowLists()  # sections of another kind: each goes to the pages that look
 
     @property
     def version(self) -> int:
@@ -29,6 +32,9 @@ class PageSections:
 
     def put(self, name: str, data: object) -> None:
         """Set a section to plain data without NaN; None takes it away."""
+        if name in LISTS and isinstance(data, dict):
+            self.lists.put(name, data)
+            return
         text = json.dumps(data, allow_nan=False, separators=(',', ':'))
         with self._lock:
             old = self._sections.get(name)
@@ -41,6 +47,8 @@ class PageSections:
 
     def get(self, name: str) -> Any:
         """A section as it is now, None where there is none."""
+        if name in LISTS:
+            return self.lists.get(name)
         section = self._sections.get(name)
         return json.loads(section.text) if section else None
 

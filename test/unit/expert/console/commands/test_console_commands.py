@@ -127,7 +127,7 @@ def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
 
 def test_viewers_may_only_look_and_stop():
     assert {name for name in COMMANDS if needed_role(name) == 'viewer'
-            } == {'hello', 'watch', 'leave_wheel', 'stop_hand'}
+            } == {'hello', 'watch', 'look', 'leave_wheel', 'stop_hand'}
     assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
     assert {name
             for name in COMMANDS
@@ -137,7 +137,7 @@ def test_viewers_may_only_look_and_stop():
 def test_no_command_names_a_topic_a_service_or_a_type():
     fields = {field for spec in COMMANDS.values() for field in spec.checks}
     assert fields == {
-        'xsrf', 'expert', 'trial', 'question', 'kind', 'name', 'outputs', 'why', 'stamp', 'region',
-        'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent', 'arm',
-        'container'
+        'xsrf', 'expert', 'trial', 'at', 'question', 'kind', 'name', 'outputs', 'why', 'stamp',
+        'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent',
+        'arm', 'container'
     }

@@ -43,14 +43,8 @@ def written(place, trials=TRIALS, **settings):
 def catalogue_of(*folders):
     sections = PageSections()
     catalogue = BagCatalogue(folders, sections)
-    catalogue._reader = bags_reader()
     catalogue.scan()
     return catalogue, lambda: sections.get('bags')
-
-
-def bags_reader():
-    from smach_oracle.analysis.bag_events import EventReader
-    return EventReader(bag_catalogue.MOST_EVENTS)
 
 
 def test_they_are_counted_as_the_analysis_counts_them(folder):
@@ -103,8 +97,9 @@ def test_a_trial_in_two_bags_is_one(folder, tmp_path):
         shutil.copytree(folder, str(tmp_path / name))
     catalogue, section = catalogue_of(str(tmp_path))
     assert len(section()['trials']) == TRIALS
-    trial, events = catalogue.events(section()['trials'][0]['number'])
+    trial = catalogue.find(section()['trials'][0]['number'])
     assert len(trial.summary.bags) == 2
+    events = catalogue.replayed(trial, 1000).events
     assert [event.seq for event in events] == list(range(len(events)))
 
 
@@ -144,7 +139,7 @@ def test_a_trial_is_read_with_its_machine_and_one_that_is_gone_says_so(folder, t
     with pytest.raises(RecordedTrialError, match='no trial 999'):
         shown.text(999)
     shutil.rmtree(str(tmp_path / 'copy'))
-    with pytest.raises(RecordedTrialError, match='damaged, or no bag'):
+    with pytest.raises(RecordedTrialError, match='is gone'):
         shown.text(section()['trials'][-1]['number'])
 
 
@@ -180,7 +175,6 @@ class TestServed(console_case.ConsoleCase):
         return [written(self.place, 1)]
 
     def trial(self):
-        self.catalogue._reader = bags_reader()
         self.catalogue.scan()
         return self.sections.get('bags')['trials'][0]['number']
 

@@ -13,6 +13,7 @@ from console_case import TOKENS
 
 from smach_oracle.expert.console import page_socket
 from smach_oracle.expert.console.commands.commands import COMMANDS, CommandReply
+from smach_oracle.expert.console.server import STATIC
 from smach_oracle.expert.console.web import sessions
 from smach_oracle.expert.console.web.access import ROLES, AccessTokens, ClientRateLimits
 
@@ -92,6 +93,31 @@ class TestOdd(console_case.ConsoleCase):
         self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=0.0)
         assert self.ask('/session').code == 429
         assert self.ask('/session', Cookie=cookie).code == 200, 'however many they are'
+
+    def tried(self, token, session):
+        cookie, info = session
+        return self.ask('/session', 'POST', json.dumps({'token': token}), Cookie=cookie,
+                        Origin=self.origin, X_Xsrf=info['xsrf']).code
+
+    def test_wrong_tokens_shut_nobody_out(self):
+        mine, theirs = self.begin(), self.begin()
+        self.access.wrong_tokens = ClientRateLimits(rate=0.0, burst=10.0, for_all=1.0)
+        assert [self.tried('guess', theirs) for _ in range(200)].count(429) == 195
+        assert len(self.audit.records) <= 11, 'the audit is not flooded'
+        assert self.ask('/').code == 200 and self.ask('/session').code == 200, 'nor is the page'
+        assert self.tried(TOKENS['operator'], mine) == 200, 'of the same address'
+
+    def test_a_stranger_who_asks_for_little_has_it_however_much_others_ask_for(self):
+        self.access.requests = ClientRateLimits(rate=0.0, burst=150.0, for_all=5.0)
+        self.access.files = ClientRateLimits(rate=0.0, burst=1500.0, for_all=5.0)
+        for limits, all_had in ((self.access.requests, 750), (self.access.files, 7500)):
+            had = sum(limits.take('10.0.0.{}'.format(number))
+                      for _ in range(1000) for number in range(20))
+            assert had == all_had * 1.4, 'with a tenth of a share of each'
+        files = sum(path.is_file() for path in STATIC.rglob('*'))
+        assert all(self.access.files.take('192.168.0.9') for _ in range(files)), 'a page is loaded'
+        assert [self.ask(path).code for path in ('/', '/session')] == [200, 200]
+        assert self.sign_in('operator')[1]['role'] == 'operator'
 
     def cookie_of(self, secret, clock=time.time, text=None):
         text = text or sessions.to_text(

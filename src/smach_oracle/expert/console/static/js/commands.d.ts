@@ -36,6 +36,7 @@ export interface DriveWish {
 export interface Commands {
   hello: { xsrf: string; expert: string };
   watch: { trial: string };
+  look: { at: 'trials' | '' }; // whether the lists of trials are looked at
   claim: OfQuestion;
   take_over: OfQuestion;
   release: OfQuestion;

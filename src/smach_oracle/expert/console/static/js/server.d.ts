@@ -22,10 +22,19 @@ export interface Batch {
   now: number;
   all?: true; // what is not among the sections is gone
   sections?: { [Name in keyof Sections]?: Sections[Name] | null }; // null: it is gone
+  lists?: { trials?: ListChange<TrialOverview> | null; bags?: ListChange<BagOverview> | null };
   events?: EventSlice;
 }
 
-/** Named pieces of what the pages show; each comes whole. */
+/** What has changed in a list; only pages that look at it get this. */
+export interface ListChange<List> {
+  all?: true; // no row of before is left
+  rest?: Omit<List, 'trials'>; // what is beside the rows
+  rows: [before: string, row: Trial][]; // with the id of the row before it; '': it is the first
+  gone?: string[]; // ids
+}
+
+/** Named pieces of what the pages show; each comes whole, but for the lists. */
 export interface Sections {
   questions: Question[];
   servers: QueryServer[];

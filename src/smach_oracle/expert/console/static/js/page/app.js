@@ -5,6 +5,7 @@ import { Connection } from './connection.js';
 import { watchOverClicks } from './deliberate.js';
 import { h, part, replace, setText, toast } from './dom.js';
 import { leaveNote, remember, remembered, takeNote } from './preferences.js';
+import { Looking } from './row_lists.js';
 import { keysButton } from './shortcuts.js';
 import { askName, askToken } from './sign_in.js';
 import { Store } from './store.js';
@@ -41,6 +42,7 @@ export class App {
     this.connection = new Connection(this.store, (state) => this.onState(state),
       () => this.leave('You have signed out on another page of this browser.'));
     this.connection.wantedExpert = remembered('expert', '');
+    this.looking = new Looking(this.connection, () => this.current === 'trials');
     this.note = takeNote();
     this.current = '';
     this.status = h('span', { id: 'status', class: 'status' });
@@ -95,6 +97,7 @@ export class App {
     const main = part('main');
     if (main.firstElementChild !== shown.view.root) replace(main, shown.view.root);
     history.replaceState(null, '', '#' + this.current);
+    this.looking.tell();
     shown.view.shown?.();
   }
 
@@ -131,6 +134,7 @@ export class App {
 
   /** The connection is there: so are the panels. */
   begin() {
+    this.looking.connected();
     const current = this.tabs.find((tab) => tab.id === this.current) || this.tabs[0];
     if (!part('main').contains(current.view.root)) this.show(location.hash.slice(1));
     for (const { view } of this.tabs) view.connected?.();

@@ -1,5 +1,6 @@
 // @ts-check
 // The newest sections that the server has sent; they are kept while the connection is away.
+import { changed as listAfter } from './row_lists.js';
 
 /** @typedef {import('../server').Batch} Batch */
 /** @typedef {import('../server').EventSlice} EventSlice */
@@ -48,13 +49,20 @@ export class Store {
   }
 
   /** @param {Batch} batch */
-  receive({ now, all, sections = {}, events }) {
+  receive({ now, all, sections = {}, lists = {}, events }) {
     this.offset = now - Date.now() / 1000;
     /** @type {Map<string, unknown>} */
     const changed = new Map(Object.entries(sections));
     if (all) {
-      for (const name of this.sections.keys()) if (!changed.has(name)) changed.set(name, null);
+      for (const name of this.sections.keys()) {
+        if (!changed.has(name) && name !== 'trials' && name !== 'bags') changed.set(name, null);
+      }
     }
+    const { trials, bags } = lists;
+    if (trials !== undefined) {
+      changed.set('trials', trials && listAfter(this.get('trials'), trials));
+    }
+    if (bags !== undefined) changed.set('bags', bags && listAfter(this.get('bags'), bags));
     for (const [name, section] of changed) {
       if (section === null) this.sections.delete(name);
       else this.sections.set(name, section);

@@ -128,8 +128,9 @@ class TrialPanel {
 
   /** @param {string[]} names */
   update(names) {
+    if (!this.isCurrent) return; // `shown` draws it
     const drawings = names.some((name) => name.startsWith('graph '));
-    if (drawings && !this.bag && this.isCurrent) this.replay.redraw();
+    if (drawings && !this.bag) this.replay.redraw();
     if (!names.includes('trials') && !names.includes('bags')) return;
     this.recorded.update();
     const { all } = this;
@@ -138,7 +139,7 @@ class TrialPanel {
       return;
     }
     if (!this.root.contains(this.table)) replace(this.root, this.body);
-    if (this.isCurrent && all.length) this.settle(all);
+    if (all.length) this.settle(all);
     this.showTable();
     this.list.show(all, this.chosen);
     const trial = all.find((each) => each.id === this.chosen);

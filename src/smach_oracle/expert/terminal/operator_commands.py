@@ -1,0 +1,172 @@
+"""What an operator types to hold robots: `pause`, `resume`, `goto PATH STATE` and the like.
+
+Calls go to all robots at once: one that hangs delays no other.
+"""
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import rosgraph
+import rospy
+
+from smach_oracle.msg import ControlStatus, MachineControl
+from smach_oracle.ros.main_thread import outside_main_thread
+from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
+from smach_oracle.srv import (
+    CommandMachine,
+    CommandMachineRequest,
+    SendMachine,
+    SendMachineRequest,
+    SetAutonomy,
+    SetAutonomyRequest,
+    SetBreakpoint,
+    SetBreakpointRequest,
+)
+
+TOPIC = '/oracle/control'
+_STATUS_LIMIT_S = 1.0
+_ALL = 'all'
+Told = List[Tuple[str, str]]  # text and style
+Robots = Callable[[], Sequence[str]]
+
+
+class _Word(NamedTuple):
+    """One command word."""
+
+    meaning: str
+    most: int  # how many words may follow it, beside the robot's name
+    fewest: int
+    service: str
+    kind: type
+    of_all: bool  # whether it means all robots where none is named
+    request: Callable[..., Any]  # of who commands, and the words that follow
+
+
+def _machine(by: str, path: str = '') -> CommandMachineRequest:
+    return CommandMachineRequest(path=path, by=by)
+
+
+def _send(by: str, path: str, state: str, repeat: str = '') -> SendMachineRequest:
+    if repeat not in ('', 'repeat'):
+        raise _UsageError('the third word can be repeat, which confirms that states are repeated')
+    return SendMachineRequest(path=path, state=state, confirm_repeats=bool(repeat), by=by)
+
+
+def _breakpoint(by: str, pattern: str) -> SetBreakpointRequest:
+    return SetBreakpointRequest(pattern=pattern, by=by)
+
+
+def _no_breakpoint(by: str, pattern: str) -> SetBreakpointRequest:
+    return SetBreakpointRequest(pattern=pattern, remove=True, by=by)
+
+
+def _autonomy(by: str, pattern: str, level: str = '') -> SetAutonomyRequest:
+    return SetAutonomyRequest(pattern=pattern, level=level, by=by)
+
+
+_WORDS: Dict[str, _Word] = {
+    'pause': _Word('hold at the next state', 1, 0, 'pause', CommandMachine, True, _machine),
+    'resume': _Word('lift the pause', 1, 0, 'resume', CommandMachine, False, _machine),
+    'step': _Word('enter one state [PATH]', 1, 0, 'step', CommandMachine, False, _machine),
+    'confirm': _Word('let a state be entered [PATH]', 1, 0, 'confirm', CommandMachine, False,
+                     _machine),
+    'preempt': _Word('stop the machine', 1, 0, 'preempt', CommandMachine, True, _machine),
+    'goto': _Word('PATH STATE [repeat]: go there', 3, 2, 'go_to', SendMachine, False, _send),
+    'break': _Word('PATTERN: pause before these states', 1, 1, 'breakpoint', SetBreakpoint, False,
+                   _breakpoint),
+    'unbreak': _Word('PATTERN: not any more', 1, 1, 'breakpoint', SetBreakpoint, False,
+                     _no_breakpoint),
+    'autonomy': _Word('PATTERN run, announce or confirm', 2, 1, 'autonomy', SetAutonomy, False,
+                      _autonomy),
+}
+OPERATOR_WORDS = [(word, each.meaning) for word, each in _WORDS.items()] + [
+    ('status', 'what runs, what waits')]
+
+
+class _UsageError(Exception):
+    """What was typed is no whole command; never leaves this module."""
+
+
+def robots_of_master() -> Sequence[str]:
+    """The nodes that can be held, by the master's list of topics.
+
+    :raises ServerGoneError: where the master does not answer.
+    """
+    try:
+        published = outside_main_thread(
+            lambda: rosgraph.Master(rospy.get_name()).getPublishedTopics(''))
+    except (OSError, rosgraph.MasterException) as err:
+        raise ServerGoneError('the master does not answer: {}'.format(err)) from err
+    return sorted(topic[:-len(TOPIC)] for topic, kind in published
+                  if kind == ControlStatus._type and topic.endswith(TOPIC))
+
+
+class OperatorCommands:
+    """Carries out the lines of one expert."""
+
+    def __init__(self, expert: str, robots: Robots = robots_of_master) -> None:
+        """`expert`: the name under which to command."""
+        self._expert = expert
+        self._robots = robots
+
+    def carry_out(self, line: str) -> Optional[Told]:
+        """Do what a line commands; return what is to be shown, None where it commands nothing."""
+        name, *words = line.split() or ['']
+        if name != 'status' and name not in _WORDS:
+            return None
+        try:
+            robots, words = self._meant(name, words)
+            if name == 'status':
+                return [told for robot in robots for told in _status_of(robot)]
+            return list(self._call(robots, _WORDS[name], words))
+        except (_UsageError, ServerGoneError) as err:
+            return [('{}: {}'.format(name, err), 'red')]
+
+    def _meant(self, name: str, words: List[str]) -> Tuple[Sequence[str], List[str]]:
+        """The robots that are meant, and the words without their name."""
+        robots = self._robots()
+        if not robots:
+            raise _UsageError('no robot is there')
+        if words and (words[0] in robots or words[0] == _ALL):
+            return (robots if words[0] == _ALL else [words[0]]), words[1:]
+        if len(robots) > 1 and name != 'status' and not _WORDS[name].of_all:
+            raise _UsageError('name one of {}, or all, first'.format(', '.join(robots)))
+        return robots, words
+
+    def _call(self, robots: Sequence[str], word: _Word, words: List[str]) -> Iterator[
+            Tuple[str, str]]:
+        if not word.fewest <= len(words) <= word.most:
+            raise _UsageError(word.meaning)
+        request = word.request(self._expert, *words)
+        calls = [(robot, ServiceCall('{}/oracle/{}'.format(robot, word.service), word.kind,
+                                     request)) for robot in robots]
+        for robot, call in calls:
+            try:
+                response = call.result(CALL_LIMIT_S)
+                yield '  {}: {}'.format(robot, response.message), 'green' if response.ok else 'red'
+            except ServerGoneError as err:
+                yield '  {}'.format(err), 'red'
+
+
+def _status_of(robot: str) -> Told:
+    try:
+        message = rospy.wait_for_message(robot + TOPIC, ControlStatus, _STATUS_LIMIT_S)
+    except rospy.ROSException:
+        return [('  {} does not tell'.format(robot), 'red')]
+    return [told for machine in message.machines for told in machine_lines(robot, machine)]
+
+
+def machine_lines(robot: str, machine: MachineControl) -> Told:
+    """How a machine stands, in lines."""
+    how = 'paused by ' + (machine.paused_by or 'somebody') if machine.paused else (
+        'runs' if machine.running else 'does not run')
+    lines = [('  {} {}: {}'.format(robot, machine.path, how), 'bold')]
+    for each in machine.active:
+        waits = ' waits ({}{})'.format(
+            each.held_by, ', to be confirmed' if each.waits_for_confirmation
+            and each.held_by != 'confirm' else '') if each.held_by else ' runs'
+        lines.append(('    {}/{}{}'.format(each.path, each.state, waits),
+                      'yellow' if each.held_by else 'dim'))
+    lines += [('    breakpoint {}'.format(each), 'dim') for each in machine.breakpoints]
+    lines += [('    autonomy {} {}'.format(pattern, level), 'dim') for pattern, level in zip(
+        machine.autonomy_patterns, machine.autonomy_levels)]
+    return lines + [('    {} is to go to {}'.format(path, state), 'dim') for path, state in zip(
+        machine.jump_containers, machine.jump_states)]

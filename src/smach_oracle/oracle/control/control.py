@@ -1,0 +1,271 @@
+"""What an operator has asked of one tree of machines. Pure.
+
+The machines look at it before each state. It wakes them by one flag of their engines, `attentive`,
+which they look at in any case: where nothing is set, a step costs nothing more.
+"""
+import threading
+from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
+
+from ..settings.settings import CONFIRM_FIRST
+from .hold import HeldBy, Hold, LetGo, Place
+from .path_pattern import PathPattern
+
+_LOOK_PERIOD_S = 0.05  # how soon a wait sees a preempt or a shutdown, of which nobody tells it
+
+EndedBy = Callable[[], Optional[LetGo]]
+
+
+class Engine(Protocol):
+    """What wakes a machine that executes (`EngineProbe`)."""
+
+    attentive: bool
+    stays_attentive: bool  # whatever the operator wants
+
+
+class Jump(NamedTuple):
+    """A state to which a container goes at its next state boundary."""
+
+    state: str
+    by: str = ''
+    text: str = ''
+    repeats: Tuple[str, ...] = ()  # the guarded states of which it was confirmed that they repeat
+    written: Tuple[str, ...] = ()  # userdata keys that were written for it
+
+
+class Control:
+    """What holds the machines of one tree. Safe to use from several threads.
+
+    `is_set`: whether a machine has to look closer before a state.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._engines: Dict[int, Engine] = {}
+        self._holds: List[Hold] = []
+        self._jumps: Dict[str, Jump] = {}
+        self._breakpoints: Dict[str, PathPattern] = {}
+        self._levels: Dict[str, Tuple[PathPattern, str]] = {}
+        self.paused = False
+        self.paused_by = ''
+        self.is_set = False
+        self.in_trial = False
+
+    # -- of the machines
+
+    def begin_trial(self) -> None:
+        """A pause, breakpoints and levels stay from the trial before; jumps do not."""
+        with self._changed:
+            self._jumps.clear()
+            self.in_trial = True
+            self._note_change()
+
+    def end_trial(self) -> None:
+        """Tell nothing more of this trial."""
+        self.in_trial = False
+
+    def attend(self, engine: Engine) -> None:
+        """Wake this machine from now on, and at once where something is set."""
+        with self._changed:
+            self._engines[id(engine)] = engine
+            engine.attentive = self.is_set or engine.stays_attentive
+
+    def leave(self, engine: Engine, path: str) -> Optional[Jump]:
+        """Forget a machine whose execution is over; return the jump that it has not made."""
+        with self._changed:
+            self._engines.pop(id(engine), None)
+            return self._pop_jump(path)
+
+    def calm(self, engine: Engine) -> None:
+        """Let a machine take the short way again, where nothing is set."""
+        with self._changed:
+            engine.attentive = self.is_set or engine.stays_attentive
+
+    def hold_before(self, place: Place, confirms: bool, breaks: bool = True) -> Optional[Hold]:
+        """Return the wait before a state, None where the machine may enter it.
+
+        :param confirms: whether the state is entered only once somebody has confirmed it.
+        :param breaks: whether breakpoints count.
+        """
+        with self._changed:
+            if self.paused:
+                return Hold(place, HeldBy.PAUSE, confirms)
+            if breaks and self._breaks_before(place):
+                return Hold(place, HeldBy.BREAKPOINT, confirms)
+            return Hold(place, HeldBy.CONFIRM, confirms) if confirms else None
+
+    def _breaks_before(self, place: Place) -> bool:
+        """Pause the tree where a breakpoint is meant."""
+        for pattern in self._breakpoints.values():
+            if pattern.matches(*place):
+                self.paused, self.paused_by = True, 'breakpoint ' + pattern.text
+                self._note_change()
+                return True
+        return False
+
+    def begin(self, hold: Hold) -> None:
+        """Show that a container waits; the operator may let it go from now on."""
+        with self._changed:
+            self._holds.append(hold)
+
+    def end(self, hold: Hold) -> None:
+        """Show that it waits no more."""
+        with self._changed:
+            self._holds.remove(hold)
+
+    def wait(self, hold: Hold, ended_by: EndedBy) -> LetGo:
+        """Wait until a hold that has begun is let go; return by what.
+
+        :param ended_by: what else ends the wait, such as a preempt; asked 20 times a second.
+        """
+        while True:
+            let_go = ended_by()  # a user's machine has a say in it: not under the lock
+            if let_go is not None:
+                return let_go
+            with self._changed:
+                let_go = self._let_go(hold)
+                if let_go is None:
+                    self._changed.wait(_LOOK_PERIOD_S)
+            if let_go is not None:
+                return ended_by() or let_go  # a preempt that came before it goes before it
+
+    def _let_go(self, hold: Hold) -> Optional[LetGo]:
+        if hold.may_be_sent and hold.place.path in self._jumps:
+            return LetGo.SENT
+        if hold.stepped:
+            return LetGo.STEPPED
+        if self.paused or hold.waits_for_confirmation:
+            return None
+        return LetGo.CONFIRMED if hold.confirmed else LetGo.RESUMED
+
+    def level_of(self, place: Place, default: str) -> str:
+        """Return the autonomy of a state; `default`: by its settings."""
+        with self._changed:
+            for pattern, level in reversed(list(self._levels.values())):
+                if pattern.matches(*place):
+                    return level
+            return default
+
+    def take_jump(self, path: str) -> Optional[Jump]:
+        """Return where the container at `path` is to go, once."""
+        with self._changed:
+            return self._pop_jump(path)
+
+    def _pop_jump(self, path: str) -> Optional[Jump]:
+        jump = self._jumps.pop(path, None)
+        if jump is not None:
+            self._note_change()
+        return jump
+
+    # -- of the operator
+
+    def pause(self, by: str = '') -> None:
+        """Hold every container of the tree at its next state boundary."""
+        with self._changed:
+            if not self.paused:
+                self.paused, self.paused_by = True, by
+                self._note_change()
+
+    def resume(self) -> Tuple[Hold, ...]:
+        """Lift the pause; return what waited because of it."""
+        with self._changed:
+            held = self._held('')
+            self.paused, self.paused_by = False, ''
+            self._note_change()
+            return held
+
+    def step(self, path: str = '') -> Tuple[Hold, ...]:
+        """Let what waits enter one state each, also what waits for a confirmation.
+
+        :param path: of the container; '': every one.
+        :returns: what goes on.
+        """
+        with self._changed:
+            held = self._held(path)
+            for hold in held:
+                hold.stepped = True
+            self._changed.notify_all()
+            return held
+
+    def confirm(self, path: str = '') -> Tuple[Hold, ...]:
+        """Confirm the states before which containers wait for that; return those.
+
+        :param path: of the container; '': every one.
+        """
+        with self._changed:
+            held = tuple(each for each in self._held(path) if each.waits_for_confirmation)
+            for hold in held:
+                hold.confirmed = True
+            self._changed.notify_all()
+            return held
+
+    def _held(self, path: str) -> Tuple[Hold, ...]:
+        return tuple(each for each in self._holds
+                     if self._let_go(each) is None and path in ('', each.place.path))
+
+    def holds(self) -> Tuple[Hold, ...]:
+        """Return what waits now."""
+        with self._changed:
+            return self._held('')
+
+    def ask_jump(self, path: str, jump: Jump) -> None:
+        """Send the container at `path` to a state at its next state boundary.
+
+        A later wish for the same container takes the place of an earlier one.
+        """
+        with self._changed:
+            self._jumps[path] = jump
+            self._note_change()
+
+    def jumps(self) -> Dict[str, Jump]:
+        """Return the jumps that are still to be made, by path of the container."""
+        with self._changed:
+            return dict(self._jumps)
+
+    def set_breakpoint(self, pattern: PathPattern) -> None:
+        """Pause the tree before each state that is meant."""
+        with self._changed:
+            self._breakpoints[pattern.text] = pattern
+            self._note_change()
+
+    def remove_breakpoint(self, pattern: PathPattern) -> bool:
+        """Take a breakpoint away; return whether there was one. A pause by it stays."""
+        with self._changed:
+            was_set = self._breakpoints.pop(pattern.text, None) is not None
+            self._note_change()
+            return was_set
+
+    def breakpoints(self) -> Tuple[str, ...]:
+        """Return the patterns of the breakpoints."""
+        with self._changed:
+            return tuple(self._breakpoints)
+
+    def set_level(self, pattern: PathPattern, level: str) -> None:
+        """Set the autonomy of states; the latest that is set for a state counts.
+
+        :param level: '' lets the settings decide again.
+        """
+        with self._changed:
+            self._levels.pop(pattern.text, None)
+            if level:
+                self._levels[pattern.text] = (pattern, level)
+                for hold in self._holds:
+                    if pattern.matches(*hold.place):
+                        hold.confirms = level == CONFIRM_FIRST
+            self._note_change()
+
+    def levels(self) -> Dict[str, str]:
+        """Return the autonomy that was set at run time, by pattern."""
+        with self._changed:
+            return {text: level for text, (_, level) in self._levels.items()}
+
+    def _note_change(self) -> None:
+        """Wake who waits, and have machines look that execute."""
+        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps)
+        if self.is_set:
+            for engine in list(self._engines.values()):
+                engine.attentive = True
+        self._changed.notify_all()
+
+    def __reduce__(self) -> Tuple[type, Tuple[()]]:
+        """Nothing that an operator has asked travels with a copied or pickled machine."""
+        return Control, ()

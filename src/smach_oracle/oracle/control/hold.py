@@ -1,0 +1,53 @@
+"""A container that waits before a state, and how such a wait ends."""
+from enum import Enum
+from typing import NamedTuple
+
+
+class HeldBy(str, Enum):
+    """Why a container waits."""
+
+    PAUSE = 'paused'
+    BREAKPOINT = 'breakpoint'
+    CONFIRM = 'confirm'  # the autonomy of the state
+
+
+class LetGo(str, Enum):
+    """Why a wait is over."""
+
+    RESUMED = 'resumed'
+    STEPPED = 'stepped'
+    CONFIRMED = 'confirmed'
+    SENT = 'sent'  # to another state
+    PREEMPTED = 'preempted'
+    SHUTDOWN = 'shutdown'
+    LEFT_BEHIND = 'left behind'  # the state around it was abandoned
+
+
+class Place(NamedTuple):
+    """A state that is about to run, and the path of its container."""
+
+    path: str
+    state: str
+
+    def in_words(self) -> str:
+        """Return it as people read it."""
+        return '{} in {}'.format(self.state, self.path)
+
+
+class Hold:
+    """One wait; `Control` alone writes to it."""
+
+    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent')
+
+    def __init__(self, place: Place, held_by: HeldBy, confirms: bool) -> None:
+        self.place = place
+        self.held_by = held_by
+        self.confirms = confirms  # whether it waits for a confirmation
+        self.confirmed = False
+        self.stepped = False
+        self.may_be_sent = True  # whether the container can go to another state from here
+
+    @property
+    def waits_for_confirmation(self) -> bool:
+        """Whether nobody has confirmed yet that the state may be entered."""
+        return self.confirms and not self.confirmed

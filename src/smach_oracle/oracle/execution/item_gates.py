@@ -1,0 +1,73 @@
+"""Lets an operator hold an Iterator between two items.
+
+An Iterator is under no oracle. It calls its transition callbacks between items, on both engines; a
+machine that it contains is held at its own boundaries.
+"""
+from typing import Any, Iterator, Tuple
+
+import smach
+
+from ..control.hold import Place
+from ..machine.protocols import Labels
+from ..machine.tree_node import TreeNode
+from ..recovery.operator_wait import wait_for_operator
+
+
+class ItemGate:
+    """A transition callback of an Iterator that waits where an operator holds the tree."""
+
+    def __init__(self, node: TreeNode, below: Labels, container: Any) -> None:
+        """`node`: of the wrapped container around it; `below`: the labels that lead to it."""
+        self.node = node
+        self._below = below
+        self._container = container
+
+    def __call__(self, userdata: object, active: object, *args: object) -> None:
+        """Wait before the next item."""
+        node = self.node
+        if not (node.tree.control.is_set or node.in_force.limits_autonomy()):
+            return
+        label = next(iter(self._container.get_children()), '')
+        path = '/'.join((node.path,) + self._below)
+        relative = '/'.join(filter(None, (node.relative_path,) + self._below))
+        autonomy = node.in_force.of_state(relative, label).autonomy
+        wait_for_operator(node, Place(path, label), autonomy, self._container.preempt_requested)
+
+
+def place_gates(node: TreeNode) -> None:
+    """Place a gate in each Iterator of a container whose items are no machines; once."""
+    for below, container in _bare_containers(node.machine, ()):
+        children = container.get_children().values()
+        if isinstance(container, smach.Iterator) and not any(
+                isinstance(child, smach.StateMachine) for child in children):
+            if any(gate.node is node for gate in _gates_of(container)):
+                continue
+            _remove(container)
+            container.register_transition_cb(ItemGate(node, below, container))
+
+
+def remove_gates(machine: smach.StateMachine) -> None:
+    """Take the gates away from the Iterators of a container."""
+    for _, container in _bare_containers(machine, ()):
+        _remove(container)
+
+
+def _gates_of(container: Any) -> Iterator[ItemGate]:
+    return (callback[0] for callback in container._transition_cbs
+            if isinstance(callback[0], ItemGate))
+
+
+def _remove(container: Any) -> None:
+    container._transition_cbs[:] = [each for each in container._transition_cbs
+                                    if not isinstance(each[0], ItemGate)]
+
+
+def _bare_containers(container: Any, below: Labels) -> Iterator[Tuple[Labels, Any]]:
+    """Yield the containers within that are no machines, each with the labels that lead to it."""
+    children = (container._states if isinstance(container, smach.StateMachine)
+                else container.get_children())
+    for label, state in list(children.items()):
+        if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
+            path = below + (label,)
+            yield path, state
+            yield from _bare_containers(state, path)

@@ -1,0 +1,321 @@
+"""The operator's hand on a running machine: what a person may ask of it, and what it answers.
+
+Stopping, pausing and letting go are never refused. Whatever lets a machine go on says what will
+run.
+"""
+from typing import List, Mapping, NamedTuple, Sequence, Tuple
+
+import smach
+
+from .control.control import Jump
+from .control.hold import Hold, Place
+from .control.path_pattern import PathPattern
+from .errors import OperatorError, SettingsError, TrialError
+from .execution.sending import Prospect, prospect_of
+from .machine.nesting import nodes_of
+from .machine.tree_node import TreeNode
+from .records.events import EventKind
+from .settings.settings import AUTONOMY_LEVELS
+
+
+class ActiveState(NamedTuple):
+    """A state that runs, or that a running container is about to enter."""
+
+    path: str  # of the container
+    state: str
+    held_by: str  # 'paused', 'breakpoint' or 'confirm' where the container waits before it, else ''
+    waits_for_confirmation: bool
+
+
+class HandStatus(NamedTuple):
+    """How the machine stands, and what is set."""
+
+    path: str  # of the top machine
+    running: bool
+    paused: bool
+    paused_by: str
+    active: Tuple[ActiveState, ...]
+    breakpoints: Tuple[str, ...]  # patterns
+    autonomy: Mapping[str, str]  # that was set at run time: level by pattern
+    jumps: Mapping[str, str]  # still to be made: state by path of the container
+
+
+class OperatorHand:
+    """A person's commands for one tree of machines. Safe to use from several threads.
+
+    Each command returns what comes of it, as a sentence, and tells it to the observers. `by` is the
+    name of who commands.
+    """
+
+    def __init__(self, machine: object) -> None:
+        """Be the hand on the tree to which a wrapped machine belongs.
+
+        :raises TrialError: for what is not under an oracle.
+        """
+        node = getattr(machine, '_oracle', None)
+        if not isinstance(node, TreeNode):
+            raise TrialError('{!r} is not under an oracle'.format(machine))
+        self._node = node
+
+    @property
+    def _top(self) -> TreeNode:
+        return self._node.top()
+
+    # -- what is never refused
+
+    def pause(self, by: str = '') -> str:
+        """Hold every container at its next state boundary; what runs now runs to its end."""
+        self._top.tree.control.pause(by)
+        return self._told('pause', self._how_it_pauses(), by)
+
+    def resume(self, by: str = '') -> str:
+        """Lift the pause."""
+        held = self._top.tree.control.resume()
+        return self._told('resume', self._what_goes_on(held), by)
+
+    def preempt(self, by: str = '') -> str:
+        """Ask the machine to stop, and lift the pause: what waits ends at once, preempted."""
+        top = self._top
+        text = '{} is asked to stop'.format(top.path)
+        try:
+            if top.machine.is_running():
+                top.machine.request_preempt()
+            else:
+                text = '{} does not run'.format(top.path)
+        except Exception as err:  # it is the user's
+            text += ', and its request_preempt failed: {!r}'.format(err)
+        finally:
+            top.tree.control.resume()
+        return self._told('preempt', text, by)
+
+    # -- one state at a time
+
+    def step(self, path: str = '', by: str = '') -> str:
+        """Let what waits enter one state each, also what waits for a confirmation.
+
+        The machine is paused from now on.
+
+        :param path: of the container, as in events; '': every one.
+        :raises OperatorError: where nothing waits there.
+        """
+        control = self._top.tree.control
+        was_paused = control.paused
+        control.pause(by)
+        held = control.step(path)
+        if held:
+            return self._told('step', _runs(held), by, path)
+        text = self._nothing_waits(path)
+        raise OperatorError(text if was_paused else self._told('pause', text, by))
+
+    def confirm(self, path: str = '', by: str = '') -> str:
+        """Confirm the states before which containers wait for that.
+
+        :param path: of the container, as in events; '': every one.
+        :raises OperatorError: where none waits for it.
+        """
+        held = self._top.tree.control.confirm(path)
+        if not held:
+            raise OperatorError('{} waits for a confirmation'.format(
+                'nothing in ' + path if path else 'nothing'))
+        text = _runs(held)
+        if self._top.tree.control.paused:
+            text += ' once it is resumed'
+        return self._told('confirm', text, by, path)
+
+    # -- elsewhere
+
+    def go_to(self, path: str, state: str, by: str = '', confirm_repeats: bool = False,
+              written: Sequence[str] = ()) -> str:
+        """Send a container to a state, at its next state boundary.
+
+        One that does not run begins there from now on.
+
+        :param path: of the container, as in events; '': the top machine.
+        :param confirm_repeats: states that are not to be repeated by themselves may be.
+        :param written: userdata keys that were written for it.
+        :raises OperatorError: where there is no such container or state, where it cannot be
+            entered now, and where an unconfirmed state may be repeated.
+        """
+        node = self._node_at(path)
+        prospect = prospect_of(node, state, tuple(written))
+        if prospect.why_not:
+            raise OperatorError(prospect.why_not)
+        if prospect.repeats and not confirm_repeats:
+            raise OperatorError('going to {} may repeat {}: confirm that it may'.format(
+                state, ', '.join(prospect.repeats)))
+        if node.machine.is_running():
+            text = self._ask_jump(node, Jump(state, by, '', prospect.repeats, tuple(written)))
+        else:
+            node.machine.set_initial_state([state])
+            text = '{} does not run; it will begin in {}'.format(node.path, state)
+        return self._told('go_to', text + _in_spite_of(prospect), by,
+                          '{}/{}'.format(node.path, state))
+
+    def send(self, state: str, by: str, written: Sequence[str] = ()) -> bool:
+        """Send this machine to a state for somebody who hears no answer, such as a viewer.
+
+        What is refused is told as a warning. `state`, `by` and `written` are those of `go_to`.
+        """
+        node = self._node
+        try:
+            self.go_to(node.path, state, by, written=written)
+        except OperatorError as err:
+            node.warn('is not sent to {} as {} wants: {}'.format(state, by or 'a viewer', err))
+            return False
+        return True
+
+    def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
+        control = self._top.tree.control
+        label = node.machine._current_label
+        is_held = any(hold.may_be_sent and hold.place.path == node.path
+                      for hold in control.holds())
+        control.ask_jump(node.path, jump)
+        if is_held:
+            return '{} goes to {} instead of {}{}'.format(
+                node.path, jump.state, label, ', where it waits' if control.paused else '')
+        return '{} goes to {} once {} has ended'.format(node.path, jump.state, label)
+
+    # -- what is set
+
+    def set_breakpoint(self, pattern: str, by: str = '') -> str:
+        """Pause the tree before each state that is meant.
+
+        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :raises OperatorError: where it cannot be read.
+        """
+        meant = _pattern(pattern)
+        self._top.tree.control.set_breakpoint(meant)
+        return self._told('set_breakpoint', '{} pauses before {}'.format(
+            self._top.path, self._states_meant(meant)), by, meant.text)
+
+    def remove_breakpoint(self, pattern: str, by: str = '') -> str:
+        """Take a breakpoint away; a pause by it stays.
+
+        :raises OperatorError: where there is none of this pattern.
+        """
+        meant, control = _pattern(pattern), self._top.tree.control
+        if not control.remove_breakpoint(meant):
+            raise OperatorError('there is no breakpoint {}; there are: {}'.format(
+                meant.text, ', '.join(control.breakpoints()) or 'none'))
+        return self._told('remove_breakpoint', 'the breakpoint {} is gone'.format(meant.text), by,
+                          meant.text)
+
+    def set_autonomy(self, pattern: str, level: str, by: str = '') -> str:
+        """Set the autonomy of states; the latest that is set for a state counts.
+
+        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :param level: 'run', 'announce' or 'confirm'; '': as the settings say.
+        :raises OperatorError: for another level, or a pattern that cannot be read.
+        """
+        meant = _pattern(pattern)
+        if level and level not in AUTONOMY_LEVELS:
+            raise OperatorError('there is no autonomy {!r}; allowed: {}'.format(
+                level, ', '.join(AUTONOMY_LEVELS)))
+        self._top.tree.control.set_level(meant, level)
+        return self._told('set_autonomy', 'autonomy {} for {}'.format(
+            level or 'as the settings say', self._states_meant(meant)), by, meant.text)
+
+    def _states_meant(self, pattern: PathPattern) -> str:
+        found = ['{}/{}'.format(node.path, label) for node in nodes_of(self._top.machine)
+                 for label in node.labels() if pattern.matches(node.path, label)]
+        more = ', ...' if len(found) > 10 else ''
+        return (', '.join(found[:10]) + more if found
+                else '{}, which is no state there now'.format(pattern.text))
+
+    # -- status
+
+    def status(self) -> HandStatus:
+        """Return how the machine stands, and what is set."""
+        top, control = self._top, self._top.tree.control
+        jumps = {path: jump.state for path, jump in control.jumps().items()}
+        return HandStatus(top.path, top.machine.is_running(), control.paused, control.paused_by,
+                          tuple(self._active()), control.breakpoints(), control.levels(), jumps)
+
+    def _active(self) -> List[ActiveState]:
+        held = self._top.tree.control.holds()
+        at_boundary = {hold.place.path for hold in held if hold.may_be_sent}
+        found = []
+        for node in nodes_of(self._top.machine):
+            label = node.machine._current_label
+            if (node.machine.is_running() and label is not None
+                    and node.path not in at_boundary):
+                found.append(ActiveState(node.path, str(label), '', False))
+        return found + [ActiveState(hold.place.path, hold.place.state, hold.held_by.value,
+                                    hold.waits_for_confirmation) for hold in held]
+
+    # -- words
+
+    def _told(self, command: str, text: str, by: str, target: str = '') -> str:
+        top = self._top
+        smach.loginfo('{}: {}{}: {}'.format(top.path, command, ' by ' + by if by else '', text))
+        if top.tree.control.in_trial:
+            top.emit(EventKind.OPERATOR_COMMAND, outcome=command, target=target, by=by, text=text)
+        return text
+
+    def _how_it_pauses(self) -> str:
+        top = self._top
+        if not top.machine.is_running():
+            return '{} does not run; it will wait before its first state'.format(top.path)
+        waits = [_in_words(each) for each in self._active() if each.held_by]
+        runs = self._what_runs()
+        told = ['waits before ' + ', '.join(waits)] if waits else []
+        if runs:
+            told.append('runs to its end: ' + ', '.join(runs))
+        return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
+
+    def _what_runs(self) -> List[str]:
+        """Return the states that run, in words, but for those within which others are active."""
+        active = self._active()
+        around = {each.path for each in active}
+        return [_in_words(each) for each in active
+                if not each.held_by and '{}/{}'.format(each.path, each.state) not in around]
+
+    def _what_goes_on(self, held: Sequence[Hold]) -> str:
+        top = self._top
+        free = [hold for hold in held if not hold.waits_for_confirmation]
+        asks = [hold.place.in_words() for hold in held if hold.waits_for_confirmation]
+        if free:
+            text = _runs(free)
+        elif not top.machine.is_running():
+            text = '{} does not run; it will not wait'.format(top.path)
+        else:
+            text = '{} goes on; nothing has waited for that'.format(top.path)
+            runs = self._what_runs()
+            text += ', and this runs on: ' + ', '.join(runs) if runs else ''
+        return text + ('; still to be confirmed: ' + ', '.join(asks) if asks else '')
+
+    def _nothing_waits(self, path: str) -> str:
+        return 'nothing waits{}. {}'.format(' in ' + path if path else '', self._how_it_pauses())
+
+    def _node_at(self, path: str) -> TreeNode:
+        top = self._top
+        nodes = {node.path: node for node in nodes_of(top.machine)}
+        node = nodes.get(path.strip('/') or top.path)
+        if node is None:
+            raise OperatorError('there is no container {!r}; there are: {}'.format(
+                path, ', '.join(sorted(nodes))))
+        return node
+
+
+def _pattern(text: str) -> PathPattern:
+    try:
+        return PathPattern(text)
+    except SettingsError as err:
+        raise OperatorError(str(err)) from err
+
+
+def _in_words(active: ActiveState) -> str:
+    return Place(active.path, active.state).in_words()
+
+
+def _runs(held: Sequence[Hold]) -> str:
+    return 'runs now: ' + ', '.join(hold.place.in_words() for hold in held)
+
+
+def _in_spite_of(prospect: Prospect) -> str:
+    told = []
+    if prospect.missing:
+        told.append('without its input keys ' + ', '.join(prospect.missing))
+    if prospect.repeats:
+        told.append('it may repeat ' + ', '.join(prospect.repeats))
+    return ''.join('; ' + each for each in told)

@@ -1,0 +1,46 @@
+"""Waits for an operator where no machine's lock is held: before a precondition, between items."""
+import contextlib
+from typing import Callable, Iterator, Optional
+
+import smach
+
+from ..control.hold import LetGo, Place
+from ..control.holding import Wait, wait_until_let_go
+from ..machine.limited_run import standing_still
+from ..machine.tree_node import TreeNode
+from ..settings.settings import CONFIRM_FIRST
+
+Stopped = Callable[[], bool]
+
+
+@contextlib.contextmanager
+def clocks_stand_still(node: TreeNode) -> Iterator[None]:
+    """Let the time limits around a container stand still, and the minutes of its trial."""
+    with standing_still(node.runs_around), node.tree.budget.stands_still():
+        yield
+
+
+def wait_for_operator(node: TreeNode, place: Place, autonomy: str, stopped: Stopped) -> None:
+    """Wait before something begins, where an operator holds it.
+
+    :param autonomy: of what begins, by its settings.
+    :param stopped: ends the wait, as a preempt does.
+    """
+    control = node.tree.control
+    if not control.is_set and autonomy != CONFIRM_FIRST:
+        return
+    confirms = control.level_of(place, autonomy) == CONFIRM_FIRST
+    hold = control.hold_before(place, confirms, not stopped())
+    if hold is None:
+        return
+    hold.may_be_sent = False
+    wait_until_let_go(control, hold, Wait(node, clocks_stand_still(node),
+                                          lambda: _ended_by(node, stopped)))
+
+
+def _ended_by(node: TreeNode, stopped: Stopped) -> Optional[LetGo]:
+    if node.is_left_behind():
+        return LetGo.LEFT_BEHIND
+    if smach.is_shutdown():
+        return LetGo.SHUTDOWN
+    return LetGo.PREEMPTED if stopped() else None

@@ -1,0 +1,99 @@
+"""A viewer's "set as initial state" for machines that run under an oracle.
+
+Our introspection server hands it over. One that a program has made with upstream's smach_ros sets
+the initial state, which does nothing to a machine that runs: its topic is listened to as well.
+"""
+import threading
+import time
+import weakref
+from typing import Any, Collection, Dict, Iterator, List, Optional, Tuple
+
+import rospy
+
+import smach
+from smach_msgs.msg import SmachContainerInitialStatusCmd
+from smach_oracle.oracle.errors import TrialError
+from smach_oracle.oracle.operator_hand import OperatorHand
+
+from ..introspection.plain_pickle import RefusedDataError, decode_userdata
+from ..introspection.viewer_jump import add_sender, sender_of
+
+_SAME_S = 1.0
+"""Clients repeat a command several times a second until a status shows it; that is one wish."""
+_Shown = Tuple[str, str]  # topic and path of a container there
+
+
+class ViewerCommands:
+    """Sends machines where viewers want them; listens for those that it is told of."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._shown: Dict[_Shown, 'weakref.ref[smach.Container]'] = {}
+        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._heard_s: Dict[Tuple[int, str], float] = {}  # each wish, by machine and state
+        add_sender(self.send)
+
+    def listen_for(self, machine: smach.StateMachine) -> None:
+        """Listen where upstream's servers listen for a machine and the containers in it."""
+        with self._lock:
+            for container in _containers_in(machine, []):
+                for shown in _shown_by_upstream(container):
+                    self._shown[shown] = weakref.ref(container)
+                    if shown[0] not in self._subscribers:
+                        self._subscribers[shown[0]] = rospy.Subscriber(
+                            shown[0], SmachContainerInitialStatusCmd, self._on_command, shown[0])
+
+    def _on_command(self, command: SmachContainerInitialStatusCmd, topic: str) -> None:
+        known = self._shown.get((topic, command.path))
+        container = known() if known is not None else None
+        if container is None:
+            return
+        try:
+            written = decode_userdata(command.local_data)
+        except RefusedDataError as err:
+            smach.logerr("'%s' is not sent anywhere: %s" % (command.path, err))
+            return
+        for label in list(command.initial_states)[:1]:
+            self.send(container, label, written, sender_of(command))
+
+    def send(self, container: Any, label: str, written: Collection[str],
+             by: str) -> Optional[bool]:
+        """Send a machine that runs under an oracle to a state, as an operator would.
+
+        :param written: userdata keys that come with the command.
+        :param by: who wants it.
+        :returns: None where the container is no such machine, False where it cannot go there.
+        """
+        if not isinstance(container, smach.StateMachine) or not container.is_running():
+            return None
+        try:
+            hand = OperatorHand(container)
+        except TrialError:
+            return None
+        return not self._is_new(container, label) or hand.send(label, by, tuple(written))
+
+    def _is_new(self, machine: object, label: str) -> bool:
+        """Note a wish; whether it is not one that was just heard."""
+        now_s = time.monotonic()
+        with self._lock:
+            self._heard_s = {wish: heard_s for wish, heard_s in self._heard_s.items()
+                             if now_s - heard_s < _SAME_S}
+            was_heard = (id(machine), label) in self._heard_s
+            self._heard_s[id(machine), label] = now_s
+            return not was_heard
+
+
+def _containers_in(container: Any, above: List[object]) -> Iterator[smach.Container]:
+    if not isinstance(container, smach.Container) or any(container is each for each in above):
+        return
+    yield container
+    for child in list(container.get_children().values()):
+        yield from _containers_in(child, above + [container])
+
+
+def _shown_by_upstream(container: smach.Container) -> Iterator[_Shown]:
+    """Topics and paths by which upstream's introspection listens for a container."""
+    for callback in getattr(container, '_transition_cbs', []):
+        proxy: Any = getattr(callback[0], '__self__', None)
+        if type(proxy).__module__ == 'smach_ros.introspection' and hasattr(proxy, '_init_cmd'):
+            yield proxy._init_cmd.resolved_name, proxy._path

@@ -1,0 +1,118 @@
+"""A pause between the items of an Iterator, and before a precondition."""
+import pickle
+
+import pytest
+from held_machines import Gate, Held
+from machines import Scripted, chain_of
+
+import smach
+from smach_oracle.oracle import OracleContainer, unwrap
+from smach_oracle.oracle.records.events import EventKind
+
+
+def items_machine(state: smach.State) -> smach.StateMachine:
+    """A machine whose state EACH does three items with a state."""
+    each = smach.Iterator(['done', 'aborted', 'preempted'], [], [], it=[1, 2, 3],
+                          exhausted_outcome='done')
+    with each:
+        smach.Iterator.set_contained_state('ITEM', state, loop_outcomes=['ok'])
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('EACH', each)
+    return machine
+
+
+def test_an_iterator_waits_between_two_items_and_steps() -> None:
+    gate = Gate()
+    state = Scripted(gate)
+    with Held(items_machine(state)).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/EACH/ITEM')
+        assert state.runs == 1
+        assert held.hand.step() == 'runs now: ITEM in SM_ROOT/EACH'
+        held.waits_before('SM_ROOT/EACH/ITEM')
+        assert state.runs == 2
+        held.hand.resume()
+        assert held.end() == 'done'
+    assert state.runs == 3
+    assert held.told(EventKind.HOLD_END) == ['stepped', 'resumed']
+
+
+@pytest.mark.parametrize('ask', [lambda held: held.hand.preempt(),
+                                 lambda held: held.machine.request_preempt()])
+def test_a_preempt_ends_an_iterator_that_waits(ask) -> None:
+    def heed(state, ud):
+        if state.preempt_requested():
+            state.service_preempt()
+            return 'preempted'
+        return 'ok'
+
+    state = Scripted('ok', heed, heed)
+    held = Held(items_machine(state))
+    held.hand.set_breakpoint('ITEM')
+    with held.begin():
+        held.waits_before('SM_ROOT/EACH/ITEM')
+        ask(held)
+        assert held.end() == 'preempted'
+    assert state.runs == 2  # the second item under the request
+
+
+def test_gates_go_with_the_oracle_and_stay_one() -> None:
+    machine = items_machine(Scripted())
+    for _ in range(2):
+        OracleContainer.wrap(machine)
+        assert machine.execute() == 'done'
+    iterator = machine['EACH']
+    assert len(iterator._transition_cbs) == 1
+    copied = pickle.loads(pickle.dumps(machine))
+    gate = copied['EACH']._transition_cbs[0][0]
+    assert gate.node.machine is copied
+    unwrap(machine)
+    assert iterator._transition_cbs == []
+
+
+@pytest.mark.parametrize('settings, waits_before', [
+    ({}, 'SM_ROOT/A'), ({'states': {'A': {'autonomy': 'confirm'}}}, 'SM_ROOT/A')])
+def test_a_precondition_is_not_begun_while_held(settings, waits_before) -> None:
+    gate = Gate('aborted')
+    first, second = Scripted(), Scripted(gate)
+    held = Held(chain_of(first, second), settings=settings, preconditions={'B': ['A']})
+    by_pause = not settings
+    with held.begin():
+        if not by_pause:
+            held.waits_before(waits_before)
+            held.hand.confirm()
+        assert gate.entered.wait(20)
+        if by_pause:
+            held.hand.pause()
+        gate.opened.set()
+        held.waits_before(waits_before)
+        assert first.runs == 1
+        assert held.of(EventKind.PRECONDITION_START)
+        if by_pause:
+            held.hand.resume()
+        else:
+            held.hand.confirm()
+        assert held.end() == 'done'
+    assert first.runs >= 2
+
+
+def test_a_function_among_the_preconditions_waits_too_and_a_preempt_ends_that() -> None:
+    def check(ud):
+        called.append(1)
+        return True
+
+    called = []
+    gate = Gate('aborted')
+    held = Held(chain_of(Scripted(gate)),
+                preconditions={'A': [check]})
+    with held.begin():
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/check')
+        held.machine.request_preempt()
+        assert held.end() == 'preempted'
+    assert not called

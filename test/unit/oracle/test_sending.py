@@ -1,0 +1,199 @@
+"""A running machine that an operator sends to a state, with the checks of an expert's jump."""
+import pytest
+from held_machines import Gate, Held, eventually
+from machines import FakeExpert, Scripted, chain_of, contents, goto
+
+import smach
+from smach_oracle.oracle.control.control import Jump
+from smach_oracle.oracle.errors import OperatorError
+from smach_oracle.oracle.records.events import EventKind
+
+
+def test_it_goes_there_once_its_state_has_ended() -> None:
+    gate, second, third = Gate(), Scripted(), Scripted()
+    with Held(chain_of(Scripted(gate), second, third)).begin() as held:
+        assert gate.entered.wait(20)
+        assert held.hand.go_to('', 'C', 'eva') == 'SM_ROOT goes to C once A has ended'
+        assert held.hand.status().jumps == {'SM_ROOT': 'C'}
+        gate.opened.set()
+        assert (held.end(), second.runs, third.runs) == ('done', 0, 1)
+        assert held.hand.status().jumps == {}
+    sent, = held.of(EventKind.SENT)
+    assert (sent.state, sent.target, sent.by) == ('B', 'C', 'eva')
+    assert sent.data == {'missing_keys': [], 'userdata': 'keep'}
+    assert not held.of(EventKind.JUMP, EventKind.FAILURE)
+
+
+def test_a_paused_machine_goes_there_at_once_and_waits_there() -> None:
+    states = [Scripted(), Scripted(), Scripted()]
+    held = Held(chain_of(*states))
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        assert held.hand.go_to('SM_ROOT', 'C') == 'SM_ROOT goes to C instead of A, where it waits'
+        held.waits_before('SM_ROOT/C')
+        assert held.hand.resume() == 'runs now: C in SM_ROOT'
+        assert held.end() == 'done'
+    assert [state.runs for state in states] == [0, 0, 1]
+    assert held.told(EventKind.HOLD_END) == ['sent', 'resumed']
+
+
+def test_a_nested_machine_can_be_sent_and_a_later_wish_wins() -> None:
+    gate = Gate()
+    states = [Scripted(), Scripted(), Scripted()]
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', chain_of(Scripted(gate), *states))
+    with Held(machine).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.go_to('SM_ROOT/INNER', 'C')
+        held.hand.go_to('SM_ROOT/INNER', 'D')
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert [state.runs for state in states] == [0, 0, 1]
+
+
+def test_it_is_refused_what_an_expert_is_refused() -> None:
+    gate = Gate()
+    with Held(chain_of(Scripted(gate), Scripted())).begin() as held:
+        assert gate.entered.wait(20)
+        with pytest.raises(OperatorError, match="no state 'X' to go to; allowed: A, B$"):
+            held.hand.go_to('', 'X')
+        with pytest.raises(OperatorError, match="no state 'ORACLE' to go to"):
+            held.hand.go_to('', 'ORACLE')
+        with pytest.raises(OperatorError, match="no container 'SM_ROOT/Y'; there are: SM_ROOT$"):
+            held.hand.go_to('SM_ROOT/Y', 'A')
+        assert not held.hand.status().jumps
+
+
+def test_a_blocked_state_is_refused() -> None:
+    gate = Gate(heeds=False)
+    held = Held(chain_of(Scripted(gate), Scripted('aborted')),
+                settings={'states': {'A': {'time_limit_s': 0.1, 'grace_period_s': 0.05}},
+                          'max_recoveries': 0},
+                expert=FakeExpert(goto('B')))
+    held.hand.set_breakpoint('B')
+    with held.begin():
+        held.waits_before('SM_ROOT/B')
+        with pytest.raises(OperatorError, match='A cannot be entered now: still runs'):
+            held.hand.go_to('', 'A')
+        gate.opened.set()
+
+
+def test_missing_keys_are_told_before() -> None:
+    gate = Gate()
+    machine = chain_of(Scripted(gate), Scripted(), Scripted(input_keys=['cup']))
+    with Held(machine).begin() as held:
+        assert gate.entered.wait(20)
+        assert held.hand.go_to('', 'C').endswith('; without its input keys cup')
+        assert 'input keys' not in held.hand.go_to('', 'C', written=['cup'])
+        held.hand.go_to('', 'C')
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert held.of(EventKind.SENT)[0].data['missing_keys'] == ['cup']
+    assert held.of(EventKind.WARNING)[0].text == 'sent there without its input keys cup'
+
+
+def test_a_state_that_is_not_repeated_by_itself_has_to_be_confirmed() -> None:
+    gate, first = Gate(), Scripted()
+    held = Held(chain_of(first, Scripted(gate), Scripted()),
+                settings={'states': {'A': {'on_retry': 'confirm'}}})
+    with held.begin():
+        assert gate.entered.wait(20)
+        with pytest.raises(OperatorError, match='going to A may repeat A: confirm that it may'):
+            held.hand.go_to('', 'A')
+        assert held.hand.go_to('', 'A', confirm_repeats=True).endswith('; it may repeat A')
+        gate.opened.set()
+        assert (held.end(), first.runs) == ('done', 2)
+
+
+def test_what_comes_to_be_repeated_in_between_is_not_confirmed() -> None:
+    """B was not done when the jump was asked for; it was when it was to be made."""
+    gate = Gate()
+    states = [Scripted(gate), Scripted(), Scripted()]
+    held = Held(chain_of(*states), settings={'states': {'A': {'on_retry': 'confirm'}}})
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        control = held.machine._oracle.tree.control
+        held.hand.step()
+        assert gate.entered.wait(20)
+        control.ask_jump('SM_ROOT', Jump('A', 'eva'))  # as if it were asked before A began
+        gate.opened.set()
+        held.waits_before('SM_ROOT/B')
+        held.hand.resume()
+        assert held.end() == 'done'
+    assert states[0].runs == 1
+    assert ('is not sent to A: it may repeat A, which nobody has confirmed'
+            in [event.text for event in held.of(EventKind.WARNING)])
+
+
+def test_userdata_are_as_the_state_had_them_unless_settings_keep_them() -> None:
+    for userdata, seen in (('restore', [1, 1]), ('keep', [1, 2])):
+        values = []
+
+        def first(state, ud, values=values):
+            values.append(ud.x)
+            ud.x = ud.x + 1
+            return 'ok'
+
+        machine = chain_of(Scripted(first, first, input_keys=['x'], output_keys=['x']), Scripted())
+        machine.userdata.x = 1
+        held = Held(machine, settings={'userdata': userdata})
+        held.hand.set_breakpoint('B')
+        with held.begin():
+            held.waits_before('SM_ROOT/B')
+            held.hand.remove_breakpoint('B')
+            held.hand.go_to('', 'A')
+            held.waits_before('SM_ROOT/A')
+            held.hand.resume()
+            assert held.end() == 'done'
+        assert values == seen
+        assert held.of(EventKind.SENT)[0].data['userdata'] == userdata
+        assert contents(held.machine.userdata)['x'] == seen[-1] + 1
+
+
+def test_a_container_that_ends_before_says_so() -> None:
+    gate = Gate()
+    with Held(chain_of(Scripted(gate))).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.go_to('', 'A')
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert [event.text for event in held.of(EventKind.WARNING)] == [
+        'has ended before it could be sent to A']
+    assert not held.hand.status().jumps
+
+
+def test_a_machine_that_does_not_run_begins_there() -> None:
+    states = [Scripted(), Scripted()]
+    held = Held(chain_of(*states))
+    assert held.hand.go_to('', 'B') == 'SM_ROOT does not run; it will begin in B'
+    with held.begin():
+        assert held.end() == 'done'
+    assert [state.runs for state in states] == [0, 1]
+
+
+def test_a_machine_whose_expert_is_asked_goes_there_after_the_answer() -> None:
+    def wait_and_go(question, cancelled, progress):
+        assert asked.opened.wait(20)
+        return goto('A')
+
+    asked, first, last = Gate(), Scripted('aborted'), Scripted()
+    held = Held(chain_of(first, Scripted(), last), expert=FakeExpert(wait_and_go),
+                settings={'max_recoveries': 0})
+    with held.begin():
+        eventually(lambda: held.of(EventKind.QUERY_OPENED))
+        assert held.hand.go_to('', 'C') == 'SM_ROOT goes to C once ORACLE has ended'
+        asked.opened.set()
+        assert (held.end(), first.runs, last.runs) == ('done', 1, 1)
+
+
+def test_a_preempt_comes_before_a_jump() -> None:
+    gate, third = Gate(), Scripted()
+    with Held(chain_of(Scripted(gate), Scripted(), third)).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.go_to('', 'C')
+        held.hand.preempt()
+        assert (held.end(), third.runs) == ('preempted', 0)
+    assert not held.of(EventKind.SENT)

@@ -1,0 +1,93 @@
+"""Which machines of a node a command means."""
+import pytest
+import rospy
+
+import smach
+from smach_oracle.oracle import OperatorHand, OracleContainer
+from smach_oracle.ros.hand import hand_server
+from smach_oracle.ros.hand.hand_server import HandServer
+from smach_oracle.srv import CommandMachineRequest, SendMachineRequest, SetBreakpointRequest
+
+
+class Silent:
+    """In place of what publishes and listens."""
+
+    def __init__(self, *args):
+        self.changes = 0
+
+    def changed(self):
+        self.changes += 1
+
+    def moved(self):
+        pass
+
+    def listen_for(self, machine):
+        pass
+
+
+@pytest.fixture
+def services(monkeypatch):
+    offered = {}
+    monkeypatch.setattr(rospy, 'Service',
+                        lambda name, kind, handle: offered.__setitem__(name, handle))
+    monkeypatch.setattr(hand_server, 'ControlPublisher', Silent)
+    monkeypatch.setattr(hand_server, 'ViewerCommands', Silent)
+    return offered
+
+
+def machine(name):
+    made = smach.StateMachine(outcomes=['done'])
+    with made:
+        smach.StateMachine.add('A', smach.CBState(lambda ud: 'done', outcomes=['done']))
+    return OracleContainer.wrap(made, name=name)
+
+
+def is_paused(each):
+    return OperatorHand(each).status().paused
+
+
+def test_a_path_means_one_machine_and_no_path_all(services):
+    server, one, two = HandServer(), machine('task'), machine('task_2')
+    server.watch(one)
+    server.watch(two)
+    pause = services['~oracle/pause']
+    assert pause(CommandMachineRequest(path='task', by='eva')).ok
+    assert (is_paused(one), is_paused(two)) == (True, False)
+    response = pause(CommandMachineRequest())
+    assert response.ok and 'task does not run' in response.message
+    assert 'task_2 does not run' in response.message and is_paused(two)
+    refused = pause(CommandMachineRequest(path='other'))
+    assert (refused.ok, refused.message) == (
+        False, "there is no machine 'other' here; there are: task, task_2")
+
+
+def test_going_somewhere_needs_one_machine(services):
+    server, one, two = HandServer(), machine('task'), machine('task_2')
+    server.watch(one)
+    server.watch(two)
+    go_to = services['~oracle/go_to']
+    assert not go_to(SendMachineRequest(state='A')).ok
+    assert go_to(SendMachineRequest(path='/task_2', state='A')).message == (
+        'task_2 does not run; it will begin in A')
+
+
+def test_what_is_refused_and_what_is_forgotten(services):
+    server, one = HandServer(), machine('task')
+    server.watch(one)
+    stop = services['~oracle/breakpoint']
+    assert stop(SetBreakpointRequest(pattern='A')).message == 'task pauses before task/A'
+    assert stop(SetBreakpointRequest(pattern='A', remove=True)).ok
+    assert not stop(SetBreakpointRequest(pattern='A', remove=True)).ok
+    server.forget(one)
+    assert services['~oracle/resume'](CommandMachineRequest()).message == (
+        "there is no machine '' here; there are: none; the first has yet to run")
+    assert not one.events.observers
+
+
+def test_who_calls_is_who_commands(services):
+    server, one = HandServer(), machine('task')
+    server.watch(one)
+    request = CommandMachineRequest()
+    request._connection_header = {'callerid': '/rosservice_1'}
+    services['~oracle/pause'](request)
+    assert OperatorHand(one).status().paused_by == '/rosservice_1'
