@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Random trees, executed under an oracle and by a model of the rules: where do the two disagree?
+
+    python3 benchmarks/random_trees.py [--trees N] [--seed S] [--only SEED] [--upstream PATH]
+    [--check]
+
+The model is written from doc/ alone (test/unit/support/tree_model). The trees are up to four levels
+deep, of StateMachines, Sequences, Concurrences and Iterators, with failures, preempts, limits and
+answers at random. Each is executed twice; events, visits, questions, outcomes and userdata are
+compared step by step. Each is then preempted from another thread, at any moment. What disagrees is
+shown with its seed, and runs again alone by --only. --upstream takes the smach found at PATH. With
+--check the exit status is 1 where anything disagrees, hangs, or leaves a thread behind.
+"""
+import argparse
+import collections
+import sys
+import threading
+from pathlib import Path
+from typing import Any, Counter, List
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / 'test' / 'unit' / 'support'))
+
+MOST_SHOWN = 5
+
+
+def main() -> int:
+    """Run and report."""
+    arguments = parse_arguments()
+    if arguments.upstream:
+        sys.path.insert(0, arguments.upstream)
+    silence()
+    seeds: List[Any] = [arguments.only] if arguments.only else [
+        arguments.seed + number for number in range(arguments.trees)]
+    counts: Counter[str] = collections.Counter()
+    for seed in seeds:
+        try_tree(seed, bool(arguments.upstream), counts)
+    for name in ('trees', 'decisions', 'questions', 'jumps across containers', 'disagreements',
+                 'hangs', 'threads left', 'preempts that went wrong'):
+        print('{:26} {:>8}'.format(name, counts[name]))
+    faults = sum(counts[name] for name in (
+        'disagreements', 'hangs', 'threads left', 'preempts that went wrong'))
+    return 1 if arguments.check and faults else 0
+
+
+def parse_arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('--trees', type=int, default=500, help='(default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=0,
+                        help='of the first tree (default: %(default)s)')
+    parser.add_argument('--only', metavar='SEED', help='try the tree of this seed alone')
+    parser.add_argument('--upstream', metavar='PATH', help='folder with an upstream smach')
+    parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
+    return parser.parse_args()
+
+
+def silence() -> None:
+    """Have neither SMACH nor the threads of its Concurrences say anything."""
+    import smach
+
+    def silent(*said: object) -> None:
+        pass
+
+    smach.set_loggers(silent, silent, silent, silent)
+    threading.excepthook = silent
+
+
+def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
+    """Execute one tree both ways, and preempt it; count what happens, show what is wrong."""
+    from tree_model.comparing import compare
+    from tree_model.disturbing import disturb
+    from tree_model.drawing import UPSTREAM, Shape, draw
+
+    shape = UPSTREAM if is_upstream else Shape()
+    found = compare(draw(seed, shape), is_upstream)
+    kinds = collections.Counter(event[0] for _, event in found.executed.course)
+    counts.update({
+        'trees': 1, 'decisions': kinds['DECISION'], 'questions': kinds['QUERY_OPENED'],
+        'jumps across containers': found.model.cross_jumps, 'hangs': int(found.is_hung),
+        'threads left': len(found.threads_left), 'disagreements': int(not found.is_fine)})
+    if not found.is_fine and counts['disagreements'] <= MOST_SHOWN:
+        print(found.report())
+    for wrong in disturb(draw(seed, shape)):
+        counts['preempts that went wrong'] += 1
+        print(wrong)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

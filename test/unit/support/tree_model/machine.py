@@ -1,0 +1,235 @@
+"""The model's StateMachines under an oracle: from state to state, and what is a failure."""
+from typing import Any, Dict, List, Optional
+
+from .ends import Failed, Goal, Way
+from .memory import PREEMPTED, SUCCESS, Remembered
+from .parts import OVERRUN, Jumping, Part, Raised, View
+from .plan import Machine
+from .recovering import Recovering
+from .scheduling import Course
+from .words import failing_outcome_of, sounds_like_failure
+
+
+class MachinePart(Part, Recovering):
+    """A StateMachine, or a Sequence, with its oracle."""
+
+    plan: Machine
+
+    def __init__(self, run: Any, plan: Machine, path: str, parent: Any) -> None:
+        super().__init__(run, plan, path, parent)
+        self._children = [run.part_of(child, path, self) for child in plan.children]
+        self.labels = [child.label for child in plan.children]
+        self.userdata: Dict[str, Any] = {}
+        self.snapshots: Dict[str, Dict[str, Any]] = {}
+        self.memory = Remembered(run.plan, path, self.labels, self.labels[0])
+        self.current: Optional[Part] = None
+        self._preempted: Optional[Part] = None
+        self.left_with = ''
+        self._natural: Optional[Way] = None  # ending, of the failure that is being recovered from
+        self.begins_in: Optional[str] = None  # its next execution
+
+    def children(self) -> List[Part]:
+        return self._children
+
+    # -- one execution
+
+    def execute(self, view: View) -> Course:
+        """Run to the end; returns the outcome."""
+        view.copy_to(self.keys, self.userdata)
+        self.settled = False
+        self._natural = None
+        self._preempted = None
+        self.snapshots.clear()
+        self.memory.begin_execution()
+        label = self.begins_in or self.labels[0]
+        self.begins_in = None
+        self.tell('CONTAINER_START', label)
+        try:
+            outcome = yield from self._run_from(label)
+        except Raised:
+            self.tell('CONTAINER_END', '')
+            raise
+        except Jumping:
+            self.leave()
+            view.copy_from(self.keys, self.userdata)
+            raise
+        finally:
+            self.current = None
+        view.copy_from(self.keys, self.userdata)
+        self.tell('CONTAINER_END', '', outcome)
+        return outcome
+
+    def _run_from(self, label: str) -> Course:
+        while True:
+            way = yield from self._visit(label)
+            if not way.is_state:
+                break
+            label = way.target
+        if self.flag and self._preempted is not None and not self._preempted.flag:
+            self.flag = False
+        return way.target
+
+    def _visit(self, label: str) -> Course:
+        """Execute one state; returns where the machine goes."""
+        child = self.current = self.child(label)
+        if self.flag:
+            self._heed_preempt()
+        self.snapshots[label] = dict(self.userdata)
+        self.tell('STATE_START', label)
+        outcome, raised = None, False
+        try:
+            outcome = yield from child.execute(View(
+                self.userdata, self.plan.remappings.get(label, {})))
+        except Raised:
+            raised = True
+        except Jumping as jump:
+            self.run.forget_begins(child)
+            return (yield from self.arrive(label, jump.goal))
+        self.run.forget_begins(child)
+        return (yield from self._ended(label, outcome, raised))
+
+    def _ended(self, label: str, outcome: Any, raised: bool) -> Course:
+        failed = self.failure_of(label, outcome, raised)
+        if failed is None:
+            is_success = not self.flag and outcome != 'preempted'
+            self.memory.ended(label, SUCCESS if is_success else PREEMPTED)
+            way = self.way_of(label, outcome)
+            self.tell('TRANSITION', label, outcome, way.target)
+            return way
+        if self.flag:
+            self.memory.ended(label, PREEMPTED)
+            return self._end_preempted(failed)
+        return (yield from self._fails(failed))
+
+    def _end_preempted(self, failed: Failed) -> Way:
+        if failed.kind == 'TIME_LIMIT' and 'preempted' in self.plan.outcomes:
+            return self.end_naturally(failed._replace(ending=Way('preempted', False)))
+        return self.end_naturally(failed)
+
+    def end_naturally(self, failed: Failed) -> Way:
+        """Go as without an oracle."""
+        if failed.ending is None:
+            raise Raised()
+        self.tell('TRANSITION', failed.label, failed.outcome, failed.ending.target)
+        return failed.ending
+
+    def _fails(self, failed: Failed) -> Course:
+        label, memory = failed.label, self.memory
+        continuous = memory.is_continuous(self.run.plan.policy, label)
+        self.count_failure(failed, continuous)
+        if self.author_recovers(failed):
+            return self.end_naturally(failed)
+        if self.child(label).settled:
+            self.settled = True
+            return self.end_naturally(failed)
+        self._natural = failed.ending
+        way = yield from self.recover(failed, continuous)
+        self._natural = None
+        return way
+
+    def count_failure(self, failed: Failed, continuous: bool) -> None:
+        """Tell of a failure and remember it."""
+        memory, label = self.memory, failed.label
+        self.tell('FAILURE', label, failed.outcome, '', failed.kind, memory.failure_class(label),
+                  float(memory.rate(label)), continuous)
+        memory.fails(label)
+
+    # -- what an end of a state is
+
+    def way_of(self, label: str, outcome: str) -> Way:
+        """Where the author leads an outcome."""
+        target = self.plan.transitions[label].get(outcome)
+        if target in self.labels:
+            return Way(target, True)
+        return next((Way(name, False) for name in (target, outcome)
+                     if name in self.plan.outcomes), Way('', False))
+
+    def failure_of(self, label: str, outcome: Any, raised: bool) -> Optional[Failed]:
+        """What the end of a state is, None where it is no failure."""
+        if raised:
+            return Failed(label, 'EXCEPTION', '', None, None)
+        if outcome is OVERRUN:
+            failing = failing_outcome_of(self.plan.outcomes)
+            return Failed(label, 'TIME_LIMIT', '', None, failing and Way(failing, False))
+        if outcome not in self.child(label).plan.outcomes:
+            return Failed(label, 'UNREGISTERED_OUTCOME', outcome or '', None, None)
+        way = self.way_of(label, outcome)
+        kind = self._kind_of(label, outcome, way)
+        return kind and Failed(label, kind, outcome, way, way if way.target else None)
+
+    def _kind_of(self, label: str, outcome: str, way: Way) -> Optional[str]:
+        if outcome in self.settings_of(label).failure_outcomes:
+            return 'FAILING_OUTCOME'
+        if way.target and not way.is_state and sounds_like_failure(way.target):
+            return 'FELL_THROUGH'
+        if not way.target:
+            return 'UNREGISTERED_OUTCOME'
+        return 'FAILING_OUTCOME' if sounds_like_failure(outcome) else None
+
+    def author_recovers(self, failed: Failed) -> bool:
+        """Whether the author's own transition stays."""
+        own = self.settings_of(failed.label).author_recoveries
+        if (own or self.run.plan.author_recoveries) == 'override':
+            return False
+        return failed.kind == 'FAILING_OUTCOME' and failed.way is not None and (
+            failed.way.is_state
+            or failed.outcome not in self.settings_of(failed.label).failure_outcomes)
+
+    def settings_of(self, label: str) -> Any:
+        """The settings of a state."""
+        return self.run.plan.of(self.path, label)
+
+    # -- preempts
+
+    def request_preempt(self) -> None:
+        self.flag = True
+        if self.current is not None:
+            self._pass_preempt_on()
+
+    def _heed_preempt(self) -> None:
+        """Before a state runs: it is preempted, unless the one before has serviced the request."""
+        if self._preempted is None or self._preempted.flag:
+            if self._preempted is not None:
+                self._preempted.flag = False
+            self._pass_preempt_on()
+        else:
+            self.flag = False
+            self._preempted = None
+
+    def _pass_preempt_on(self) -> None:
+        if self._preempted is not None and self._preempted is not self.current:
+            self._preempted.flag = False
+        self._preempted = self.current
+        self.current.request_preempt()
+
+    # -- leaving and arriving
+
+    def arrive(self, label: str, goal: Goal) -> Course:
+        """A jump has left the state of that label."""
+        if goal.machine is not self:
+            self.memory.ended(label, PREEMPTED)
+            self.choose_left_with()
+            self.tell('TRANSITION', label, self.child(label).left_with, self.left_with)
+            raise Jumping(goal)
+        return (yield from self.follow_from_below(label, goal))
+
+    def leave(self) -> None:
+        """End at once, as preempted."""
+        self.flag = False
+        self.choose_left_with()
+        self.tell('CONTAINER_END', '', self.left_with)
+
+    def choose_left_with(self) -> None:
+        """Find the outcome of a container that is left: as without an oracle, if not preempted."""
+        outcomes, natural = self.plan.outcomes, self._natural
+        if 'preempted' in outcomes:
+            self.left_with = 'preempted'
+        elif natural is not None and not natural.is_state:
+            self.left_with = natural.target
+        else:
+            self.left_with = failing_outcome_of(outcomes) or ''
+
+    def tell(self, kind: str, label: str, outcome: str = '', target: str = '',
+             *more: Any) -> None:
+        """Note an event."""
+        self.run.tell(self.path, (kind, label, outcome or '', target) + more)
