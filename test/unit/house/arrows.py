@@ -36,15 +36,16 @@ ARROWS: Dict[str, Set[str]] = {
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
 TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))
 # what the executive keeps to itself
-INSIDE = {'oracle.execution', 'oracle.branches', 'oracle.recovery', 'oracle.places', 'oracle.machine'}
+INSIDE = {'oracle.execution', 'oracle.branches', 'oracle.recovery', 'oracle.places',
+          'oracle.machine'}
 Layer = Union[str, Set[str]]
 # the packages and modules of a room that has packages, from the top down. Each may import those
 # below it alone: names in one set do not know each other.
 LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
         'prospects', 'operator_hand', 'container', 'question', 'execution', 'branches', 'recovery',
-        'places', 'machine', 'control', 'asking', 'records', 'settings', 'decision', 'number_checks',
-        'background', 'errors'
+        'places', 'machine', 'control', 'asking', 'records', 'settings', 'decision',
+        'number_checks', 'background', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',

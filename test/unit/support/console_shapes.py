@@ -35,7 +35,6 @@ from smach_oracle.expert.console.sensors.question_images import QuestionImage, i
 from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
 from smach_oracle.expert.console.sensors.robot_cameras import RobotCameras
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStream, SensorStreams
-from smach_oracle.expert.console.trials import bag_catalogue
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
 from smach_oracle.expert.console.web.audit import Person
