@@ -8,7 +8,7 @@ from typing import List, Mapping, NamedTuple, Sequence, Tuple
 import smach
 
 from .control.control import Jump
-from .control.hold import Hold, Place
+from .control.hold import HeldPlace, Hold
 from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.sending import Prospect, prospect_of
@@ -305,7 +305,7 @@ def _pattern(text: str) -> PathPattern:
 
 
 def _in_words(active: ActiveState) -> str:
-    return Place(active.path, active.state).in_words()
+    return HeldPlace(active.path, active.state).in_words()
 
 
 def _runs(held: Sequence[Hold]) -> str:

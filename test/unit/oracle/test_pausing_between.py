@@ -22,10 +22,11 @@ def items_machine(state: smach.State) -> smach.StateMachine:
     return machine
 
 
-def test_an_iterator_waits_between_two_items_and_steps() -> None:
+@pytest.mark.parametrize('nested', [True, False])
+def test_an_iterator_waits_between_two_items_and_steps(nested) -> None:
     gate = Gate()
     state = Scripted(gate)
-    with Held(items_machine(state)).begin() as held:
+    with Held(items_machine(state), settings={'nested': nested}).begin() as held:
         assert gate.entered.wait(20)
         held.hand.pause()
         gate.opened.set()
@@ -40,9 +41,10 @@ def test_an_iterator_waits_between_two_items_and_steps() -> None:
     assert held.told(EventKind.HOLD_END) == ['stepped', 'resumed']
 
 
+@pytest.mark.parametrize('nested, runs', [(True, 0), (False, 2)])
 @pytest.mark.parametrize('ask', [lambda held: held.hand.preempt(),
                                  lambda held: held.machine.request_preempt()])
-def test_a_preempt_ends_an_iterator_that_waits(ask) -> None:
+def test_a_preempt_ends_an_iterator_that_waits(ask, nested, runs) -> None:
     def heed(state, ud):
         if state.preempt_requested():
             state.service_preempt()
@@ -50,19 +52,19 @@ def test_a_preempt_ends_an_iterator_that_waits(ask) -> None:
         return 'ok'
 
     state = Scripted('ok', heed, heed)
-    held = Held(items_machine(state))
+    held = Held(items_machine(state), settings={'nested': nested})
     held.hand.set_breakpoint('ITEM')
     with held.begin():
         held.waits_before('SM_ROOT/EACH/ITEM')
         ask(held)
         assert held.end() == 'preempted'
-    assert state.runs == 2  # the second item under the request
+    assert state.runs == runs  # a state without an oracle of its own runs under the request
 
 
 def test_gates_go_with_the_oracle_and_stay_one() -> None:
     machine = items_machine(Scripted())
     for _ in range(2):
-        OracleContainer.wrap(machine)
+        OracleContainer.wrap(machine, nested=False)
         assert machine.execute() == 'done'
     iterator = machine['EACH']
     assert len(iterator._transition_cbs) == 1

@@ -87,7 +87,8 @@ def test_where_an_interface_has_another_name_it_says_so_once_and_tries_without(
     monkeypatch.setattr(rospy, 'logwarn', lambda text, *what: warned.append(text % what))
     settings = SimpleNamespace(plans=StatePlans({'PICK': {'means': 'take'}}), most_questions=9)
     operator = ScriptedOperator(settings, None, None, None)
-    goal = SimpleNamespace(failed_state='PICK', choices=[SimpleNamespace(state='PICK', blocked='')],
+    goal = SimpleNamespace(failed_state='PICK', choices=[SimpleNamespace(
+        state='PICK', blocked='', container='')],
                            interfaces=[SimpleNamespace(name=name) for name in offered])
     answers = [
         operator._plan_answer(SimpleNamespace(goal=goal), 0, TrueScene({}, 1, '')) for _ in range(2)

@@ -7,7 +7,7 @@ import threading
 from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
 from ..settings.settings import CONFIRM_FIRST
-from .hold import HeldBy, Hold, LetGo, Place
+from .hold import HeldBy, HeldPlace, Hold, LetGo
 from .path_pattern import PathPattern
 
 _LOOK_PERIOD_S = 0.05  # how soon a wait sees a preempt or a shutdown, of which nobody tells it
@@ -80,7 +80,7 @@ class Control:
         with self._changed:
             engine.attentive = self.is_set or engine.stays_attentive
 
-    def hold_before(self, place: Place, confirms: bool, breaks: bool = True) -> Optional[Hold]:
+    def hold_before(self, place: HeldPlace, confirms: bool, breaks: bool = True) -> Optional[Hold]:
         """Return the wait before a state, None where the machine may enter it.
 
         :param confirms: whether the state is entered only once somebody has confirmed it.
@@ -93,7 +93,7 @@ class Control:
                 return Hold(place, HeldBy.BREAKPOINT, confirms)
             return Hold(place, HeldBy.CONFIRM, confirms) if confirms else None
 
-    def _breaks_before(self, place: Place) -> bool:
+    def _breaks_before(self, place: HeldPlace) -> bool:
         """Pause the tree where a breakpoint is meant."""
         for pattern in self._breakpoints.values():
             if pattern.matches(*place):
@@ -137,7 +137,7 @@ class Control:
             return None
         return LetGo.CONFIRMED if hold.confirmed else LetGo.RESUMED
 
-    def level_of(self, place: Place, default: str) -> str:
+    def level_of(self, place: HeldPlace, default: str) -> str:
         """Return the autonomy of a state; `default`: by its settings."""
         with self._changed:
             for pattern, level in reversed(list(self._levels.values())):

@@ -23,7 +23,7 @@ class LetGo(str, Enum):
     LEFT_BEHIND = 'left behind'  # the state around it was abandoned
 
 
-class Place(NamedTuple):
+class HeldPlace(NamedTuple):
     """A state that is about to run, and the path of its container."""
 
     path: str
@@ -39,7 +39,7 @@ class Hold:
 
     __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent')
 
-    def __init__(self, place: Place, held_by: HeldBy, confirms: bool) -> None:
+    def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
         self.place = place
         self.held_by = held_by
         self.confirms = confirms  # whether it waits for a confirmation

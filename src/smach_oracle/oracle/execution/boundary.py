@@ -4,7 +4,7 @@ from typing import Iterator, NamedTuple, Optional
 
 import smach
 
-from ..control.hold import Hold, LetGo, Place
+from ..control.hold import HeldPlace, Hold, LetGo
 from ..control.holding import Wait, wait_until_let_go
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
@@ -50,7 +50,7 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     jump = None if stops else control.take_jump(node.path)
     if jump is not None and make_jump(node, jump):
         return Stop()  # to the next boundary, which is before that state
-    place = Place(node.path, str(machine._current_label))
+    place = HeldPlace(node.path, str(machine._current_label))
     level = control.level_of(place, node.record(place.state).settings.autonomy)
     hold = control.hold_before(place, level == CONFIRM_FIRST, not stops)
     if hold is not None and (stops or (was_preempted and control.paused)):
@@ -69,7 +69,7 @@ def _is_to_stop(node: TreeNode) -> bool:
     return False
 
 
-def _announce(node: TreeNode, place: Place) -> None:
+def _announce(node: TreeNode, place: HeldPlace) -> None:
     smach.loginfo('{}: is about to enter {}'.format(*place))
     node.emit(EventKind.ANNOUNCE, state=place.state, text='about to enter ' + place.state)
 

@@ -7,7 +7,8 @@ from typing import Any, Iterator, Tuple
 
 import smach
 
-from ..control.hold import Place
+from ..branches.border import border_of
+from ..control.hold import HeldPlace
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
@@ -31,13 +32,20 @@ class ItemGate:
         path = '/'.join((node.path,) + self._below)
         relative = '/'.join(filter(None, (node.relative_path,) + self._below))
         autonomy = node.in_force.of_state(relative, label).autonomy
-        wait_for_operator(node, Place(path, label), autonomy, self._container.preempt_requested)
+        wait_for_operator(node, HeldPlace(path, label), autonomy, self._container.preempt_requested)
 
 
 def place_gates(node: TreeNode) -> None:
-    """Place a gate in each Iterator of a container whose items are no machines; once."""
+    """Place a gate in each Iterator of a container whose items have no boundary themselves; once.
+
+    Machines have one, and states under an oracle of their own.
+    """
     for below, container in _bare_containers(node.machine, ()):
         children = container.get_children().values()
+        border = border_of(container)
+        if border is not None and border.machines:
+            _remove(container)
+            continue
         if isinstance(container, smach.Iterator) and not any(
                 isinstance(child, smach.StateMachine) for child in children):
             if any(gate.node is node for gate in _gates_of(container)):

@@ -15,7 +15,7 @@ from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from .failure import Failure
 from .precondition_runner import PreconditionRunner
-from .stop import Stop
+from .stop import RecoveryStop
 
 Decided = Tuple[Decider, DecisionFacts]
 
@@ -27,7 +27,7 @@ class Deciding:
     """
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
-                 context: FailureContext, continuous: bool, stop: Stop) -> None:
+                 context: FailureContext, continuous: bool, stop: RecoveryStop) -> None:
         self._node = node
         self._record = record
         self.failure = failure

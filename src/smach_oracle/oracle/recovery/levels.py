@@ -14,7 +14,7 @@ from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
 from .deciding import Deciding
 from .failure import ContainerEnding, Failure, author_recovers, failure_kind, route_of
-from .stop import Stop
+from .stop import RecoveryStop
 
 
 def passed_over(node: TreeNode, ending: ContainerEnding) -> str:
@@ -120,7 +120,8 @@ class OuterLevel:
     That is a failure of the state only where the oracle does not ask.
     """
 
-    def __init__(self, node: TreeNode, below: TreeNode, failure: Failure, stop: Stop) -> None:
+    def __init__(self, node: TreeNode, below: TreeNode, failure: Failure,
+                 stop: RecoveryStop) -> None:
         """`below`: the level below, which asks; `failure`: as its end would be judged here."""
         self._node = node
         self._record: StateRecord = node.record(failure.state)

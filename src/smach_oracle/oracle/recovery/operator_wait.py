@@ -4,7 +4,7 @@ from typing import Callable, Iterator, Optional
 
 import smach
 
-from ..control.hold import LetGo, Place
+from ..control.hold import HeldPlace, LetGo
 from ..control.holding import Wait, wait_until_let_go
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
@@ -20,7 +20,7 @@ def clocks_stand_still(node: TreeNode) -> Iterator[None]:
         yield
 
 
-def wait_for_operator(node: TreeNode, place: Place, autonomy: str, stopped: Stopped) -> None:
+def wait_for_operator(node: TreeNode, place: HeldPlace, autonomy: str, stopped: Stopped) -> None:
     """Wait before something begins, where an operator holds it.
 
     :param autonomy: of what begins, by its settings.

@@ -8,7 +8,7 @@ from typing import Any, Iterator, Optional
 
 import smach
 
-from ..control.hold import Place
+from ..control.hold import HeldPlace
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import behind
@@ -87,7 +87,7 @@ class PreconditionRunner:
         """Wait where an operator holds the tree; `label`: of a state of the container."""
         node = self._node
         autonomy = node.settings_of(label).autonomy if label else RUN
-        wait_for_operator(node, Place(node.path, name), autonomy, self._stopped)
+        wait_for_operator(node, HeldPlace(node.path, name), autonomy, self._stopped)
 
     def _call(self, spec: PreconditionSpec) -> None:
         self._wait_for_operator(spec.name)

@@ -31,7 +31,7 @@ from .levels import (
 )
 from .obeying import verdict_of
 from .question_making import Account, make_question, targets_of
-from .stop import Stop
+from .stop import RecoveryStop
 from .verdict import Verdict, VerdictKind
 
 
@@ -49,7 +49,7 @@ class Recovery:
         self._record = record
         self._failure = failure
         self._continuous = continuous
-        self._stop = Stop(node, record)
+        self._stop = RecoveryStop(node, record)
         self._cause = ''  # of the decision
         self._budget = node.tree.budget
         self._ends_budget = False  # whether the question's deadline is that of the trial

@@ -8,7 +8,7 @@ from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
 
 
-class Stop:
+class RecoveryStop:
     """Whether one recovery is over. `cancelled` is set by a preempt, from any thread."""
 
     def __init__(self, node: TreeNode, record: StateRecord) -> None:
