@@ -85,7 +85,7 @@ class OperatorHand:
         except Exception as err:  # it is the user's
             text += ', and its request_preempt failed: {!r}'.format(err)
         finally:
-            top.tree.control.resume()
+            top.tree.control.stop()
         return self._told('preempt', text, by)
 
     # -- one state at a time
@@ -136,7 +136,7 @@ class OperatorHand:
         :raises OperatorError: where there is no such container or state, where it cannot be
             entered now, and where an unconfirmed state may be repeated.
         """
-        node = self._node_at(path)
+        node = self._node_at(path, state)
         prospect = prospect_of(node, state, tuple(written))
         if prospect.why_not:
             raise OperatorError(prospect.why_not)
@@ -167,9 +167,8 @@ class OperatorHand:
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
         control = self._top.tree.control
         label = node.machine._current_label
-        is_held = any(hold.may_be_sent and hold.place.path == node.path
-                      for hold in control.holds())
-        control.ask_jump(node.path, jump)
+        is_held = any(hold.may_be_sent and hold.key == node.key for hold in control.holds())
+        control.ask_jump(node.key, jump)
         if is_held:
             return '{} goes to {} instead of {}{}'.format(
                 node.path, jump.state, label, ', where it waits' if control.paused else '')
@@ -233,12 +232,12 @@ class OperatorHand:
 
     def _active(self) -> List[ActiveState]:
         held = self._top.tree.control.holds()
-        at_boundary = {hold.place.path for hold in held if hold.may_be_sent}
+        at_boundary = {hold.key for hold in held if hold.may_be_sent}
         found = []
         for node in nodes_of(self._top.machine):
             label = node.machine._current_label
             if (node.machine.is_running() and label is not None
-                    and node.path not in at_boundary):
+                    and node.key not in at_boundary):
                 found.append(ActiveState(node.path, str(label), '', False))
         return found + [ActiveState(hold.place.path, hold.place.state, hold.held_by.value,
                                     hold.waits_for_confirmation) for hold in held]
@@ -287,14 +286,15 @@ class OperatorHand:
     def _nothing_waits(self, path: str) -> str:
         return 'nothing waits{}. {}'.format(' in ' + path if path else '', self._how_it_pauses())
 
-    def _node_at(self, path: str) -> TreeNode:
+    def _node_at(self, path: str, state: str) -> TreeNode:
+        """Return the container at a path; of branches, which have one path, that of the state."""
         top = self._top
-        nodes = {node.path: node for node in nodes_of(top.machine)}
-        node = nodes.get(path.strip('/') or top.path)
-        if node is None:
+        nodes = list(nodes_of(top.machine))
+        found = [node for node in nodes if node.path == (path.strip('/') or top.path)]
+        if not found:
             raise OperatorError('there is no container {!r}; there are: {}'.format(
-                path, ', '.join(sorted(nodes))))
-        return node
+                path, ', '.join(sorted({node.path for node in nodes}))))
+        return next((node for node in found if state in node.labels()), found[0])
 
 
 def _pattern(text: str) -> PathPattern:

@@ -199,8 +199,10 @@ class IteratorBorder(Border):
 
     def _note_outcome(self, outcome: object) -> None:
         if self._items is not None and isinstance(outcome, str):
+            # one that is left for a state elsewhere, or preempted, has ended by no word of its own
             self._items.is_finished = (loops(self.container, outcome)
-                                       and not is_preempted(outcome))
+                                       and not is_preempted(outcome)
+                                       and not self.container._preempt_requested)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""

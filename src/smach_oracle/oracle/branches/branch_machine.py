@@ -51,13 +51,16 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
             node.path))
         return None
     node.engine.begin_execution()
-    node.preempt_told = node.gave_up = False
+    node.preempt_told, node.gave_up = False, None
     node.departure = None
     try:
         return _step_to_end(machine, pending_preempt)
     except smach.InvalidUserCodeError as err:
         raised = err
     finally:
+        dropped = node.tree.control.leave(node.engine, node.key)
+        if dropped is not None:
+            node.warn('has ended before it could be sent to {}'.format(dropped.state))
         node.runs_around = ()
         node.records.drop_snapshots()
     if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):

@@ -45,6 +45,7 @@ class Control:
         self._jumps: Dict[str, Jump] = {}
         self._breakpoints: Dict[str, PathPattern] = {}
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
+        self._stopping = False  # an operator has asked the machine to stop
         self.paused = False
         self.paused_by = ''
         self.is_set = False
@@ -62,6 +63,8 @@ class Control:
     def end_trial(self) -> None:
         """Tell nothing more of this trial."""
         self.in_trial = False
+        with self._changed:
+            self._stopping = False
 
     def attend(self, engine: Engine) -> None:
         """Wake this machine from now on, and at once where something is set."""
@@ -87,6 +90,8 @@ class Control:
         :param breaks: whether breakpoints count.
         """
         with self._changed:
+            if self._stopping:
+                return None
             if self.paused:
                 return Hold(place, HeldBy.PAUSE, confirms)
             if breaks and self._breaks_before(place):
@@ -129,7 +134,9 @@ class Control:
                 return ended_by() or let_go  # a preempt that came before it goes before it
 
     def _let_go(self, hold: Hold) -> Optional[LetGo]:
-        if hold.may_be_sent and hold.place.path in self._jumps:
+        if self._stopping:
+            return LetGo.PREEMPTED
+        if hold.may_be_sent and hold.key in self._jumps:
             return LetGo.SENT
         if hold.stepped:
             return LetGo.STEPPED
@@ -140,10 +147,13 @@ class Control:
     def level_of(self, place: HeldPlace, default: str) -> str:
         """Return the autonomy of a state; `default`: by its settings."""
         with self._changed:
-            for pattern, level in reversed(list(self._levels.values())):
-                if pattern.matches(*place):
-                    return level
-            return default
+            return self._level_of(place, default)
+
+    def _level_of(self, place: HeldPlace, default: str) -> str:
+        for pattern, level in reversed(list(self._levels.values())):
+            if pattern.matches(*place):
+                return level
+        return default
 
     def take_jump(self, path: str) -> Optional[Jump]:
         """Return where the container at `path` is to go, once."""
@@ -161,9 +171,16 @@ class Control:
     def pause(self, by: str = '') -> None:
         """Hold every container of the tree at its next state boundary."""
         with self._changed:
+            self._stopping = False
             if not self.paused:
                 self.paused, self.paused_by = True, by
                 self._note_change()
+
+    def stop(self) -> None:
+        """Lift the pause for a stop: what waits ends, and nothing more is held in this trial."""
+        with self._changed:
+            self.paused, self.paused_by, self._stopping = False, '', True
+            self._note_change()
 
     def resume(self) -> Tuple[Hold, ...]:
         """Lift the pause; return what waited because of it."""
@@ -248,9 +265,9 @@ class Control:
             self._levels.pop(pattern.text, None)
             if level:
                 self._levels[pattern.text] = (pattern, level)
-                for hold in self._holds:
-                    if pattern.matches(*hold.place):
-                        hold.confirms = level == CONFIRM_FIRST
+            for hold in self._holds:
+                if pattern.matches(*hold.place):
+                    hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
             self._note_change()
 
     def levels(self) -> Dict[str, str]:

@@ -37,7 +37,8 @@ class HeldPlace(NamedTuple):
 class Hold:
     """One wait; `Control` alone writes to it."""
 
-    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent')
+    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent',
+                 'autonomy', 'key')
 
     def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
         self.place = place
@@ -46,6 +47,8 @@ class Hold:
         self.confirmed = False
         self.stepped = False
         self.may_be_sent = True  # whether the container can go to another state from here
+        self.autonomy = ''  # of the state, by its settings
+        self.key = place.path  # by which jumps of the container are asked for
 
     @property
     def waits_for_confirmation(self) -> bool:

@@ -47,12 +47,17 @@ def _locked(node: TreeNode) -> Iterator[None]:
 def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
     stops = machine.preempt_requested() or _is_to_stop(node)
-    jump = None if stops else control.take_jump(node.path)
+    jump = None if stops else control.take_jump(node.key)
     if jump is not None and make_jump(node, jump):
         return Stop()  # to the next boundary, which is before that state
     place = HeldPlace(node.path, str(machine._current_label))
-    level = control.level_of(place, node.record(place.state).settings.autonomy)
-    hold = control.hold_before(place, level == CONFIRM_FIRST, not stops)
+    autonomy = node.record(place.state).settings.autonomy
+    level = control.level_of(place, autonomy)
+    # what an author does at a preempt waits for no confirmation, and at no breakpoint
+    hold = control.hold_before(place, level == CONFIRM_FIRST and not was_preempted,
+                               not (stops or was_preempted))
+    if hold is not None:
+        hold.autonomy, hold.key = autonomy, node.key
     if hold is not None and (stops or (was_preempted and control.paused)):
         return _end_preempted(node)
     if level == ANNOUNCE:

@@ -2,6 +2,7 @@
 from typing import NamedTuple, Tuple
 
 from ..asking.question import names
+from ..branches.border import IteratorBorder, border_of
 from ..control.control import Jump
 from ..machine.repeats import leave_for, repeated_by_going_to, why_closed
 from ..machine.snapshots import restore
@@ -54,6 +55,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
         return False
     restored = _restore(node, jump)
     leave_for(node, target)
+    forget_jump(node, label)
     if prospect.missing:
         node.warn('sent there without its input keys {}'.format(', '.join(prospect.missing)),
                   target)
@@ -64,6 +66,14 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     go_to(node, "State machine sent by {} to '{}' instead of '{}'".format(by, target, label),
           target)
     return True
+
+
+def forget_jump(node: TreeNode, label: str) -> None:
+    """Forget how the oracle wanted to enter a state to which it led, and which is not entered."""
+    node.record(label).forget_entry()
+    border = border_of(node.machine._states[label])
+    if isinstance(border, IteratorBorder):
+        border.ask_to_go_on(False)
 
 
 def _restore(node: TreeNode, jump: Jump) -> bool:

@@ -202,6 +202,9 @@ class Step:
         """Go as a verdict of a container below says, which has left the present state."""
         node, record = self._node, self._record
         told = outcome if isinstance(outcome, str) else ''
+        if isinstance(outcome, Overrun):
+            node.warn('was left for a state of another container, and {}'.format(outcome.text),
+                      record.label)
         if error is not None:
             smach.logwarn('{}/{}: raised {!r} when it was left'.format(
                 node.path, record.label, error))
@@ -209,7 +212,8 @@ class Step:
         if departure.arrives_at is not node:
             wanted = leaving_outcome(self._machine, node.in_force.failing, None)
             return self._advance(told, Route(wanted, False), facts=LEFT)
-        recall_preempts(self._machine._states[record.label])
+        if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
+            recall_preempts(self._machine._states[record.label])
         failure = Failure(record.label, FailureKind.TIME_LIMIT, told,
                           'was left, as {} failed'.format(departure.failed), None)
         return ArrivingVisit(node, record, failure, departure).arrive(told, self._context())
@@ -260,7 +264,7 @@ class Step:
         if not node.tree.recover or self._author_recovers(failure):
             tell_passed_over(node, failure)
             return self._end_unrecovered(self._natural_ending(failure), failure)
-        if is_settled(node, record.label):
+        if is_settled(node, failure):
             return self._end_settled(failure)
         visit = (OftenUnwellVisit(node, record, failure, why_unwell) if why_unwell
                  else OracleVisit(node, record, failure))
@@ -269,7 +273,8 @@ class Step:
     def _end_settled(self, failure: Failure) -> Optional[str]:
         """End the container by a failure that has had its account further below."""
         ending = self._natural_ending(failure)
-        self._node.gave_up = ending.state is None
+        if ending.state is None:
+            self._node.gave_up = ending.outcome or ''
         return self._end_unrecovered(ending, failure)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:

@@ -102,7 +102,7 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
         error = err
         raise
     finally:
-        dropped = node.tree.control.leave(node.engine, node.path)
+        dropped = node.tree.control.leave(node.engine, node.key)
         if dropped is not None:
             tell_dropped(node, dropped)
         node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=_why(outcome, error))

@@ -54,9 +54,11 @@ class ContainerRecords:
             record.begin_trial()
 
     def drop_snapshots(self) -> None:
-        """Let go of the userdata that snapshots refer to."""
+        """Let go of the userdata that snapshots refer to, and of entries that never came."""
         for record in self.by_label.values():
             record.snapshot = None
+            if record.way_down or record.entered_by_oracle:
+                record.forget_entry()
 
     def visit_ended(self, record: StateRecord, outcome: str, result: VisitResult) -> None:
         """Add a visit to the history, and a success to the rate.

@@ -101,7 +101,10 @@ class TreeNode:
         # where a verdict from below or here ends the present state (execution.departure)
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
-        self.gave_up = False  # the latest execution ended so
+        # the outcome with which the latest execution was given up, '' for an error; None: it was not
+        self.gave_up: Optional[str] = None
+        # a state that is executed as a precondition now
+        self.as_precondition: Optional[smach.State] = None
         self.join(tree)
 
     def take_name(self, name: str) -> None:
@@ -124,6 +127,13 @@ class TreeNode:
         if self.parent is None:
             return self.name
         return '/'.join((self.parent.path,) + self.below)
+
+    @property
+    def key(self) -> str:
+        """Its path, and of a branch the label, too: all branches of a Concurrence have one path."""
+        if self.branch is None:
+            return self.path
+        return '{}/{}'.format(self.path, next(iter(self.machine._states), ''))
 
     @property
     def relative_path(self) -> str:
@@ -257,7 +267,7 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.preempt_told = self.gave_up = False
+        self.preempt_told, self.gave_up = False, None
         self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()

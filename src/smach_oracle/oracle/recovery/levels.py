@@ -5,6 +5,7 @@ import smach
 
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
+from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..places.levels import is_direct, levels_above
 from ..places.place import Place
@@ -17,15 +18,22 @@ from .failure import ContainerEnding, Failure, author_recovers, failure_kind, ro
 from .stop import RecoveryStop
 
 
+def _is_overridden(above: TreeNode, below: Labels) -> bool:
+    """Whether the oracle takes what the author of a container around has drawn."""
+    path = '/'.join(filter(None, (above.relative_path,) + below[:-1]))
+    return above.in_force.of_state(path, below[-1]).author_recoveries == 'override'
+
+
 def passed_over(node: TreeNode, ending: ContainerEnding) -> str:
     """Return the outcome with which an Iterator around a container goes on, '' for none."""
     above = next(levels_above(node), None)
-    if above is None or is_direct(node) or ending.outcome is None:
+    if above is None or is_direct(node) or node.branch is not None or ending.outcome is None:
         return ''
     around: Any = above.machine._states[node.below[0]]
     for label in node.below[1:-1]:
         around = around.get_children()[label]
-    goes_on = isinstance(around, smach.Iterator) and ending.outcome in around._loop_outcomes
+    goes_on = (isinstance(around, smach.Iterator) and ending.outcome in around._loop_outcomes
+               and not _is_overridden(above, node.below))
     # what only the settings call a failure its author has not foreseen
     return ending.outcome if goes_on and ending.outcome in node.in_force.failing else ''
 
@@ -82,10 +90,11 @@ def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
     child, above = node, node.parent
     while above is not None and above.machine._is_running:
+        state = above.machine._states.get(child.below[0])
         label = above.machine._current_label
-        if label is not None and above.is_oracle(label):
+        if above.as_precondition is state or (label is not None and above.is_oracle(label)):
             return True
-        if above.machine._current_state is not above.machine._states.get(child.below[0]):
+        if above.machine._current_state is not state:
             return False
         child, above = above, above.parent
     return False

@@ -33,7 +33,7 @@ def wait_for_operator(node: TreeNode, place: HeldPlace, autonomy: str, stopped: 
     hold = control.hold_before(place, confirms, not stopped())
     if hold is None:
         return
-    hold.may_be_sent = False
+    hold.may_be_sent, hold.autonomy = False, autonomy
     wait_until_let_go(control, hold, Wait(node, clocks_stand_still(node),
                                           lambda: _ended_by(node, stopped)))
 

@@ -160,6 +160,7 @@ class PreconditionRunner:
             if self._cancelled:
                 raise NotMet('preempted')
             self._running = state
+        self._node.as_precondition = state
         try:
             if label:
                 write_constants(behind(self._gate), constants_of(self._machine, label))
@@ -186,6 +187,7 @@ class PreconditionRunner:
         return result.outcome
 
     def _ended(self, state: smach.State) -> None:
+        self._node.as_precondition = None
         with self._lock:
             self._running = None
             cancelled = self._cancelled
