@@ -70,10 +70,9 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
     """Execute one tree both ways, and preempt it; count what happens, show what is wrong."""
     from tree_model.comparing import compare
     from tree_model.disturbing import disturb
-    from tree_model.drawing import UPSTREAM, Shape, draw
+    from tree_model.drawing import draw
 
-    shape = UPSTREAM if is_upstream else Shape()
-    found = compare(draw(seed, shape), is_upstream)
+    found = compare(draw(seed), is_upstream)
     kinds = collections.Counter(event[0] for _, event in found.executed.course)
     counts.update({
         'trees': 1, 'decisions': kinds['DECISION'], 'questions': kinds['QUERY_OPENED'],
@@ -81,7 +80,7 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
         'threads left': len(found.threads_left), 'disagreements': int(not found.is_fine)})
     if not found.is_fine and counts['disagreements'] <= MOST_SHOWN:
         print(found.report())
-    for wrong in disturb(draw(seed, shape)):
+    for wrong in disturb(draw(seed)):
         counts['preempts that went wrong'] += 1
         print(wrong)
 

@@ -28,12 +28,9 @@ class Shape(NamedTuple):
     leaf_branches: bool = False  # leafs directly in Iterators and Concurrences
     preempts: bool = True
     time_limits: bool = True
-    raising_branches: bool = True  # exceptions and strays in Concurrences
 
 
 ANY = Shape()
-UPSTREAM = Shape(raising_branches=False)
-"""There a branch that raised is left preempted, and so is its next execution."""
 
 
 def draw(seed: object, shape: Shape = ANY) -> TreePlan:
@@ -102,9 +99,7 @@ class _Drawing:
     def _leaf(self, beside: bool) -> Leaf:
         chance = self._chance
         more = tuple(name for name in BAD + ('again',) if chance.random() < 0.4)
-        kinds = ['end'] * 6
-        if self._shape.raising_branches or not beside:
-            kinds += ['raise', 'stray']
+        kinds = ['end'] * 6 + ['raise', 'stray']
         if self._preempts:
             kinds.append('preempt')
         overruns = not beside and self._shape.time_limits and chance.random() < 0.02
