@@ -70,9 +70,10 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
     """Execute one tree both ways, and preempt it; count what happens, show what is wrong."""
     from tree_model.comparing import compare
     from tree_model.disturbing import disturb
-    from tree_model.drawing import draw
+    from tree_model.drawing import ANY, UPSTREAM, draw
 
-    found = compare(draw(seed), is_upstream)
+    shape = UPSTREAM if is_upstream else ANY
+    found = compare(draw(seed, shape), is_upstream)
     kinds = collections.Counter(event[0] for _, event in found.executed.course)
     counts.update({
         'trees': 1, 'decisions': kinds['DECISION'], 'questions': kinds['QUERY_OPENED'],
@@ -80,7 +81,7 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
         'threads left': len(found.threads_left), 'disagreements': int(not found.is_fine)})
     if not found.is_fine and counts['disagreements'] <= MOST_SHOWN:
         print(found.report())
-    for wrong in disturb(draw(seed)):
+    for wrong in disturb(draw(seed, shape)):
         counts['preempts that went wrong'] += 1
         print(wrong)
 
