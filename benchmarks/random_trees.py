@@ -4,7 +4,7 @@
     python3 benchmarks/random_trees.py [--trees N] [--seed S] [--only SEED] [--upstream PATH]
     [--check]
 
-The model is written from doc/ alone (test/unit/support/tree_model). The trees are up to four levels
+The model is written apart from the executive (test/unit/support/tree_model). The trees are up to four levels
 deep, of StateMachines, Sequences, Concurrences and Iterators, with failures, preempts, limits and
 answers at random. Each is executed twice; events, visits, questions, outcomes and userdata are
 compared step by step. Each is then preempted from another thread, at any moment. What disagrees is

@@ -1,4 +1,4 @@
-"""Random trees: the executive goes as the model goes that is written from doc/ alone."""
+"""Random trees: the executive goes as a model goes that is written apart from it."""
 import os
 import threading
 
