@@ -4,12 +4,13 @@
     python3 benchmarks/random_trees.py [--trees N] [--seed S] [--only SEED] [--upstream PATH]
     [--check]
 
-The model is written from doc/ alone (test/unit/support/tree_model). The trees are up to four levels
-deep, of StateMachines, Sequences, Concurrences and Iterators, with failures, preempts, limits and
-answers at random. Each is executed twice; events, visits, questions, outcomes and userdata are
-compared step by step. Each is then preempted from another thread, at any moment. What disagrees is
-shown with its seed, and runs again alone by --only. --upstream takes the smach found at PATH. With
---check the exit status is 1 where anything disagrees, hangs, or leaves a thread behind.
+The model is written apart from the executive (test/unit/support/tree_model). The trees are up to
+four levels deep, of StateMachines, Sequences, Concurrences and Iterators, with failures, preempts,
+limits and answers at random. Each is executed twice. Events, visits, questions, outcomes and
+userdata are compared step by step. Each is then preempted from another thread, at any moment. What
+disagrees is shown with its seed, and runs again alone by --only. --upstream takes the smach found
+at PATH. With --check the exit status is 1 where anything disagrees, hangs, or leaves a thread
+behind.
 """
 import argparse
 import collections
@@ -70,9 +71,9 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
     """Execute one tree both ways, and preempt it; count what happens, show what is wrong."""
     from tree_model.comparing import compare
     from tree_model.disturbing import disturb
-    from tree_model.drawing import UPSTREAM, Shape, draw
+    from tree_model.drawing import ANY, UPSTREAM, draw
 
-    shape = UPSTREAM if is_upstream else Shape()
+    shape = UPSTREAM if is_upstream else ANY
     found = compare(draw(seed, shape), is_upstream)
     kinds = collections.Counter(event[0] for _, event in found.executed.course)
     counts.update({

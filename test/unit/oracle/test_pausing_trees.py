@@ -101,7 +101,8 @@ def test_a_preempt_ends_a_paused_tree_on_all_levels() -> None:
 
 def test_a_branch_that_its_concurrence_stops_does_not_wait_on() -> None:
     gate = Gate()
-    waiting = chain_of(Scripted())
+    waiting = chain_of(Scripted(lambda state, ud: 'ok' if gate.entered.wait(20) else 'aborted'),
+                       Scripted())
     together = smach.Concurrence(['done', 'aborted', 'preempted'], 'done',
                                  child_termination_cb=lambda outcomes: True)
     with together:
@@ -111,10 +112,10 @@ def test_a_branch_that_its_concurrence_stops_does_not_wait_on() -> None:
     with machine:
         smach.StateMachine.add('BOTH', together, {'done': 'done'})
     held = Held(machine)
-    held.hand.set_breakpoint('LONG/A')
-    held.hand.set_breakpoint('BOTH/LONG/A')
+    held.hand.set_breakpoint('LONG/B')
+    held.hand.set_breakpoint('BOTH/LONG/B')
     with held.begin():
-        held.waits_before('SM_ROOT/BOTH/LONG/A')
+        held.waits_before('SM_ROOT/BOTH/LONG/B')
         gate.opened.set()
         assert held.end() in ('done', 'preempted')
         assert held.hand.status().paused  # that was no wish of the operator's

@@ -1,1 +1,1 @@
-"""Random trees: drawn, executed by SMACH under an oracle, and by a model made from doc/ alone."""
+"""Random trees: drawn, executed by SMACH under an oracle, and by a model written apart from it."""

@@ -118,14 +118,17 @@ class Scripted(smach.State):
 
 def _owed_branches(state: Any) -> List[Any]:
     """The branches around, to which a preempt is on its way; it comes once to each that runs."""
-    owed = []
+    owed, is_cut_off = [], False
     while state is not None:
         around = getattr(state, 'around', None)
-        if isinstance(around, Parallel) and state.plan_label in around.owed:
-            around.owed.discard(state.plan_label)
-            owed.append(state)
+        if isinstance(around, Parallel):
+            if state.plan_label in around.owed:
+                around.owed.discard(state.plan_label)
+                owed.append(state)
+            else:
+                is_cut_off = is_cut_off or not around.passes_on()
         state = around
-    return owed
+    return [] if is_cut_off else owed
 
 
 class _Impatient(threading.Condition):
@@ -145,6 +148,7 @@ class Parallel(smach.Concurrence):
         self._stops_at = set(stops_at)
         self._active = set()
         self.owed = set()
+        self._has_preempted = False
         self._child_termination_cb = self._branch_ended
         if hasattr(self, '_done_cond'):
             self._done_cond = _Impatient()
@@ -153,13 +157,24 @@ class Parallel(smach.Concurrence):
         """Run all branches."""
         self._active = set(self._labels)
         self.owed = set()
+        self._has_preempted = False
         self._world.turns.fork(len(self._labels))
         return super().execute(*args, **kwargs)
 
     def request_preempt(self) -> None:
         """Ask the branches to stop."""
-        self.owed |= self._active
+        self._owe()
         super().request_preempt()
+
+    def _owe(self) -> None:
+        """The branches that run are preempted; upstream's engine does that once in an execution."""
+        if self.passes_on():
+            self.owed |= self._active
+        self._has_preempted = True
+
+    def passes_on(self) -> bool:
+        """Whether a preempt would reach the branches that run."""
+        return not (self._has_preempted and hasattr(self, '_done_cond'))
 
     def _branch_ended(self, outcomes: Any) -> bool:
         stops = bool(self._stops_at & set(outcomes.values()))
@@ -176,7 +191,7 @@ class Parallel(smach.Concurrence):
         self._active.discard(label)
         self.owed.discard(label)
         if stops:
-            self.owed |= self._active
+            self._owe()
         self._world.turns.branch_ended(not self._active)
 
 

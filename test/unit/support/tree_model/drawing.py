@@ -24,16 +24,16 @@ class Shape(NamedTuple):
 
     depth: int = 4
     concurrent: bool = True
-    iterated: bool = True
+    iterated: bool = False  # the model does not know that they go on with an item
     leaf_branches: bool = False  # leafs directly in Iterators and Concurrences
     preempts: bool = True
     time_limits: bool = True
-    raising_branches: bool = True  # exceptions and strays in Concurrences
+    beside_beside: bool = True  # Concurrences in Concurrences
 
 
 ANY = Shape()
-UPSTREAM = Shape(raising_branches=False)
-"""There a branch that raised is left preempted, and so is its next execution."""
+# there a preempt reaches branches in branches at no certain moment
+UPSTREAM = Shape(beside_beside=False)
 
 
 def draw(seed: object, shape: Shape = ANY) -> TreePlan:
@@ -102,9 +102,7 @@ class _Drawing:
     def _leaf(self, beside: bool) -> Leaf:
         chance = self._chance
         more = tuple(name for name in BAD + ('again',) if chance.random() < 0.4)
-        kinds = ['end'] * 6
-        if self._shape.raising_branches or not beside:
-            kinds += ['raise', 'stray']
+        kinds = ['end'] * 6 + ['raise', 'stray']
         if self._preempts:
             kinds.append('preempt')
         overruns = not beside and self._shape.time_limits and chance.random() < 0.02
@@ -117,7 +115,7 @@ class _Drawing:
         drawn = self._chance.random()
         if depth <= 0 or self._left <= 0 or drawn < 0.5:
             return self._leaf(beside)
-        if drawn < 0.6 and self._shape.concurrent:
+        if drawn < 0.6 and self._may_be_beside(beside):
             return self._beside(depth - 1)
         if drawn < 0.7 and self._shape.iterated:
             return self._repeated(depth - 1, beside)
@@ -177,6 +175,9 @@ class _Drawing:
             return chance.choice(['aborted'] * (4 * ('aborted' in ends)) + ends)
         return None
 
+    def _may_be_beside(self, beside: bool) -> bool:
+        return self._shape.concurrent and (self._shape.beside_beside or not beside)
+
     def _beside(self, depth: int) -> Beside:
         chance = self._chance
         children = tuple(self._branch(depth) for _ in range(chance.randint(1, 3)))
@@ -196,7 +197,7 @@ class _Drawing:
         chance = self._chance
         if self._shape.leaf_branches and chance.random() < 0.3:
             child: Any = self._leaf(beside)
-        elif depth > 0 and self._shape.concurrent and chance.random() < 0.1:
+        elif depth > 0 and self._may_be_beside(beside) and chance.random() < 0.1:
             child = self._beside(depth - 1)
         else:
             child = self._machine(self._label('E'), depth, beside)

@@ -120,7 +120,7 @@ class MachinePart(Part, Recovering):
         if self.author_recovers(failed):
             return self.end_naturally(failed)
         if self.child(label).settled:
-            self.settled = True
+            self.settled = failed.ending is None or not failed.ending.is_state
             return self.end_naturally(failed)
         self._natural = failed.ending
         way = yield from self.recover(failed, continuous)

@@ -7,6 +7,7 @@ from .machine import MachinePart
 from .parts import ConcurrencePart, Cut, IteratorPart, Jumping, LeafPart, Part, Raised, View
 from .plan import CUT, KEYS, MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
 from .scheduling import Scheduler
+from .words import sounds_like_failure
 
 PARTS = {Leaf: LeafPart, Machine: MachinePart, Beside: ConcurrencePart, Repeated: IteratorPart}
 
@@ -103,7 +104,7 @@ class Model:
         """Whether the author of a level above recovers from a container that ends so."""
         level = inner.parent
         if isinstance(level, IteratorPart):
-            return outcome in level.plan.loop_outcomes
+            return outcome in level.plan.loop_outcomes and sounds_like_failure(outcome)
         if not isinstance(level, MachinePart):
             return False
         failed = level.failure_of(inner.label, outcome, False)

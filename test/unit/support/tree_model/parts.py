@@ -247,11 +247,13 @@ class ConcurrencePart(Part):
         """A branch goes elsewhere: the others are preempted."""
         self.goal = goal
         self.flag = True
-        for other in self._active:
-            if other != label:
-                self.child(other).request_preempt()
+        self._preempt_active(but=label)
 
-    def _preempt_active(self) -> None:
+    def _preempt_active(self, but: str = '') -> None:
+        """Preempt the branches that run; upstream's engine does that once in an execution."""
+        if self._is_reached and self.run.is_upstream:
+            return
         self._is_reached = self._is_reached or bool(self._active)
         for label in self._active:
-            self.child(label).request_preempt()
+            if label != but:
+                self.child(label).request_preempt()
