@@ -63,7 +63,7 @@ class TestExpertProtocol(unittest.TestCase):
         self.assertTrue(self.ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
         self.assertEqual(asked.answer,
-                         (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera'))
+                         (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera', ''))
         self.assertTrue(wait_for(lambda: self.listed(self.ann) is None), 'it leaves the open list')
 
     def test_superseding_hands_over_the_output_userdata(self):

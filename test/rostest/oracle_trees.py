@@ -52,8 +52,8 @@ class TreesTest(unittest.TestCase):
         self.expert = FrontEnd(self, '/task/expert_query')
         self.task = oracle_run(self, '--config', config, script(self, SCRIPT))
 
-    def answer(self, **decision):
-        question = self.expert.question(state='GRASP')
+    def answer(self, other_than='', **decision):
+        question = self.expert.question(state='GRASP', other_than=other_than)
         self.assertIsNotNone(question, self.task.output())
         reply = self.expert.answer(AnswerQueryRequest(
             question.query.query_id, ExpertDecision(by='Ann', **decision)))
@@ -69,7 +69,8 @@ class TreesTest(unittest.TestCase):
             ('task', 'PICK'), ('task', 'PLACE'), ('task/FIND', 'LOOK'), ('task/FIND', 'AIM')])
         _, reply = self.answer(kind=ExpertDecision.GOTO, container='task/FIND', state='AIM')
         self.assertTrue(reply.ok, reply.message)
-        query, reply = self.answer(kind=ExpertDecision.SUPERSEDE, outcome='succeeded')
+        query, reply = self.answer(other_than=query.query_id, kind=ExpertDecision.SUPERSEDE,
+                                   outcome='succeeded')
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(self.task.says('OUTCOME succeeded'), self.task.output())
         self.assertIn('VISITS LOOK AIM REACH GRASP AIM REACH GRASP PLACE', self.task.output())

@@ -51,7 +51,7 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
             node.path))
         return None
     node.engine.begin_execution()
-    node.preempt_told, node.gave_up = False, None
+    node.preempt_told = node.gave_up = False
     node.departure = None
     try:
         return _step_to_end(machine, pending_preempt)

@@ -130,18 +130,15 @@ def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[st
 def is_settled(node: TreeNode, failure: Failure) -> bool:
     """Whether a state has failed because the oracle of a container in it gave up.
 
-    That failure has had its account: no level above recovers from it, or asks about it again.
-    Behind a Concurrence or an Iterator only what ended in a failure can be what it has failed for.
+    That failure has had its account: no level above recovers from it, or asks about it again. An
+    overrun of the state is a failure of its own.
     """
     state = node.machine._states[failure.state]
-    is_direct = isinstance(state, smach.StateMachine)
-    below = [state] if is_direct else [machine for _, machine in machines_below(state)]
+    below = [state] if isinstance(state, smach.StateMachine) else [
+        machine for _, machine in machines_below(state)]
     nodes = [cast(WrappedMachine, machine)._oracle for machine in below
              if isinstance(machine, node.tree.container_class)]
-    settled = failure.kind is not FailureKind.TIME_LIMIT and any(
-        each.gave_up is not None and (
-            is_direct or not each.gave_up or each.gave_up in each.in_force.failing)
-        for each in nodes)
+    settled = failure.kind is not FailureKind.TIME_LIMIT and any(each.gave_up for each in nodes)
     for each in nodes:
-        each.gave_up = None
+        each.gave_up = False
     return settled

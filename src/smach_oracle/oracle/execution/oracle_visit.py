@@ -185,8 +185,7 @@ class OracleVisit:
         ending, text = verdict.ending, verdict.text
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
         node = self._node
-        if ending.state is None:
-            node.gave_up = ending.outcome or ''
+        node.gave_up = ending.state is None
         node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
                   target=ending.state or '', by=verdict.by, text=told)
         if ending.error is not None:

@@ -273,8 +273,7 @@ class Step:
     def _end_settled(self, failure: Failure) -> Optional[str]:
         """End the container by a failure that has had its account further below."""
         ending = self._natural_ending(failure)
-        if ending.state is None:
-            self._node.gave_up = ending.outcome or ''
+        self._node.gave_up = ending.state is None
         return self._end_unrecovered(ending, failure)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:

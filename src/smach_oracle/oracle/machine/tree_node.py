@@ -101,8 +101,7 @@ class TreeNode:
         # where a verdict from below or here ends the present state (execution.departure)
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
-        # the outcome with which the latest execution was given up, '' for an error; None: it was not
-        self.gave_up: Optional[str] = None
+        self.gave_up = False  # the latest execution ended so
         # a state that is executed as a precondition now
         self.as_precondition: Optional[smach.State] = None
         self.join(tree)
@@ -267,7 +266,7 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.preempt_told, self.gave_up = False, None
+        self.preempt_told = self.gave_up = False
         self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()
