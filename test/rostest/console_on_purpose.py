@@ -54,7 +54,7 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
     state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
     recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
     asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
-    give_up: [], interfaces: [], userdata: [] };
+    give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
   const request = async () => ({ ok: true, message: "" });
   const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
     connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
