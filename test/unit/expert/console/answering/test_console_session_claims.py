@@ -69,8 +69,8 @@ def give(console, command, person, page=1, **arguments):
 
 
 def answer(console, person):
-    return give(console, 'answer', person, kind='goto', name='PICK', container='', outputs=[], why='',
-                seen=None)
+    return give(console, 'answer', person, kind='goto', name='PICK', container='', outputs=[],
+                why='', seen=None)
 
 
 def test_two_people_of_one_name_do_not_hold_one_claim(console):
