@@ -24,7 +24,8 @@ YOURS = 'It is yours.'
 UNKNOWN_SUCCESS = '''return import("/static/js/answering/state_choices.js").then(
 ({ stateLines }) => (
   stateLines({ state: "PICK", success: null, class: 0, visits: 0, missing: [], preconditions: [],
-    blocked: "", repeats: [], helped: [0, 0] }, "PLACE")[0].textContent))'''
+    blocked: "", repeats: [], runs_again: [], helped: [0, 0], container: "" },
+  { state: "PLACE", running: false }).map((line) => line ? line.textContent : "").join("")))'''
 NO_PLACE = '''return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
   const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));
   const view = new GraphView(() => {});

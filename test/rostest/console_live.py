@@ -21,6 +21,22 @@ QUESTION = '.question-row[data-key^="/alpha/"]'
 ANSWER = '.choice.goto[data-name=PLACE]'
 LIVE = 'live'
 SILENT = 'Nothing is heard from {} any more.'
+# what a page says of a robot when neither it nor the console has been heard for a while
+GONE = '''
+const paths = ["page/store.js", "page/liveness.js"];
+return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
+  [{ Store }, { Liveness }]) => {
+  const store = new Store();
+  const liveness = new Liveness(store);
+  const tell = (robot) => store.receive({ now: 0, sections: {
+    servers: [{ name: "s", connected: true }],
+    heard: { beat: 1, master: 0, servers: { s: 0 }, robots: { "/r": robot } } } });
+  tell(0);
+  liveness.running -= 9000;
+  const silent = liveness.gone({ server: "s", robot: "/r" });
+  tell(9);
+  return [silent, liveness.gone({ server: "s", robot: "/r" })];
+});'''
 GREY = 'return getComputedStyle(document.querySelector(".detail-body")).filter'
 
 
@@ -85,6 +101,11 @@ class Live(ConsolePage, unittest.TestCase):
         finally:
             self.console.thaw()
         self.assertTrue(self.answerable(), 'it comes back; the answer has come too late')
+
+    def test_2_of_a_robot_nothing_is_known_while_the_console_is_silent(self):
+        silent, gone = self.browser.run(GONE)
+        self.assertEqual(silent, '')
+        self.assertIn('/r is gone', gone)
 
     def test_3_with_a_dead_master_no_answer_is_sent(self):
         self.master.kill()

@@ -54,7 +54,7 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
     state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
     recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
     asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
-    give_up: [], interfaces: [], userdata: [] };
+    give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
   const request = async () => ({ ok: true, message: "" });
   const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
     connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
@@ -70,6 +70,44 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
   await detail.claim("take_over");
   said("bob");
   return [said("ann"), said("carl")];
+});'''
+# "No, go back" from giving up a container above that may end as the failed one may
+GO_BACK = '''
+return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
+  const make = (outcome, key, words, act) => {
+    const button = document.createElement("button");
+    button.dataset.name = outcome;
+    button.onclick = act;
+    return button;
+  };
+  const part = new GiveUp({ state: "PICK", path: "TOP/FETCH", give_up: ["aborted"],
+    give_up_above: [{ container: "TOP", outcome: "aborted" }], running: false }, make,
+  { send() {}, changed() {} });
+  document.body.append(part.root);
+  part.root.querySelector(".ends-above").open = true;
+  part.ask("aborted", "TOP");
+  part.cancel();
+  const focused = document.activeElement.dataset.container;
+  part.root.remove();
+  return focused;
+});'''
+# a robot that is held after an answer, and whose silence ends
+HELD = '''
+return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
+  let gone = "";
+  const app = { current: "questions", connection: { request: async () => ({}) },
+    store: { questions: [], onEvents: () => () => {} }, liveness: { gone: () => gone } };
+  const question = { id: "q", trial: "t", robot: "/r", path: "TASK", state: "PICK" };
+  const shown = new FollowUp(app, question, { leave() {}, choose() {} });
+  shown.begin({ kind: "goto", name: "PLACE", container: "" });
+  const events = [["query_answered", "q"], ["jump", ""], ["hold_start", ""]].map(
+    ([kind, query]) => ({ kind, query, words: kind, text: "" }));
+  shown.take({ trial: "t", from: 0, events });
+  return ["", "gone", ""].map((now) => {
+    gone = now;
+    shown.update();
+    return shown.hint.textContent;
+  });
 });'''
 REFUSED = 'the page had just changed there'
 
@@ -186,6 +224,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         mine, taken = browser.run(TAKEN)
         self.assertEqual(mine, 'It is yours. Leave it to others')
         self.assertIn('carl has taken this question over.', taken)
+        self.assertEqual(browser.run(GO_BACK), 'TOP', 'the focus is where it was')
+        waits = 'It waits until somebody lets it go on.'
+        self.assertEqual(browser.run(HELD), [waits, 'gone', waits])
         self.assertEqual(browser.errors(), [])
 
     def test_6_a_machine_with_a_server_of_its_own_is_listed_once(self):

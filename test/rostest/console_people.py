@@ -20,6 +20,8 @@ from waiting import wait_for
 
 from smach_oracle.msg import OpenQueries, OracleEvent
 
+if WITH_BROWSER:
+    from selenium.webdriver.common.keys import Keys
 QUESTION = '.question-row[data-key^="/alpha/"]'
 ANSWER = '.choice.goto[data-name=PLACE]'
 YOURS = 'It is yours.'
@@ -58,6 +60,14 @@ class People(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         browser.find('.name-demand')
         self.assertEqual(self.holder(), '', 'nobody claims without a name')
+        self.assertEqual(browser.run('return document.activeElement.id'), 'expert')
+        self.assertTrue(browser.run('return document.querySelector(".name-demand")'
+                                    '.getBoundingClientRect().top > innerHeight / 2'),
+                        'what stops a hand is at the top')
+        browser.find('#no-name').send_keys(Keys.ESCAPE)
+        self.assertTrue(browser.says('your name is needed', '.claim-bar .problem'),
+                        'Esc leaves the dialog alone')
+        browser.click('[data-action=claim]')
         browser.click('#no-name')
         self.assertTrue(browser.says('your name is needed', '.claim-bar .problem'))
         self.assertTrue(browser.says('Nobody works on it.'))

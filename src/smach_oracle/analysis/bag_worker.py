@@ -12,7 +12,7 @@ import sys
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import NOT_COUNTED
+from smach_oracle.oracle.records.facts import NOT_COUNTED, told_in_words
 
 from .bag_events import BagError, EventReader
 from .bag_machines import FailureImage, RecordedContainer, RecordedMachines, read_machines
@@ -144,7 +144,8 @@ def _replayed(request: BagRequest, by_trial: Dict[str, Dict[int, Event]]) -> Dic
 
 def _event(event: Event) -> List[Any]:
     counted = not (event.data and event.data.get(NOT_COUNTED))
-    return [int(event.kind), *event[1:-1], None if counted else {NOT_COUNTED: True}]
+    kept = dict(told_in_words(event.data), **({} if counted else {NOT_COUNTED: True}))
+    return [int(event.kind), *event[1:-1], kept or None]
 
 
 def _shortened(events: Sequence[Event]) -> List[Event]:

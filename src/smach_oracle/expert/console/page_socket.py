@@ -2,6 +2,7 @@
 import asyncio
 import itertools
 import json
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Callable, Optional, Set, Union
@@ -51,6 +52,7 @@ class OpenPages:
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
         self.numbers = itertools.count(1)
+        self._trials_lock = threading.Lock()  # so that no older list is put last
         self._trials_version = -1  # of the list of live trials
         self.workers = ThreadPoolExecutor(8, 'command')
 
@@ -65,11 +67,12 @@ class OpenPages:
 
     def write_trials(self) -> None:
         """Bring the list of live trials up to date, if anybody looks and something has changed."""
-        version = self.log.version
-        if version != self._trials_version and any(
-                socket.lists.looks for socket in list(self.sockets)):
-            self._trials_version = version
-            self.sections.put('trials', self.log.overview())
+        with self._trials_lock:
+            version = self.log.version
+            if version != self._trials_version and any(
+                    socket.lists.looks for socket in list(self.sockets)):
+                self._trials_version = version
+                self.sections.put('trials', self.log.overview())
 
     def push(self) -> None:
         """Send every page what is new."""
@@ -166,6 +169,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return
         if not self._bucket(message).take():
             if not self._limits.unruly.take():
+                if _only_stops(message):
+                    self._at_once(parse(message))  # no limit holds it up
                 self.end(TOO_FAST, 'too many commands')
                 return
             if not _only_stops(message):

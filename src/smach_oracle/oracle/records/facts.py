@@ -4,11 +4,12 @@ Bags that were recorded before events carried them tell the same by the words of
 are known here and nowhere else. Pure; no smach.
 """
 from enum import Enum
-from typing import Any, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 from .events import NO_OUTCOME, Event
 
 DECIDED_BY = 'decided_by'  # key in the data of DECISION
+JUMPED_TO = 'to'  # key in the data of JUMP: path of the state, where it is in a container below
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
 BRANCHES = 'branches'  # key in the data of CONTAINER_START: states that have oracles of their own
 # key in the data of TRANSITION: true where it says nothing of how good the state is
@@ -52,6 +53,13 @@ def decided_by(event: Event) -> Decider:
         return Decider(stated)
     old = event.text.endswith(_OLD_SPENT)
     return Decider.MAX_RECOVERIES if old else Decider.POLICY
+
+
+def told_in_words(data: Any) -> Dict[str, str]:
+    """Return of the data of an event what its sentence tells."""
+    if not isinstance(data, Mapping):
+        return {}
+    return {key: data[key] for key in (JUMPED_TO, DECIDED_BY) if isinstance(data.get(key), str)}
 
 
 def ended_by(event: Event, entered_a_state: bool) -> TrialEnd:

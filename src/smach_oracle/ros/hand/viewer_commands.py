@@ -20,6 +20,7 @@ from ..introspection.viewer_jump import add_sender, sender_of
 
 _SAME_S = 1.0
 """Clients repeat a command several times a second until a status shows it; that is one wish."""
+_Wish = Tuple[int, str]  # id of a machine, and a state
 _Shown = Tuple[str, str]  # topic and path of a container there
 
 
@@ -30,7 +31,8 @@ class ViewerCommands:
         self._lock = threading.Lock()
         self._shown: Dict[_Shown, 'weakref.ref[smach.Container]'] = {}
         self._subscribers: Dict[str, rospy.Subscriber] = {}
-        self._heard_s: Dict[Tuple[int, str], float] = {}  # each wish, by machine and state
+        self._sending = threading.Lock()  # the second of two equal wishes waits for the first
+        self._heard: Dict[_Wish, Tuple[float, bool]] = {}  # when, in s; whether it was sent
         add_sender(self.send)
 
     def listen_for(self, machine: smach.StateMachine) -> None:
@@ -70,17 +72,19 @@ class ViewerCommands:
             hand = OperatorHand(container)
         except TrialError:
             return None
-        return not self._is_new(container, label) or hand.send(label, by, tuple(written))
+        wish = (id(container), label)
+        with self._sending:
+            known = self._answered(wish)
+            sent = hand.send(label, by, tuple(written)) if known is None else known
+            self._heard[wish] = (time.monotonic(), sent)
+        return sent
 
-    def _is_new(self, machine: object, label: str) -> bool:
-        """Note a wish; whether it is not one that was just heard."""
+    def _answered(self, wish: _Wish) -> Optional[bool]:
+        """Whether an equal wish that was just heard was sent; None where there was none."""
         now_s = time.monotonic()
-        with self._lock:
-            self._heard_s = {wish: heard_s for wish, heard_s in self._heard_s.items()
-                             if now_s - heard_s < _SAME_S}
-            was_heard = (id(machine), label) in self._heard_s
-            self._heard_s[id(machine), label] = now_s
-            return not was_heard
+        self._heard = {each: heard for each, heard in self._heard.items()
+                       if now_s - heard[0] < _SAME_S}
+        return self._heard[wish][1] if wish in self._heard else None
 
 
 def _containers_in(container: Any, above: List[object]) -> Iterator[smach.Container]:

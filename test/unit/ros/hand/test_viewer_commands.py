@@ -86,6 +86,15 @@ def test_a_command_that_a_client_repeats_is_one_wish(viewers):
     assert running.end() == [('A', 0), ('A', 0), ('B', 0), ('C', 0)]
 
 
+def test_what_is_refused_stays_refused_when_a_client_repeats_it(viewers):
+    running = Running({'states': {'A': {'on_retry': 'confirm'}}})
+    for _ in range(3):
+        assert set_initial_states(watch_of(running), ['A'], {'x': 7}, '/viewer') is False
+    assert running.machine.userdata.x == 0
+    assert running.end() == [('A', 0), ('B', 0), ('C', 0)]
+    assert [event.kind for event in running.events].count(EventKind.WARNING) == 1
+
+
 def test_a_bare_machine_goes_there_as_ever(viewers):
     running = Running(wrap=False)
     watch = watch_of(running)

@@ -36,22 +36,34 @@ class LastHeard:
         self._nodes = nodes
         self._master_heard_s = master_heard_s
         self._beat_s = -BEAT_S
+        self._told: Dict[str, Optional[float]] = {}  # when each server was heard, in the last beat
         self._followed: Dict[str, List[str]] = {}  # nodes by robot
 
     def write_sections(self, sections: PageSections) -> None:
-        """Write the next beat when it is due."""
+        """Write the next beat when it is due, or a server that was silent is heard."""
         now_s = time.monotonic()
-        if now_s - self._beat_s < BEAT_S:
+        if now_s - self._beat_s < BEAT_S and not self._is_heard_again():
             return
         self._beat_s = now_s
         self._follow()
+        self._told = {name: _came_s(self._front_end.news(name))
+                      for name in self._front_end.servers}
         sections.put('heard', {
             'beat': round(now_s, 1), 'master': _age(self._master_heard_s(), now_s), 'servers': {
-                name: _age(_came_s(self._front_end.news(name)), now_s)
-                for name in self._front_end.servers
+                name: _age(came_s, now_s) for name, came_s in self._told.items()
             }, 'robots': {robot: _age(self._robot_heard_s(robot), now_s)
                           for robot in sorted(self._followed)}
         })
+
+    def _is_heard_again(self) -> bool:
+        """A server without questions is silent; with the next one it must not read as silent."""
+        for name in self._front_end.servers:
+            came_s = _came_s(self._front_end.news(name))
+            before_s = self._told.get(name)
+            if came_s is not None and before_s is not None and (
+                    self._beat_s - before_s > SILENT_AFTER_S and came_s > before_s):
+                return True
+        return False
 
     def refusal(self, command: PageCommand, listed: ListedQuestion) -> str:
         """Why a command is not carried out for what is too old; '' where it may be."""

@@ -22,7 +22,7 @@ def question_view(listed: ListedQuestion, epoch_s: float,
     """One open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
-    :param score: how often going to a state has helped.
+    :param recovery_counts: how often going to a state has helped.
     """
     goal = listed.goal
     return {

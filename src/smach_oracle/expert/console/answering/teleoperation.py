@@ -93,7 +93,8 @@ class Teleoperation:
         client = self._clients.get(key)
         if client is not None:
             client.stop_whoever_drives()
-        self._leave(key, None, '{} has stopped the hand'.format(person.expert))
+        who = person.expert or 'somebody at {}'.format(person.client)  # to stop needs no name
+        self._leave(key, None, '{} has stopped the hand'.format(who))
         reply = CommandReply(client is not None, '' if client is not None else NOT_RUNNING)
         self._audit.record(person, command.name, reply.ok, reply.message, {},
                            self._front_end.find(key))

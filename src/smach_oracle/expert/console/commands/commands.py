@@ -47,7 +47,7 @@ class CommandReply(NamedTuple):
 def parse(text: object) -> PageCommand:
     """Check one message of a browser.
 
-    :raises BadCommand: saying what is wrong, and what is allowed.
+    :raises CommandError: saying what is wrong, and what is allowed.
     """
     data = _decode(text)
     try:

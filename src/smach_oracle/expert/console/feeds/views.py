@@ -2,12 +2,13 @@
 
 A robot's words are passed on as text, never as markup.
 """
+import json
 import math
 from typing import Any, Dict, Optional
 
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted
+from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_words
 
 from ...wording import event_words
 
@@ -18,15 +19,24 @@ _KINDS = {int(kind): kind for kind in EventKind}
 def event_of(message: OracleEvent) -> Event:
     """The event as the executive emitted it; of its data only what the console needs."""
     kind: Any = _KINDS.get(message.kind, message.kind)
-    data = None
+    data: Optional[Dict[str, Any]] = None
     if kind == EventKind.TRIAL_START:
         data = {'recovers': '"recovers": false' not in message.data}
     elif kind == EventKind.TRANSITION and NOT_COUNTED in message.data:
         data = {NOT_COUNTED: True}
+    elif kind in (EventKind.JUMP, EventKind.DECISION):
+        data = told_in_words(_parsed(message.data))
     return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
                  message.state, message.outcome, message.target, message.failure_kind,
                  message.failure_class, message.rate, message.continuous, message.query_id,
                  message.by, message.text, data)
+
+
+def _parsed(data: str) -> Any:
+    try:
+        return json.loads(data)
+    except ValueError:
+        return None
 
 
 def event_view(event: Event) -> Dict[str, Any]:

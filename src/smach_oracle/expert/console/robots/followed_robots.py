@@ -70,6 +70,7 @@ class FollowedRobots:
             robot.set_alive(self._unseen[name] < _GONE_AFTER)
             if self._unseen[name] == _GONE_AFTER:
                 self._log.end_missing(name)
+                self._clocks.forget(name)
         self._forget_gone()
 
     def nodes(self) -> Dict[str, FrozenSet[str]]:

@@ -36,6 +36,11 @@ class RobotClocks:
             if stamp_s > 0.0 and room and (known is None or known.came_s < reading.came_s):
                 self._readings[robot] = reading
 
+    def forget(self, robot: str) -> None:
+        """Forget the time of a robot that is gone, until it is heard again."""
+        with self._lock:
+            self._readings.pop(robot, None)
+
     def now_s(self, robot: str) -> Optional[float]:
         """A robot's time, s; None where it has told none."""
         reading = self._readings.get(robot)

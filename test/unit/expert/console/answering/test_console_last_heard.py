@@ -91,3 +91,15 @@ def test_the_pages_are_told_the_ages_and_a_beat(everybody):
         'beat': NOW_S, 'master': 2.0, 'servers': {'/robot/expert_query': 0.0},
         'robots': {'/robot': None, '/other': None}}
     assert everybody.followed == {'/robot', '/a', '/b'}
+
+
+def test_a_server_that_was_long_silent_is_told_of_as_soon_as_it_is_heard(everybody, monkeypatch):
+    made, sections = made_of(everybody), PageSections()
+    everybody.server_s = NOW_S - 3600.0
+    made.write_sections(sections)
+    monkeypatch.setattr(last_heard, 'time', SimpleNamespace(monotonic=lambda: NOW_S + 0.2))
+    made.write_sections(sections)
+    assert sections.get('heard')['servers'] == {'/robot/expert_query': 3600.0}, 'no beat is due'
+    everybody.server_s = NOW_S + 0.1
+    made.write_sections(sections)
+    assert sections.get('heard')['servers'] == {'/robot/expert_query': 0.1}

@@ -107,6 +107,16 @@ def test_whoever_sees_a_hand_stops_it_and_its_driver_has_lost_the_wheel(make):
     assert drive(made).message == teleoperation.TAKE_FIRST
 
 
+@pytest.mark.parametrize('name, who', [('vera', 'vera'), ('', 'somebody at 10.0.0.7')])
+def test_the_record_of_the_driver_says_who_has_stopped_the_hand(make, monkeypatch, name, who):
+    told = []
+    monkeypatch.setattr(Silent, 'record', lambda _, *facts: told.append(facts))
+    made, _, _ = make()
+    made.stop(PageCommand(1, 'stop_hand', {'question': 'q'}),
+              Person('10.0.0.7', 's', 'viewer', name), 9)
+    assert told[0][1] == 'leave_wheel' and told[0][3] == who + ' has stopped the hand'
+
+
 def test_a_hand_that_no_page_drives_is_stopped_as_well(make):
     made, client, sent = make()
     client.control.leave(0.0)

@@ -21,3 +21,17 @@ def test_every_kind_of_event_has_words(kind):
 
 def test_a_kind_of_a_later_release_does_no_harm():
     assert event_view(event_of(OracleEvent(kind=99, rate=math.inf)))['kind'] == '99'
+
+
+@pytest.mark.parametrize('message, words', [
+    (OracleEvent(kind=OracleEvent.JUMP, target='KITCHEN', data='{"to": "KITCHEN/PICK"}'),
+     'The machine goes to KITCHEN/PICK.'),
+    (OracleEvent(kind=OracleEvent.JUMP, target='KITCHEN', data='{"to": ["KITCHEN"]}'),
+     'The machine goes to KITCHEN.'),
+    (OracleEvent(kind=OracleEvent.JUMP, target='KITCHEN', data='no JSON'),
+     'The machine goes to KITCHEN.'),
+    (OracleEvent(kind=OracleEvent.DECISION, outcome='revisit', target='PICK',
+                 text='PICK is tried again', data='{"decided_by": "policy"}'),
+     'PICK is tried again.')])
+def test_what_the_data_of_an_event_tell_is_in_its_words(message, words):
+    assert event_view(event_of(message))['words'] == words

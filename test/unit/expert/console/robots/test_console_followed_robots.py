@@ -4,6 +4,7 @@
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.expert.console.robots import followed_robots
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
+from smach_oracle.expert.console.sensors.robot_clocks import RobotClocks
 from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
@@ -91,3 +92,17 @@ def test_robots_are_found_by_name_and_type_and_the_oldest_of_many_that_are_gone_
     assert sections.get('robots') == ['/f', '/g'] and sections.get('live /a') is None
     assert '/a/oracle/events' in FakeSubscriber.unregistered and not sections.get(
         'live /g')['alive']
+
+
+def test_the_clock_of_a_robot_that_is_gone_is_forgotten(monkeypatch):
+    monkeypatch.setattr(followed_robots.rospy, 'Subscriber', FakeSubscriber)
+    clocks = RobotClocks()
+    found = followed_robots.FollowedRobots(PageSections(), TrialLog(), NoLayouts(), clocks)
+    here = [['/here/oracle/events', OracleEvent._type]]
+    found.follow(here + [['/simulated/oracle/events', OracleEvent._type]])
+    clocks.take('/here', 9000.0)
+    clocks.take('/simulated', 12.0)
+    assert clocks.shared_now_s() is None
+    for _ in range(2):
+        found.follow(here)
+    assert clocks.robots() == ['/here'] and clocks.shared_now_s() >= 9000.0

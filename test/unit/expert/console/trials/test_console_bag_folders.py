@@ -19,6 +19,7 @@ from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.bag_folders import BagFolders
 from smach_oracle.expert.console.trials.bag_process import read_bags
 from smach_oracle.expert.console.web.sections import PageSections
+from smach_oracle.oracle.records.events import EventKind
 
 MOST_GROWTH = 200000  # KiB of this process, while it has another one read
 TOO_LARGE = 'damaged, or too large: it takes more than 512 MiB of memory'
@@ -163,3 +164,11 @@ def test_very_many_bags_of_one_trial_are_bounded(folder, monkeypatch):
     catalogue.scan()
     trial, = sections.get('bags')['trials']
     assert len(catalogue.find(trial['number']).summary.bags) == 3
+
+
+def test_what_the_words_of_an_event_tell_comes_out_of_the_reader(folder):
+    told = {'to': 'KITCHEN/PICK', 'decided_by': 'policy', 'userdata': {'secret': 1}}
+    (folder / 'jump.bag').write_bytes(crafted_bag(event(kind=EventKind.JUMP, data=told)))
+    reply = read_bags(BagFolders([str(folder)]),
+                      BagRequest([str(folder / 'jump.bag')], ['crafted'], shown_events=9))
+    assert [each.data for each in reply.events] == [{'to': 'KITCHEN/PICK', 'decided_by': 'policy'}]

@@ -19,9 +19,11 @@ import { redraw } from '../page/redraw.js';
 /** @type {Set<EventKind>} */
 const SHOWN = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end',
   'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure',
-  'trial_end', 'query_opened', 'health_wait_start', 'health_wait_end']);
+  'trial_end', 'query_opened', 'health_wait_start', 'health_wait_end', 'hold_start', 'hold_end',
+  'sent', 'announce']);
 const MOST_SHOWN = 12; // the latest
 const SILENCE_MS = 6000;
+const HELD = 'It waits until somebody lets it go on.';
 
 export class FollowUp {
   /**
@@ -38,6 +40,8 @@ export class FollowUp {
     /** @type {TrialEvent | null} */
     this.last = null; // with which it is over: the trial's end, or the next question
     this.since = 0; // ms, since the answer; 0 before
+    /** @type {TrialEvent[]} */
+    this.shown = [];
     /** @type {HTMLElement[]} */
     this.given = []; // what this has put the focus on: it may take it on from there
     this.waits = false; // it does nothing new: the state runs on
@@ -96,6 +100,7 @@ export class FollowUp {
     this.earlier.hidden = !hidden;
     redraw(this.steps, steps.slice(hidden).map((event) => h('li', { class: event.kind },
       event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
+    this.shown = steps;
     setText(this.hint, this.hintOf(steps));
     this.root.classList.toggle('over', Boolean(this.last));
     this.showNext();
@@ -105,15 +110,22 @@ export class FollowUp {
   hintOf(steps) {
     const gone = this.last ? '' : this.app.liveness.gone(this.question);
     if (gone) return gone;
-    if (!this.last && steps.length) return 'It goes on…';
-    if (!this.last) {
-      return this.waits
-        ? this.question.state + ' runs on. You are asked again if it takes twice as long.'
-        : 'Waiting for what it does…';
+    if (!this.last && steps.length) {
+      return steps[steps.length - 1].kind === 'hold_start' ? HELD : 'It goes on…';
     }
+    if (!this.last) return this.hintBefore();
     if (this.last.kind === 'query_opened') return 'It asks again, about ' + this.last.state + '.';
     const { outcome } = this.last;
     return 'The trial is over' + (outcome ? ': it ended with ' + outcome + '.' : '.');
+  }
+
+  /** Before anything is heard of what it does. */
+  hintBefore() {
+    const { state, robot } = this.question;
+    if (this.waits) return state + ' runs on. You are asked again if it takes twice as long.';
+    return this.since && Date.now() - this.since > SILENCE_MS
+      ? 'What it does next is not known: nothing is heard on ' + robot + '/oracle/events.'
+      : 'Waiting for what it does…';
   }
 
   /** The question that it asks now; else the oldest that nobody works on. */
@@ -149,13 +161,7 @@ export class FollowUp {
   update() {
     if (!this.since) return;
     this.showNext();
-    const gone = this.last ? '' : this.app.liveness.gone(this.question);
-    if (gone) setText(this.hint, gone);
-    else if (!this.waits && !this.steps.childElementCount
-        && Date.now() - this.since > SILENCE_MS) {
-      setText(this.hint, 'What it does next is not known: nothing is heard on '
-        + this.question.robot + '/oracle/events.');
-    }
+    setText(this.hint, this.hintOf(this.shown));
   }
 }
 

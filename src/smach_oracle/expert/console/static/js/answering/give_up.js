@@ -131,7 +131,8 @@ export class GiveUp {
   /** Back to what was pressed first. */
   focusChoice() {
     const choices = /** @type {HTMLElement[]} */ ([...this.choices.querySelectorAll('button')]);
-    const pressed = choices.find((choice) => choice.dataset['name'] === this.outcome);
+    const pressed = choices.find(({ dataset }) => (dataset['name'] === this.outcome
+      && (dataset['container'] || '') === this.container));
     if (pressed) moveFocus(pressed);
   }
 

@@ -83,10 +83,12 @@ export class Liveness {
   }
 
   /**
-   * Why a question is gone, where its robot is; '' where that is not known.
+   * Why a question is gone, where its robot is; '' where that is not known: from a console or a
+   * master that is silent nothing is heard of any robot.
    * @param {Question} question
    */
   gone({ server, robot }) {
+    if (this.silent) return '';
     const known = (this.store.get('servers') || []).find(({ name }) => name === server);
     if (known?.connected && !this.isSilent(robot)) return '';
     return robot + ' is gone: its process has ended, or cannot be reached. Its question went with '

@@ -101,7 +101,11 @@ function showDemand(connection, done) {
   /** @type {HTMLDialogElement} */
   const dialog = h('dialog', { class: 'card name-demand', 'aria-label': 'Your name',
     onclose: () => { dialog.remove(); done(given); },
-    onkeydown: (event) => { if (event.key === 'Escape') dialog.close(); } },
+    onkeydown: (event) => {
+      if (event.key !== 'Escape') return;
+      event.stopPropagation(); // it leaves the dialog alone, not what is behind it
+      dialog.close();
+    } },
   h('form', { onsubmit },
     h('h2', {}, 'Who are you?'), h('p', { class: 'dim' }, ABOUT_NAMES), name, problem,
     h('div', { class: 'row' },

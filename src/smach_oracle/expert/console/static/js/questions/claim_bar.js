@@ -100,6 +100,6 @@ export class ClaimBar {
  * @param {string} [id]
  */
 function button(text, onclick, id) {
-  return h('button', { class: 'inline', onclick, 'data-action': id,
-    'data-deliberate': id || text }, text);
+  // what lets go, and has no id, is never pressed too soon
+  return h('button', { class: 'inline', onclick, 'data-action': id, 'data-deliberate': id }, text);
 }

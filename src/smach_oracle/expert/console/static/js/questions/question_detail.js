@@ -57,7 +57,8 @@ export class QuestionDetail {
     this.time = h('span', { class: 'time' });
     this.silence = new SilenceBar(app.liveness, question);
     this.onlookers = new Onlookers(app, question);
-    this.robotGone = ''; // how it went, and the question with it
+    /** @type {string | null} */
+    this.robotGone = null; // how it went, and the question with it; null: it was open until now
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
       takeOver: () => this.claim('take_over') });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
@@ -303,13 +304,19 @@ export class QuestionDetail {
     this.show();
   }
 
+  /** As it was when the question went; of one that is answered here nothing is said. */
+  howItWent() {
+    if (this.now || this.settled) return null;
+    return this.robotGone === null ? this.app.liveness.gone(this.question) : this.robotGone;
+  }
+
   show() {
     const { now, mine, settled, held, claiming, sending, problem } = this;
-    const { mayAnswer, expert, liveness } = this.app;
+    const { mayAnswer, expert } = this.app;
     const silent = Boolean(now && !settled && this.silence.show());
-    this.robotGone = now ? '' : this.robotGone || liveness.gone(this.question);
+    this.robotGone = this.howItWent();
     this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
-      gone: this.robotGone });
+      gone: this.robotGone || '' });
     this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
     this.form.enable(mine && !sending && !settled && !silent);
     this.showTime();

@@ -134,8 +134,8 @@ class QuestionPanel {
       { leave: () => this.leave(), choose: (next) => this.choose(next) });
     this.showStage();
     this.showQueue();
-    this.detail.begin();
     moveFocus(this.detail.title);
+    this.detail.begin(); // may ask for a name, which takes the focus
   }
 
   /** Back to the list, as a person wants it: the focus goes to its first question. */
