@@ -52,8 +52,7 @@ def _heading(container: ContainerProspect) -> List[str]:
     if not container.recovers:
         return lines + wrapped('The oracle recovers nothing here: it observes.', 2)
     if not container.is_top and settings.escalate:
-        lines += wrapped('To ask means: the oracle of the machine around it takes over.', 2)
-        return lines
+        lines += wrapped('Before it asks, the oracle of the machine around it may decide.', 2)
     back = ('each state is on its own, so that a step back is a retry' if container.has_branches
             else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
                 container.initial))
