@@ -250,8 +250,9 @@ class Step:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         state = self._machine._states[record.label]
-        if isinstance(state, smach.Container):
-            recall_preempts(state)  # a Concurrence that has failed has preempted its branches
+        if isinstance(state, smach.Container) and failure.kind is not FailureKind.TIME_LIMIT:
+            # a Concurrence that has failed has preempted its branches; one that overran still runs
+            recall_preempts(state)
         context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)
