@@ -250,7 +250,8 @@ class Step:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         state = self._machine._states[record.label]
-        if isinstance(state, smach.Container) and failure.kind is not FailureKind.TIME_LIMIT:
+        if (node.tree.recover and failure.kind is not FailureKind.TIME_LIMIT
+                and isinstance(state, smach.Container)):
             # a Concurrence that has failed has preempted its branches; one that overran still runs
             recall_preempts(state)
         context = self._context()
