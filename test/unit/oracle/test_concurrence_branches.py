@@ -203,6 +203,28 @@ def test_a_precondition_that_is_not_met_takes_back_its_own_writes_alone():
     assert 'mine' not in concurrence.userdata
 
 
+def test_what_a_precondition_that_was_met_wrote_stays_where_the_next_one_is_not_met():
+    def met(ud):
+        ud.mine = 'met'
+        return True
+
+    def fails(ud):
+        ud.mine = 'half'
+        return False
+    concurrence = both(Scripted('aborted'), Scripted())
+    machine = watched(concurrence, preconditions={'ALL/LEFT': [met, fails]})
+    machine.run()
+    assert concurrence.userdata.mine == 'met'
+
+
+def test_an_expert_names_the_branch_beside_by_its_path():
+    expert = FakeExpert(goto('RIGHT', container='TOP/ALL'))
+    left, right = Scripted('aborted'), Scripted()
+    machine = watched(both(left, right), expert=expert, settings=ASKS)
+    assert machine.run() == 'done'
+    assert len(expert.questions) == 1 and (left.runs, right.runs) == (2, 2), 'all run again'
+
+
 def test_remappings_of_branches_hold():
     class Adds(smach.State):
         def __init__(self):

@@ -125,7 +125,8 @@ def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
 
     A state that the container of the failed state has not, and one other has, is that one's.
     """
-    if answer.container == choices.container:
+    is_beside = (answer.container, answer.state) in choices.states  # another branch
+    if answer.container == choices.container and not is_beside:
         return answer._replace(container='')
     is_told = answer.container or ('', answer.state) in choices.states
     if is_told or answer.kind is not AnswerKind.GOTO:

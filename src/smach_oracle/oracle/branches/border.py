@@ -4,6 +4,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, cast
 
 import smach
 
+from ..machine.nesting import machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import BRANCHES
@@ -140,6 +141,8 @@ class IteratorBorder(Border):
         super().__init__(container)
         self._items: Optional[TrackedItems] = None
         self._trial_id = ''  # that of `_items`
+        self._rounds = 0  # how often it has begun anew
+        self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
         self._begun: Dict[str, Any] = {}  # what its io keys were when it began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_asked_to_go_on = False
@@ -165,20 +168,39 @@ class IteratorBorder(Border):
     def _take_places(self) -> None:
         iterator = self.container
         items, trial_id = self._items, self._trial_now()
+        inside = tuple(border.mark() for border in self._iterators_around())
         may = (self._is_asked_to_go_on and items is not None and items.given is iterator._items
-               and trial_id == self._trial_id)
+               and (trial_id, inside) == (self._trial_id, self._inside))
         self._is_asked_to_go_on = False
         if items is None or items.given is not iterator._items:
             items = TrackedItems(iterator._items, self._tell)
         self.goes_on = items.goes_on = may and items.has_rest()
         if self.goes_on:
             self._pass_on(dict(self.states()))
+        else:
+            self._rounds += 1
         self._items, self._trial_id, self._ended_with = items, trial_id, None
+        self._inside = inside
         iterator._items = items
         state = iterator._state
         if state is not None:
             iterator._state = StandIn(state, self.machines.get(iterator._state_label),
                                       self._note_outcome)
+
+    def mark(self) -> Tuple[int, int]:
+        """Return what is different for each item: its number, and that of the round."""
+        return self._rounds, self._items.number if self._items is not None else 0
+
+    def _iterators_around(self) -> Iterator['IteratorBorder']:
+        node, below = self.top, self.below
+        while node is not None and below:
+            container: Any = node.machine
+            for label in below[:-1]:
+                container = _children_of(container)[label]
+                border = border_of(container)
+                if isinstance(border, IteratorBorder):
+                    yield border
+            node, below = node.parent, node.below
 
     def _pass_on(self, states: Mapping[str, smach.State]) -> None:
         """Let an Iterator directly inside go on too: its items belong to the unfinished one."""
@@ -207,6 +229,8 @@ class IteratorBorder(Border):
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
         self._ended_with = outcome if isinstance(outcome, str) else None
+        if self._items is not None and self._items.is_exhausted:
+            _forget_given_up(self.container)  # the author has gone on behind it
         super().ended(outcome, error)
 
     def _give_places_back(self) -> None:
@@ -250,6 +274,21 @@ def border_of(state: object) -> Optional[Border]:
     """Return what is kept beside a Concurrence or an Iterator; None for anything else."""
     border = getattr(state, '_oracle_border', None)
     return border if isinstance(border, Border) else None
+
+
+def _children_of(container: Any) -> Mapping[str, Any]:
+    if isinstance(container, smach.StateMachine):
+        return container._states
+    children: Mapping[str, Any] = container.get_children()
+    return children
+
+
+def _forget_given_up(container: smach.Container) -> None:
+    """Forget whether the oracles of the machines in a container have given up."""
+    for _, machine in machines_below(container):
+        node = getattr(machine, '_oracle', None)
+        if node is not None:
+            node.gave_up = False
 
 
 def _same(one: object, other: object) -> bool:

@@ -152,7 +152,8 @@ class OracleVisit:
             restore(self._machine.userdata._data, restores, verdict.written,
                     node.in_force.deep_copy_keys)
         leave_for(node, target, way.down[1:])
-        ask_to_go_on(node, target)
+        for place in way.down:
+            ask_to_go_on(place.node, place.label)
         if missing:
             place = way.down[-1]
             place.node.warn('jumping there without its input keys {}'.format(', '.join(missing)),

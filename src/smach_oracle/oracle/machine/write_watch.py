@@ -7,7 +7,7 @@ from .userdata_gate import UserdataGate
 
 
 class UserdataMark(NamedTuple):
-    """Userdata at a moment, and the keys written until then.
+    """Userdata at a moment.
 
     `copies` and `prints` (fingerprints) are those of the deep-copied keys.
     """
@@ -15,7 +15,6 @@ class UserdataMark(NamedTuple):
     data: Dict[str, Any]
     copies: Dict[str, Any]
     prints: Dict[str, Optional[bytes]]
-    written: Set[str]
 
 
 class WriteWatch:
@@ -32,6 +31,7 @@ class WriteWatch:
         self._machine = machine
         self._deep = tuple(deep_copy_keys)
         self.gate = UserdataGate(machine)
+        self._kept: Set[str] = set()  # written through the gate before `begin`
         self._before = dict(machine.userdata._data)
         self._prints = {
             key: fingerprint(self._before[key])
@@ -42,8 +42,9 @@ class WriteWatch:
         """Begin with what may be taken back."""
         data = dict(self._machine.userdata._data)
         copies = {key: copied(data[key]) for key in self._deep if key in data}
-        return UserdataMark(data, copies, {key: fingerprint(data[key])
-                                    for key in copies}, set(self.gate.written))
+        self._kept.update(self.gate.written)
+        self.gate.written.clear()  # the set itself: branches of the gate have it, too
+        return UserdataMark(data, copies, {key: fingerprint(data[key]) for key in copies})
 
     def take_back(self, begun: UserdataMark) -> None:
         """Make the userdata what it was; it no longer counts as written.
@@ -62,22 +63,22 @@ class WriteWatch:
             data[key] = value
         for key in set(data).difference(begun.data):
             del data[key]
-        self.gate.written.intersection_update(begun.written)
+        self.gate.written.clear()
 
     def _take_back_own(self, begun: UserdataMark) -> None:
         """Take back what passed the gate alone: others write the userdata at the same time."""
         data = self._machine.userdata._data
-        for key in self.gate.written.difference(begun.written):
+        for key in self.gate.written:
             if key in begun.data:
                 data[key] = begun.data[key]
             else:
                 data.pop(key, None)
-        self.gate.written.intersection_update(begun.written)
+        self.gate.written.clear()
 
     def written(self) -> Set[str]:
         """Return the keys set, deleted or changed so far."""
         now = dict(self._machine.userdata._data)
-        keys = set(self.gate.written)
+        keys = self._kept.union(self.gate.written)
         keys.update(key for key in now
                     if key not in self._before or now[key] is not self._before[key])
         keys.update(key for key in self._before if key not in now)

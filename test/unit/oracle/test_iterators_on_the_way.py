@@ -1,0 +1,82 @@
+"""Iterators on the way of a jump, and in the items of other Iterators."""
+import pytest
+from branch_machines import Item, inside, iterator_over
+from guarded_machines import chain
+from machines import FakeExpert, Scripted, Watched, goto
+
+import smach
+from smach_oracle.oracle.records.events import EventKind
+
+ASKS = {'max_recoveries': 0}
+
+
+def each_of(state, label, items=(1, 2), loop=('done',)):
+    """An Iterator over a machine or a state; its item is under the key `label`."""
+    iterator = smach.Iterator(outcomes=['done', 'aborted', 'preempted'], input_keys=[],
+                              output_keys=[], it=list(items), it_label=label,
+                              exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state(label.upper(), state, loop_outcomes=list(loop))
+    return iterator
+
+
+class Notes(smach.State):
+    """Notes its items; ends as told for them, once each, then with 'done'."""
+
+    def __init__(self, done, **script):
+        smach.State.__init__(self, ['done', 'aborted', 'preempted'], input_keys=['row', 'column'])
+        self.done, self.script = done, script
+
+    def execute(self, ud):
+        seen = tuple(ud[key] for key in ('row', 'column') if key in ud)
+        self.done.append(seen)
+        return self.script.pop('_' + '_'.join(map(str, seen)), 'done')
+
+
+def nothing(question, cancelled, progress):
+    """No answer."""
+
+
+@pytest.mark.parametrize('place', [('TOP/INNER', 'ALL'), ('TOP/INNER/ALL', 'EACH')])
+def test_an_iterator_further_down_goes_on_where_an_expert_goes_there(place):
+    each = Item(item3=['aborted'])
+    inner = inside(iterator_over(each))
+    inner.register_input_keys(['done'])
+    machine = chain(INNER=inner, LATER=Scripted())
+    machine.userdata.done = []
+    expert = FakeExpert(goto('LATER', container='TOP'),
+                        goto(place[1], container=place[0]))
+    machine['LATER'].script.append('aborted')
+    assert Watched(machine, name='TOP', expert=expert, settings=ASKS).run() == 'done'
+    assert each.tried == [1, 2, 3, 3, 4]
+
+
+def test_what_is_left_of_one_item_is_not_gone_on_with_in_the_next():
+    done = []
+    columns = each_of(Notes(done, _1_2='aborted'), 'column', (1, 2, 3))
+    columns.register_input_keys(['row'])
+    row = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'], input_keys=['row'])
+    with row:
+        smach.StateMachine.add('LOOK', Scripted('ok', 'aborted'), {'ok': 'COLUMNS'})
+        smach.StateMachine.add('COLUMNS', columns, {'done': 'done', 'aborted': 'TIDY'})
+        smach.StateMachine.add('TIDY', Scripted(), {'ok': 'done'})
+    rows = each_of(row, 'row')
+    expert = FakeExpert(nothing, goto('COLUMNS'))
+    machine = Watched(chain(ROWS=rows), name='TOP', expert=expert, settings=ASKS)
+    assert machine.run() == 'done'
+    assert [question.failed_state for question in expert.questions] == ['COLUMN', 'LOOK']
+    assert done == [(1, 1), (1, 2), (2, 1), (2, 2), (2, 3)], 'no column of row 2 is dropped'
+
+
+def test_an_item_that_was_given_up_and_passed_over_settles_no_failure_beside_it():
+    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
+                                    outcome_map={'done': {'ALL': 'done', 'BESIDE': 'ok'}})
+    left = each_of(chain(A=Scripted('ok', 'aborted')), 'item', loop=('done', 'aborted'))
+    with concurrence:
+        smach.Concurrence.add('ALL', left)
+        smach.Concurrence.add('BESIDE', Scripted('preempted'))
+    machine = Watched(chain(BOTH=concurrence), name='TOP', settings={
+        'states': {'**/A': {'max_recoveries': 0}}})
+    assert machine.run() == 'done'
+    assert [(event.state, event.outcome) for event in machine.of(EventKind.DECISION)] == [
+        ('A', 'ask'), ('BOTH', 'revisit')]
