@@ -82,7 +82,7 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
         'threads left': len(found.threads_left), 'disagreements': int(not found.is_fine)})
     if not found.is_fine and counts['disagreements'] <= MOST_SHOWN:
         print(found.report())
-    for wrong in disturb(draw(seed, shape)):
+    for wrong in disturb(draw(seed)):
         counts['preempts that went wrong'] += 1
         print(wrong)
 

@@ -31,7 +31,7 @@ def test_the_executive_and_the_model_go_the_same_way(first):
 
 
 def test_a_tree_that_is_preempted_at_any_moment_ends_and_runs_again():
-    wrong = [text for seed in range(40) for text in disturb(draw(seed, SHAPE))]
+    wrong = [text for seed in range(40) for text in disturb(draw(seed))]
     assert wrong == []
 
 

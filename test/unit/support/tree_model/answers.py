@@ -13,6 +13,7 @@ class Options(NamedTuple):
 
     places: Tuple[Tuple[str, str], ...]  # path and label
     missing: Tuple[Tuple[str, str, Tuple[str, ...]], ...]  # input keys, by place
+    repeats: Tuple[Tuple[str, str, Tuple[str, ...]], ...]  # guarded states, by place
     supersede: Tuple[Tuple[str, str], ...]  # outcome, and where it leads
     give_up: Tuple[Tuple[str, str], ...]  # path and outcome
     outputs: Tuple[str, ...]
@@ -33,4 +34,4 @@ def draw_reply(plan: TreePlan, path: str, label: str, number: int,
         outputs = {key: '{}/{} answer {}'.format(path, label, number) for key in options.outputs
                    if chance.random() < 0.5}
         return Reply('supersede', '', chance.choice(options.supersede)[0], outputs)
-    return Reply('goto', *chance.choice(options.places))
+    return Reply('goto', *chance.choice(options.places)) if options.places else None

@@ -21,6 +21,7 @@ class World:
         self.top: Any = None
         self.signal = threading.Event()  # set at the leafs' entry of that number
         self.signals_at = 0
+        self.patience_s = PREEMPT_S
         self.begin_trial()
 
     def begin_trial(self) -> None:
@@ -62,6 +63,8 @@ class Scripted(smach.State):
         self._world = world
         self._plan = plan
         self._path = path
+        self.around: Any = None
+        self.plan_label = plan.label
         self._executions = 0
         self._asked = threading.Event()
 
@@ -96,7 +99,7 @@ class Scripted(smach.State):
     def _overrun(self, ud: Any) -> str:
         self._note_entry(ud)
         if not self.preempt_requested():
-            self._asked.wait(PREEMPT_S)
+            self._asked.wait(self._world.patience_s)
         self.service_preempt()
         return 'preempted'
 
@@ -108,8 +111,8 @@ class Scripted(smach.State):
         """Where a Concurrence around passes a preempt on in a thread of its own, wait for it."""
         branches = _owed_branches(self)
         if branches and not self.preempt_requested():
-            self._asked.wait(PREEMPT_S)
-        end = time.monotonic() + PREEMPT_S
+            self._asked.wait(self._world.patience_s)
+        end = time.monotonic() + self._world.patience_s
         while not all(branch.preempt_requested() for branch in branches):
             if time.monotonic() > end:
                 return
@@ -132,10 +135,27 @@ def _owed_branches(state: Any) -> List[Any]:
 
 
 class _Impatient(threading.Condition):
-    """Upstream's Concurrence looks every 0.1 s whether its threads have ended."""
+    """Upstream's Concurrence looks every 0.1 s whether its threads have ended.
+
+    It waits for ever where a branch ends without an outcome, as at a shutdown: here, up to the cut.
+    """
+
+    def __init__(self, world: World) -> None:
+        super().__init__()
+        self._world = world
+        self._notified = 0  # one that comes just at a timeout is not lost
+
+    def notify_all(self) -> None:
+        self._notified += 1
+        super().notify_all()
 
     def wait(self, timeout: Optional[float] = None) -> bool:
-        return super().wait(timeout and min(timeout, 0.002))
+        if timeout is not None:
+            return super().wait(min(timeout, 0.002))
+        before = self._notified
+        while self._notified == before and not self._world.is_cut:
+            super().wait(0.2)
+        return True
 
 
 class Parallel(smach.Concurrence):
@@ -151,7 +171,7 @@ class Parallel(smach.Concurrence):
         self._has_preempted = False
         self._child_termination_cb = self._branch_ended
         if hasattr(self, '_done_cond'):
-            self._done_cond = _Impatient()
+            self._done_cond = _Impatient(world)
 
     def execute(self, *args: Any, **kwargs: Any) -> Any:
         """Run all branches."""
@@ -159,7 +179,25 @@ class Parallel(smach.Concurrence):
         self.owed = set()
         self._has_preempted = False
         self._world.turns.fork(len(self._labels))
+        for label, state in self._states.items():
+            if not isinstance(state, smach.Container):
+                self._listen_to(label, state)
         return super().execute(*args, **kwargs)
+
+    def _listen_to(self, label: str, branch: Any) -> None:
+        """Note where a plain state raises, or what stands in for it now: its oracle gave up."""
+        if 'execute' in vars(branch):
+            return
+        execute = branch.execute
+
+        def listening(*args: Any) -> Any:
+            try:
+                return execute(*args)
+            except Exception:
+                self.branch_raised(label)
+                raise
+
+        branch.execute = listening
 
     def request_preempt(self) -> None:
         """Ask the branches to stop."""
@@ -217,7 +255,6 @@ ToldMachine = _told(smach.StateMachine)
 ToldSequence = _told(smach.Sequence)
 ToldIterator = _told(smach.Iterator)
 ToldConcurrence = _told(Parallel)
-ToldLeaf = _told(Scripted)
 
 
 def build(world: World) -> Any:
@@ -228,7 +265,7 @@ def build(world: World) -> Any:
 
 def _node(world: World, plan: Any, path: str, around: Any) -> Any:
     if isinstance(plan, Leaf):
-        made = ToldLeaf(world, plan, path)
+        made = Scripted(world, plan, path)
     else:
         made = _BUILDERS[type(plan)](world, plan, '{}/{}'.format(path, plan.label))
     made.around = around

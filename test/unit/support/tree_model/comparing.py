@@ -1,12 +1,12 @@
 """One tree, both ways: where the courses part."""
 import itertools
 import threading
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from .executing import Executed
 from .model import Model
-from .parts import UNSAID
-from .plan import CUT, TOP, Beside, TreePlan, nodes_below
+from .parts import Unsaid
+from .plan import CUT, TOP, Beside, Leaf, Repeated, TreePlan, children_of, nodes_below
 from .turns import Hang
 
 TRIAL_S = 60.0  # no trial takes so long
@@ -46,7 +46,7 @@ class Comparison(NamedTuple):
             ', threads left: {}'.format(self.threads_left) if self.threads_left else '')]
         if self.difference:
             path, number, mine, theirs = self.difference
-            courses = [_by_path(course, bool(path)).get(path, [])
+            courses = [_by_path(self.plan, course, bool(path)).get(path, [])
                        for course in (self.model.course, self.executed.course)]
             lines += ['  {}'.format(event) for event in courses[0][max(0, number - 12):number]]
             for name, course in zip(('model', 'executive'), courses):
@@ -95,7 +95,7 @@ def in_time(executed: Executed) -> Optional[str]:
 def difference_of(plan: TreePlan, model: List[Any], executed: List[Any]) -> Optional[Difference]:
     """Where two courses part first; those of containers that run at the same time each alone."""
     is_concurrent = any(isinstance(node, Beside) for _, node in nodes_below(TOP, plan.top))
-    mine, theirs = _by_path(model, is_concurrent), _by_path(executed, is_concurrent)
+    mine, theirs = (_by_path(plan, course, is_concurrent) for course in (model, executed))
     found = []
     for path in sorted(set(mine) | set(theirs)):
         pairs = itertools.zip_longest(mine.get(path, ()), theirs.get(path, ()))
@@ -103,14 +103,16 @@ def difference_of(plan: TreePlan, model: List[Any], executed: List[Any]) -> Opti
             if not _is_same(one, other):
                 found.append(Difference(path, number, one, other))
                 break
-    return min(found, key=lambda each: _moment(model, is_concurrent, each)) if found else None
+    return min(found, key=lambda each: _moment(plan, model, is_concurrent, each)) if found else None
 
 
-def _moment(model: List[Any], is_concurrent: bool, difference: Difference) -> int:
+def _moment(plan: TreePlan, model: List[Any], is_concurrent: bool, difference: Difference) -> int:
     """Where in the model's whole course a difference comes."""
     if not is_concurrent:
         return difference.number
-    places = [place for place, (path, _) in enumerate(model) if path == difference.path]
+    branches = _branches_of(plan)
+    places = [place for place, (path, event) in enumerate(model)
+              if _course_of(path, event, branches) == difference.path]
     return (places + [len(model)])[min(difference.number, len(places))]
 
 
@@ -119,14 +121,29 @@ def _is_same(one: Any, other: Any) -> bool:
     if one is None or other is None or len(one) != len(other):
         return one == other
     return all(abs(mine - theirs) < 1e-9 if isinstance(mine, float) and isinstance(theirs, float)
-               else mine in (theirs, UNSAID) for mine, theirs in zip(one, other))
+               else isinstance(mine, Unsaid) or mine == theirs for mine, theirs in zip(one, other))
 
 
-def _by_path(course: List[Any], is_concurrent: bool) -> Dict[str, List[Any]]:
+def _by_path(plan: TreePlan, course: List[Any], is_concurrent: bool) -> Dict[str, List[Any]]:
+    branches = _branches_of(plan)
     by_path: Dict[str, List[Any]] = {}
     for path, event in course:
-        by_path.setdefault(path if is_concurrent else '', []).append((path,) + tuple(event))
+        name = _course_of(path, event, branches) if is_concurrent else ''
+        by_path.setdefault(name, []).append((path,) + tuple(event))
     return by_path
+
+
+def _branches_of(plan: TreePlan) -> Set[Tuple[str, str]]:
+    """The places of the branches, each of which goes its own way."""
+    return {(path, child.label) for path, node in nodes_below(TOP, plan.top)
+            if isinstance(node, (Beside, Repeated))
+            for child in children_of(node) if isinstance(child, Leaf)}
+
+
+def _course_of(path: str, event: Any, branches: Set[Tuple[str, str]]) -> str:
+    """The path of the container that an event is of, or of its branch."""
+    return '/'.join((path, event[1])) if (path, event[1]) in branches and not event[0].startswith(
+        'CONTAINER') else path
 
 
 def threads_left(before: Any) -> Tuple[str, ...]:

@@ -8,12 +8,14 @@ from .executing import Executed
 from .plan import TreePlan
 
 SIGNAL_S = 30.0
+PATIENCE_S = 0.3  # upstream's Concurrence loses a preempt that comes before it waits
 
 
 def disturb(plan: TreePlan, trials: int = 2) -> List[str]:
     """Preempt a tree at a random entry of a leaf, and execute it again; returns what is wrong."""
     before = set(threading.enumerate())
     executed = Executed(plan)
+    executed.world.patience_s = PATIENCE_S
     chance = random.Random('disturb ' + plan.seed)
     wrong = []
     for _ in range(trials):

@@ -13,7 +13,9 @@ from .plan import (
     Repeated,
     StateSettings,
     TreePlan,
+    children_of,
     machines_of,
+    nodes_below,
 )
 
 BAD = ('aborted', 'grasp_failed', 'odd')
@@ -24,11 +26,12 @@ class Shape(NamedTuple):
 
     depth: int = 4
     concurrent: bool = True
-    iterated: bool = False  # the model does not know that they go on with an item
-    leaf_branches: bool = False  # leafs directly in Iterators and Concurrences
+    iterated: bool = True
+    leaf_branches: bool = True  # leafs directly in Iterators and Concurrences
     preempts: bool = True
     time_limits: bool = True
     beside_beside: bool = True  # Concurrences in Concurrences
+    guarded: bool = True  # states that are not repeated
 
 
 ANY = Shape()
@@ -52,6 +55,7 @@ class _Drawing:
         self._trouble = chance.choice((0.15, 0.3, 0.5, 0.7))
         self._preempts = shape.preempts and chance.random() < 0.3
         self._left = chance.choice((6, 10, 20))  # leafs
+        self._guards = shape.guarded and random.Random('guards ' + seed).random() < 0.35
 
     def plan(self) -> TreePlan:
         chance = self._chance
@@ -65,8 +69,8 @@ class _Drawing:
             userdata=self._one_of('restore', 'keep', 0.3), escalate=chance.random() < 0.4,
             on_no_answer=('stop', ''), has_expert=chance.random() < 0.85, states={})
         plan = plan._replace(on_no_answer=self._fallback(plan))
-        for path, machine in machines_of(plan):
-            self._settings(plan.states, path, machine)
+        for path, node in nodes_below(TOP, top):
+            self._settings(plan.states, path, node)
         return plan
 
     def _one_of(self, usual: str, other: str, share: float) -> str:
@@ -199,6 +203,8 @@ class _Drawing:
             child: Any = self._leaf(beside)
         elif depth > 0 and self._may_be_beside(beside) and chance.random() < 0.1:
             child = self._beside(depth - 1)
+        elif depth > 0 and chance.random() < 0.15:
+            child = self._repeated(depth - 1, beside)
         else:
             child = self._machine(self._label('E'), depth, beside)
         loop = tuple(name for name in child.outcomes
@@ -212,29 +218,39 @@ class _Drawing:
     # -- settings of states
 
     def _settings(self, states: Dict[Tuple[str, str], StateSettings], path: str,
-                  machine: Machine) -> None:
+                  node: Node) -> None:
         chance = self._chance
-        for index, child in enumerate(machine.children):
+        for index, child in enumerate(children_of(node)):
+            if not isinstance(node, Machine) and not isinstance(child, Leaf):
+                continue
             limit = chance.choice((0, 1, 3)) if chance.random() < 0.1 else None
             listed = tuple(name for name in child.outcomes
                            if name not in ('ok', 'preempted') and chance.random() < 0.1)
             states[path, child.label] = StateSettings(
-                self._checks(machine, index), listed,
+                self._checks(node, index), listed,
                 prior=chance.choice((0.2, 0.5, 0.8)) if chance.random() < 0.15 else None,
                 max_recoveries=limit,
                 author_recoveries=(chance.choice(('keep', 'override')) if chance.random() < 0.1
                                    else None),
-                memory=chance.choice((1, 3)) if chance.random() < 0.1 else None)
+                memory=chance.choice((1, 3)) if chance.random() < 0.1 else None,
+                on_retry=self._on_retry(path, node))
 
-    def _checks(self, machine: Machine, index: int) -> Tuple[Check, ...]:
+    def _on_retry(self, path: str, node: Node) -> str:
+        """None in Concurrences: who is held back there asks while others still begin."""
+        is_beside = isinstance(node, Beside) or '/C' in path
+        if is_beside or not self._guards or self._chance.random() >= 0.25:
+            return 'allow'
+        return self._chance.choice(('confirm', 'confirm', 'never'))
+
+    def _checks(self, node: Node, index: int) -> Tuple[Check, ...]:
         chance = self._chance
         if chance.random() < 0.7:
             return ()
         checks = []
         for number in range(chance.randint(1, 2)):
-            others = [child.label for child in machine.children[:index]
-                      if isinstance(child, Leaf) and 'preempt' not in child.kinds
-                      and not child.overruns]
+            others = [child.label for child in children_of(node)[:index]
+                      if isinstance(node, Machine) and isinstance(child, Leaf)
+                      and 'preempt' not in child.kinds and not child.overruns]
             if others and chance.random() < 0.4:
                 checks.append(Check(chance.choice(others), is_label=True))
             else:

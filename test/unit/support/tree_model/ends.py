@@ -17,6 +17,7 @@ class Failed(NamedTuple):
     outcome: str
     way: Optional[Way]  # of the author
     ending: Optional[Way]  # None: it raises
+    was_left: bool = False  # by a jump that cannot be gone on with
 
 
 class Goal(NamedTuple):
@@ -30,6 +31,7 @@ class Goal(NamedTuple):
     written: Set[str] = frozenset()
     place: Tuple[str, str] = ('', '')  # where it ends
     crosses: bool = False  # containers were left
+    repeats: Tuple[str, ...] = ()  # what it was said to repeat when it was decided
 
 
 class Reply(NamedTuple):

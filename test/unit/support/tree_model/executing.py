@@ -115,7 +115,7 @@ def settings_of(plan: TreePlan) -> Dict[str, Any]:
     for (path, label), own in plan.states.items():
         said = {key: list(value) if isinstance(value, tuple) else value
                 for key, value in own._asdict().items()
-                if key != 'preconditions' and value not in (None, ())}
+                if key != 'preconditions' and value not in (None, (), 'allow')}
         if said:
             settings['states'][_relative(path, label)] = said
     for path, leaf in _overrunning(TOP, plan.top):
@@ -156,10 +156,13 @@ class DrawnExpert(Expert):
 def options_of(question: Any) -> Options:
     """What a question offers."""
     path = question.container_path
+    open_now = [choice for choice in question.choices if not choice.blocked]
     return Options(
-        tuple(sorted((choice.container or path, choice.state) for choice in question.choices)),
+        tuple(sorted((choice.container or path, choice.state) for choice in open_now)),
         tuple(sorted((choice.container or path, choice.state, tuple(sorted(choice.missing_keys)))
-                     for choice in question.choices)),
+                     for choice in open_now)),
+        tuple(sorted((choice.container or path, choice.state, tuple(sorted(choice.repeats)))
+                     for choice in open_now if choice.repeats)),
         tuple(sorted((choice.outcome, choice.target) for choice in question.supersede_outcomes)),
         tuple(sorted([(path, outcome) for outcome in question.give_up_outcomes]
                      + [(each.container, each.outcome) for each in question.give_up_above])),

@@ -1,5 +1,5 @@
 """The model's StateMachines under an oracle: from state to state, and what is a failure."""
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Way
 from .memory import PREEMPTED, SUCCESS, Remembered
@@ -69,11 +69,35 @@ class MachinePart(Part, Recovering):
             self.flag = False
         return way.target
 
+    def own_places(self) -> Set[Tuple[str, str]]:
+        """The places of its states."""
+        return {(self.path, label) for label in self.labels}
+
+    def holds_paths(self) -> bool:
+        """Whether all below its path is in it."""
+        return True
+
+    def _held_back(self, label: str) -> Course:
+        """The machine has come to a state that is not to be repeated: an expert is asked."""
+        self.run.forget_begins(self.child(label))
+        failing = failing_outcome_of(self.plan.outcomes)
+        failed = Failed(label, 'HELD_BACK', '', None, failing and Way(failing, False))
+        if self.flag:
+            self._preempted.flag = False
+            return self._end_preempted(failed)
+        self._natural = failed.ending
+        way = yield from self.recover(failed, False)
+        self._natural = None
+        return way
+
     def _visit(self, label: str) -> Course:
         """Execute one state; returns where the machine goes."""
         child = self.current = self.child(label)
         if self.flag:
             self._heed_preempt()
+        if self.run.repeats.come((self.path, label)):
+            self.snapshots[label] = dict(self.userdata)
+            return (yield from self._held_back(label))
         self.snapshots[label] = dict(self.userdata)
         self.tell('STATE_START', label)
         outcome, raised = None, False
@@ -102,7 +126,7 @@ class MachinePart(Part, Recovering):
         return (yield from self._fails(failed))
 
     def _end_preempted(self, failed: Failed) -> Way:
-        if failed.kind == 'TIME_LIMIT' and 'preempted' in self.plan.outcomes:
+        if failed.kind in ('TIME_LIMIT', 'HELD_BACK') and 'preempted' in self.plan.outcomes:
             return self.end_naturally(failed._replace(ending=Way('preempted', False)))
         return self.end_naturally(failed)
 
@@ -205,7 +229,11 @@ class MachinePart(Part, Recovering):
     # -- leaving and arriving
 
     def arrive(self, label: str, goal: Goal) -> Course:
-        """A jump has left the state of that label."""
+        """A jump has left the state of that label; a preempt of where it goes ends it."""
+        if goal.machine.flag:
+            self.flag = True  # what is left is preempted
+            self._preempted = self.child(label)
+            return (yield from self._ended(label, self.child(label).left_with, False))
         if goal.machine is not self:
             self.memory.ended(label, PREEMPTED)
             self.choose_left_with()

@@ -2,11 +2,14 @@
 from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .answers import Options, draw_reply
+from .branch import BranchPart
 from .ends import Goal, Reply
+from .iterating import IteratorPart
 from .machine import MachinePart
-from .parts import ConcurrencePart, Cut, IteratorPart, Jumping, LeafPart, Part, Raised, View
+from .parts import ConcurrencePart, Cut, Jumping, LeafPart, Part, Raised, View
 from .plan import CUT, KEYS, MOST_ENTRIES, TOP, Beside, Leaf, Machine, Repeated, TreePlan
-from .scheduling import Scheduler
+from .repeats import Repeats
+from .scheduling import Course, Scheduler
 from .words import sounds_like_failure
 
 PARTS = {Leaf: LeafPart, Machine: MachinePart, Beside: ConcurrencePart, Repeated: IteratorPart}
@@ -21,9 +24,12 @@ class Model:
         self.plan = plan
         self.is_upstream = is_upstream
         self.course: List[Tuple[str, Tuple[Any, ...]]] = []
+        self.repeats = Repeats(plan)
         self.budget = {'recoveries': 0, 'questions': 0}
         self._numbers: Dict[Tuple[str, ...], int] = {}
         self._machines: Dict[str, MachinePart] = {}
+        self._branches: List[BranchPart] = []
+        self._iterators: List[IteratorPart] = []
         self.top: MachinePart = self._make(plan.top, TOP, None)
         self.cross_jumps = 0
 
@@ -36,14 +42,56 @@ class Model:
         part = PARTS[type(plan)](self, plan, path, parent)
         if isinstance(part, MachinePart):
             self._machines[path] = part
+        elif isinstance(part, IteratorPart):
+            self._iterators.append(part)
         return part
+
+    def branch_of(self, plan: Any, path: str, parent: Part) -> Part:
+        """Make the part of a node directly in an Iterator or a Concurrence."""
+        if not isinstance(plan, Leaf):
+            return self.part_of(plan, path, parent)
+        self._branches.append(BranchPart(self, plan, path, parent))
+        return self._branches[-1]
+
+    def between_ends(self, part: Part, branches: List[str], course: Course) -> Course:
+        """An execution of an Iterator or a Concurrence; told of where it has branches."""
+        told = (lambda *event: self.tell(part.path, event)) if branches else (lambda *event: None)
+        told('CONTAINER_START', ', '.join(branches), '', '')
+        try:
+            outcome = yield from course
+        except Raised:
+            told('CONTAINER_END', '', '', '')
+            raise
+        except Jumping:
+            told('CONTAINER_END', '', part.left_with, '')
+            raise
+        told('CONTAINER_END', '', outcome, '')
+        return outcome
+
+    def let_go_on(self, machine: MachinePart, target: str) -> None:
+        """The oracle goes to a state: an Iterator that has failed or was left goes on there."""
+        for part in machine.children():
+            if isinstance(part, IteratorPart):
+                outcome = part.ended_with
+                part.ask_to_go_on(part.label == target and (
+                    outcome in (None, 'preempted')
+                    or machine.failure_of(part.label, outcome, False) is not None))
+
+    def forget_rests_below(self, part: Part) -> None:
+        """Another item begins: what Iterators in it have left was that of the one before."""
+        for iterator in self._iterators:
+            if part in _with_ancestors(iterator):
+                iterator.forget()
 
     def execute(self) -> str:
         """One trial; returns the outcome, or '' where it raises."""
+        self.repeats.begin_trial()
         for kind in self.budget:
             self.budget[kind] = 0
-        for machine in self._machines.values():
+        for machine in [*self._machines.values(), *self._branches]:
             machine.memory.begin_trial()
+        for iterator in self._iterators:
+            iterator.forget()
         self._numbers = {key: number for key, number in self._numbers.items()
                          if key[0] != 'question'}
         self.entries = 0
@@ -86,6 +134,11 @@ class Model:
         limit = self.plan.budget.get(kind)
         return limit is not None and self.budget[kind] >= limit
 
+    def holder(self, path: str, label: str) -> MachinePart:
+        """The machine that holds a place, or the branch that is it."""
+        return next((branch for branch in self._branches
+                     if (branch.path, branch.label) == (path, label)), None) or self._machines[path]
+
     def machine(self, path: str) -> MachinePart:
         """The machine of that path."""
         return self._machines[path]
@@ -103,8 +156,10 @@ class Model:
     def is_foreseen(self, inner: Part, outcome: str) -> bool:
         """Whether the author of a level above recovers from a container that ends so."""
         level = inner.parent
+        if isinstance(inner, BranchPart):
+            return False
         if isinstance(level, IteratorPart):
-            return outcome in level.plan.loop_outcomes and sounds_like_failure(outcome)
+            return self._passes_over(level, inner, outcome)
         if not isinstance(level, MachinePart):
             return False
         failed = level.failure_of(inner.label, outcome, False)
@@ -116,6 +171,11 @@ class Model:
         return way is not None and bool(way.target) and not way.is_state and self.is_foreseen(
             level, way.target)
 
+    def _passes_over(self, iterator: IteratorPart, inner: Part, outcome: str) -> bool:
+        own = self.plan.of(iterator.path, inner.label).author_recoveries
+        return (outcome in iterator.plan.loop_outcomes and sounds_like_failure(outcome)
+                and (own or self.plan.author_recoveries) != 'override')
+
     def forget_begins(self, part: Part) -> None:
         """What was not entered in the middle is entered at its own start from now on."""
         for machine in self._machines.values():
@@ -124,16 +184,24 @@ class Model:
 
     def goal_of(self, origin: MachinePart, path: str, label: str) -> Goal:
         """Where to go from a container to a place."""
-        target: Part = self._machines[path]
+        target: Part = self.holder(path, label)
         place = label
         around = _with_ancestors(origin)
         begins = {}
         while target not in around or not isinstance(target, MachinePart):
-            if isinstance(target, MachinePart):
+            if isinstance(target, MachinePart) and not isinstance(target, BranchPart):
                 begins[target.path] = label
             label = target.label
             target = target.parent
         return Goal(target, label, begins, place=(path, place))
+
+    def is_closed(self, goal: Goal) -> bool:
+        """Whether a place, or what lies on the way down to it, cannot be entered."""
+        return any(self.repeats.is_closed(place) for place in self.places_on(goal))
+
+    def places_on(self, goal: Goal) -> List[Tuple[str, str]]:
+        """The places on the way down to where a goal leads, with its own."""
+        return [(goal.machine.path, goal.label), *goal.begins.items(), goal.place]
 
     def depart(self, origin: Part, goal: Goal) -> Jumping:
         """Have what runs beside the way to a goal preempted; of two jumps the first wins."""
@@ -142,6 +210,8 @@ class Model:
             if isinstance(part.parent, ConcurrencePart):
                 way.append((part.parent, part.label))
             part = part.parent
+        if goal.gives_up is None:
+            goal = goal._replace(repeats=self.repeats.repeated_by(goal.machine, goal.label))
         goal = next((beside.goal for beside, _ in way if beside.goal is not None), goal)
         for beside, label in way:
             if beside.goal is None:
@@ -151,7 +221,7 @@ class Model:
     def missing_at(self, goal: Goal, userdata: Dict[str, Any]) -> Tuple[str, ...]:
         """Input keys of a place that are not there, where a goal's machine has this userdata."""
         path, label = goal.place
-        machine = self._machines[path]
+        machine = self.holder(path, label)
         part = machine.child(label)
         remapping = machine.plan.remappings.get(label, {})
         return tuple(sorted(
@@ -162,6 +232,8 @@ class Model:
         """Whether a container has a key once the machine has come down to it."""
         if part is around:
             return key in userdata
+        if isinstance(part, BranchPart):
+            return self._will_have(part.parent, key, around, userdata)
         if key in part.userdata:
             return True
         if key not in part.keys:
@@ -181,16 +253,22 @@ class Model:
     def options(self, machine: MachinePart, label: str, written: Set[str]) -> Options:
         """What may be answered."""
         part = machine.child(label)
-        places = [(each.path, name) for each in self._machines.values() for name in each.labels]
+        places = [(each.path, name) for each in [*self._machines.values(), *self._branches]
+                  for name in each.labels]
         levels = [each for each in _with_ancestors(machine) if isinstance(each, MachinePart)]
-        missing = []
+        places = [place for place in places if not self.is_closed(self.goal_of(machine, *place))]
+        missing, repeats = [], []
         for path, name in places:
             goal = self.goal_of(machine, path, name)
+            repeated = self.repeats.repeated_by(goal.machine, goal.label)
+            if repeated:
+                repeats.append((path, name, repeated))
             missing.append((path, name, self.missing_at(goal, goal.machine.after_jump(
                 goal.label, written if goal.machine is machine else set()))))
         return Options(
-            tuple(sorted(places)), tuple(sorted(missing)),
-            tuple(sorted((name, machine.way_of(label, name).target)
+            tuple(sorted(places)), tuple(sorted(missing)), tuple(sorted(repeats)),
+            tuple(sorted((name, machine.leads_to(name) if isinstance(machine, BranchPart)
+                          else machine.way_of(label, name).target)
                          for name in part.plan.outcomes)),
             tuple(sorted((each.path, name) for each in levels for name in each.plan.outcomes)),
             tuple(sorted(getattr(part.plan, 'writes', part.keys))))

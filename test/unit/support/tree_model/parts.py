@@ -1,11 +1,14 @@
-"""The model's leafs, Iterators and Concurrences, as the contract of SMACH says."""
+"""The model's leafs and Concurrences, as the contract of SMACH says."""
 from typing import Any, Dict, List, Optional, Tuple
 
-from .plan import Beside, Leaf, Repeated
+from .plan import Beside, Leaf
 from .scheduling import Course, Fork, Turn
 
 OVERRUN = object()
-UNSAID = '(as SMACH preempts)'  # the outcome of an Iterator or a Concurrence that is left
+
+
+class Unsaid(str):
+    """An outcome that may be another: upstream's engine may preempt a branch that has ended."""
 
 
 class View:
@@ -108,59 +111,6 @@ class LeafPart(Part):
         return seen
 
 
-class IteratorPart(Part):
-    """An Iterator."""
-
-    plan: Repeated
-
-    def __init__(self, run: Any, plan: Repeated, path: str, parent: Any) -> None:
-        super().__init__(run, plan, path, parent)
-        self.left_with = UNSAID
-        self._child = run.part_of(plan.child, path, self)
-        self.userdata: Dict[str, Any] = {}
-        self._runs = False
-
-    def children(self) -> List[Part]:
-        return [self._child]
-
-    def request_preempt(self) -> None:
-        self.flag = True
-        if self._runs:
-            self._child.request_preempt()
-
-    def execute(self, view: View) -> Course:
-        """Go through the items; returns the outcome."""
-        view.copy_to(self.keys, self.userdata)
-        self._runs = True
-        self.settled = False
-        try:
-            outcome = yield from self._iterate()
-        except Raised:
-            self.settled = self._child.settled
-            raise
-        except Jumping:
-            self.flag = False
-            view.copy_from(self.keys, self.userdata)
-            raise
-        finally:
-            self._runs = False
-        self.flag = False
-        view.copy_from(self.keys, self.userdata)
-        return self.plan.final_map.get(outcome, outcome)
-
-    def _iterate(self) -> Course:
-        child = self._child
-        for _ in range(self.plan.items):
-            if self.flag and not self.run.is_upstream:
-                child.request_preempt()
-            outcome = yield from child.execute(View(self.userdata, {}))
-            self.settled = child.settled
-            if self.flag or outcome not in self.plan.loop_outcomes:
-                return outcome
-        self.settled = False
-        return 'ok'
-
-
 class ConcurrencePart(Part):
     """A Concurrence."""
 
@@ -168,9 +118,9 @@ class ConcurrencePart(Part):
 
     def __init__(self, run: Any, plan: Beside, path: str, parent: Any) -> None:
         super().__init__(run, plan, path, parent)
-        self.left_with = UNSAID
-        self._children = [run.part_of(child, path, self) for child in plan.children]
         self.userdata: Dict[str, Any] = {}
+        self._children = [run.branch_of(child, path, self) for child in plan.children]
+        self._branches = [child.label for child in plan.children if isinstance(child, Leaf)]
         self._active: List[str] = []
         self._outcomes: Dict[str, str] = {}
         self._error: Optional[Exception] = None
@@ -182,6 +132,9 @@ class ConcurrencePart(Part):
 
     def execute(self, view: View) -> Course:
         """Run all branches; returns the outcome."""
+        return self.run.between_ends(self, self._branches, self._execute(view))
+
+    def _execute(self, view: View) -> Course:
         view.copy_to(self.keys, self.userdata)
         self._active = [child.label for child in self._children]
         self._outcomes = {}
@@ -196,16 +149,20 @@ class ConcurrencePart(Part):
         for child in self._children:
             child.flag = False
         self.settled = any(child.settled for child in self._children)
-        if self.goal is not None:
-            self.flag = False
-            view.copy_from(self.keys, self.userdata)
-            raise Jumping(self.goal)
+        goal = self.goal
         if self._error is not None:
             self.flag = False
-            raise self._error
+            if goal is None or goal.machine.flag:
+                raise self._error
+            self.left_with = ''
+            raise Jumping(goal)
         serviced = self._settle_preempt(is_deaf)
         outcome = self._outcome(serviced)
         view.copy_from(self.keys, self.userdata)
+        if goal is not None:
+            self.flag = False
+            self.left_with = Unsaid(outcome) if self.run.is_upstream else outcome
+            raise Jumping(goal)
         return outcome
 
     def _branch(self, child: Part) -> Course:
@@ -230,8 +187,8 @@ class ConcurrencePart(Part):
         """A branch has ended."""
         self._active.remove(label)
         if isinstance(error, Jumping):
-            return
-        if error is not None:
+            outcome = self.child(label).left_with
+        elif error is not None:
             self._error = error
             self._preempt_active()
             return

@@ -84,6 +84,7 @@ class StateSettings(NamedTuple):
     max_recoveries: Optional[int] = None
     author_recoveries: Optional[str] = None
     memory: Optional[int] = None
+    on_retry: str = 'allow'
 
 
 class TreePlan(NamedTuple):

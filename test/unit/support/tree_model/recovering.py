@@ -4,7 +4,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 from .ends import Failed, Goal, Reply, Way
 from .parts import Part, Raised, View
 from .scheduling import Course
-from .words import decided
+from .words import decided, failing_outcome_of
 
 ORACLE = 'ORACLE'
 
@@ -30,7 +30,7 @@ class Recovering:
     def recover(self: Any, failed: Failed, continuous: bool) -> Course:
         """Recover from a failure that was counted; returns where the machine goes."""
         self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
-        decision = yield from self.decide(failed.label, continuous)
+        decision = yield from self.decide(failed.label, continuous, failed.kind == 'HELD_BACK')
         if self.flag:
             return self._preempted_ending(failed)
         self._tell_decision(failed.label, decision)
@@ -70,13 +70,17 @@ class Recovering:
     def _tell_decision(self: Any, label: str, decision: Decision) -> None:
         self.tell('DECISION', label, decision.action, decision.target, decision.by)
 
-    def decide(self: Any, label: str, continuous: bool) -> Course:
+    def decide(self: Any, label: str, continuous: bool, held_back: bool = False) -> Course:
         """What the oracle decides about a failure of its state that was counted."""
+        if held_back:
+            return Decision('ask', '', 'held_back')
         spent = ''
         if self.memory.recoveries.get(label, 0) >= self.limit_of(label):
             spent = 'max_recoveries'
         elif self.run.is_spent('recoveries'):
             spent = 'budget'
+        elif self.settings_of(label).on_retry != 'allow':
+            spent = 'on_retry'
         written: Set[str] = set()
         action, by = 'ask', spent
         if not spent:
@@ -94,6 +98,8 @@ class Recovering:
         target = {'revisit': label, 'ask': ''}.get(action)
         if target is None:
             target = self.memory.step_back_target(self.run.plan.policy, label)
+        if target and self.run.repeats.repeated_by(self, target):
+            action, target, by = 'ask', '', 'on_retry'
         return Decision(action, target, by, written)
 
     def _run_checks(self: Any, label: str, checks: Any, written: Set[str]) -> Course:
@@ -116,6 +122,10 @@ class Recovering:
                 self.userdata[check.writes] = '{}/{} {}#{}'.format(
                     self.path, label, check.name, number)
             return self.run.plan.holds(self.path, label, check, number)
+        place = (self.path, check.name)
+        if self.run.repeats.blocks_precondition(place):
+            return False
+        self.run.repeats.runs_as_precondition(place)
         self.current = self.child(check.name)
         try:
             outcome = yield from self.current.execute(View(
@@ -133,7 +143,9 @@ class Recovering:
     # -- where it asks
 
     def _ask(self: Any, failed: Failed, decision: Decision) -> Course:
-        if failed.ending is not None and not failed.ending.is_state and self.run.is_foreseen(
+        is_held_back = failed.kind == 'HELD_BACK'
+        if not is_held_back and failed.ending is not None and not (
+                failed.ending.is_state) and self.run.is_foreseen(
                 self, failed.ending.target):
             return self.give_up(failed, failed.ending)
         would_end = failed.ending is None or not failed.ending.is_state
@@ -176,8 +188,9 @@ class Recovering:
             self.tell('QUERY_EXPIRED', failed.label)
             return None
         name = '{}/{}'.format(reply.path, reply.name)
-        self.tell('QUERY_ANSWERED', failed.label, reply.kind,
-                  name if reply.path not in ('', self.path) else reply.name)
+        is_own = reply.path in ('', self.path) and (
+            reply.kind != 'goto' or reply.name in self.labels)  # not that of a branch beside
+        self.tell('QUERY_ANSWERED', failed.label, reply.kind, reply.name if is_own else name)
         return reply
 
     def _fall_back(self: Any, failed: Failed, written: Set[str]) -> Way:
@@ -187,10 +200,13 @@ class Recovering:
         gone = self.memory.fallbacks.get(failed.label, 0)
         if kind == 'goto' and gone < max(1, self.limit_of(failed.label)) and (
                 not self.run.is_spent('recoveries')):
-            self.memory.fallbacks[failed.label] = gone + 1
-            self.run.budget['recoveries'] += 1
             path, label = self.run.place(name)
-            return self.go_to_place(failed.label, path, label, written)
+            goal = self.run.goal_of(self, path, label)
+            if not (self.run.is_closed(goal)
+                    or self.run.repeats.repeated_by(goal.machine, goal.label)):
+                self.memory.fallbacks[failed.label] = gone + 1
+                self.run.budget['recoveries'] += 1
+                return self.go_to_place(failed.label, path, label, written)
         return self.give_up(failed, failed.ending)
 
     def _obey(self: Any, failed: Failed, reply: Reply, written: Set[str]) -> Way:
@@ -201,7 +217,11 @@ class Recovering:
             remapping = self.plan.remappings.get(label, {})
             self.userdata.update({remapping.get(key, key): value
                                   for key, value in reply.outputs.items()})
-            self.memory.supersede(label)
+            if failed.kind == 'HELD_BACK':
+                self.memory.ended(label, 'superseded')
+                self.run.repeats.superseded((self.path, label))
+            elif not failed.was_left:
+                self.memory.supersede(label)
             way = self.way_of(label, reply.name)
             self.tell('SUPERSEDE', label, reply.name, way.target)
             if way.is_state:
@@ -228,19 +248,24 @@ class Recovering:
 
     def jump(self: Any, label: str, goal: Goal) -> Way:
         """Go to a state of this container, from the one of that label."""
-        restores = self.run.plan.userdata == 'restore' and goal.label in self.snapshots
+        restores = self.restores(goal.label)
         after = self.after_jump(goal.label, goal.written)
         self.userdata.clear()
         self.userdata.update(after)
+        self.run.repeats.leave_for(self, goal.label, self.run.places_on(goal))
         self._note_begins(goal)
         self.tell('JUMP', label, '', goal.label, self.run.missing_at(goal, self.userdata),
                   'restore' if restores else 'keep')
         self.run.cross_jumps += bool(goal.begins or goal.crosses)
         return Way(goal.label, True)
 
+    def restores(self: Any, target: str) -> bool:
+        """Whether a jump to a state puts the userdata back."""
+        return self.run.plan.userdata == 'restore' and target in self.snapshots
+
     def after_jump(self: Any, target: str, written: Set[str]) -> Dict[str, Any]:
         """The userdata that a jump to a state leaves."""
-        if self.run.plan.userdata != 'restore' or target not in self.snapshots:
+        if not self.restores(target):
             return dict(self.userdata)
         survives = {key: value for key, value in self.userdata.items() if key in written}
         return {**self.snapshots[target], **survives}
@@ -260,8 +285,11 @@ class Recovering:
         return self.jump(failed, goal._replace(written=written))
 
     def _note_begins(self: Any, goal: Goal) -> None:
+        self.run.let_go_on(self, goal.label)
         for path, label in goal.begins.items():
-            self.run.machine(path).begins_in = label
+            machine = self.run.machine(path)
+            machine.begins_in = label
+            self.run.let_go_on(machine, label)
 
     def failed_as(self: Any, label: str, ending: Optional[Way]) -> Optional[Failed]:
         """The failure of its own state that ends so, None where that is none."""
@@ -282,8 +310,6 @@ class Recovering:
     def follow_from_below(self: Any, label: str, goal: Goal) -> Course:
         """A jump has left the state of that label and has come here."""
         yield from ()
-        if self.flag:
-            return self._end_jump(label)
         if goal.gives_up is not None:
             self.memory.ended(label, 'preempted')
             self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
@@ -293,11 +319,17 @@ class Recovering:
         if goal.failed is None:
             self.memory.ended(label, 'preempted')
         self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
+        told = set(goal.repeats)
+        if self.run.is_closed(goal) or (
+                set(self.run.repeats.repeated_by(self, goal.label)) - told):
+            return self._ask_on_arrival(label)
         return self.jump(label, goal._replace(crosses=True))
 
-    def _end_jump(self: Any, label: str) -> Way:
-        self.flag = False
-        self.memory.ended(label, 'preempted')
-        self.choose_left_with()
-        self.tell('TRANSITION', label, self.child(label).left_with, self.left_with)
-        return Way(self.left_with, False)
+    def _ask_on_arrival(self: Any, label: str) -> Way:
+        """The place has closed, or something was done meanwhile: ask again, here."""
+        failing = failing_outcome_of(self.plan.outcomes)
+        failed = Failed(label, 'TIME_LIMIT', '', None, failing and Way(failing, False),
+                        was_left=True)
+        reply = self._ask_expert(failed, set())
+        return self._fall_back(failed, set()) if reply is None else self._obey(
+            failed, reply, set())
