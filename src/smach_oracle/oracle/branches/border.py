@@ -192,15 +192,17 @@ class IteratorBorder(Border):
         return self._rounds, self._items.number if self._items is not None else 0
 
     def _iterators_around(self) -> Iterator['IteratorBorder']:
-        node, below = self.top, self.below
-        while node is not None and below:
+        node: Optional[TreeNode] = self.top
+        below: Tuple[str, ...] = self.below
+        while node is not None:
             container: Any = node.machine
             for label in below[:-1]:
                 container = _children_of(container)[label]
                 border = border_of(container)
                 if isinstance(border, IteratorBorder):
                     yield border
-            node, below = node.parent, node.below
+            below = node.below
+            node = node.parent
 
     def _pass_on(self, states: Mapping[str, smach.State]) -> None:
         """Let an Iterator directly inside go on too: its items belong to the unfinished one."""

@@ -39,18 +39,23 @@ class World:
 
     def tell(self, path: str, event: Any) -> None:
         """Note what happens, up to the cut."""
+        if event[0] == 'DECISION' and event[-1] == 'held_back':
+            self._count()  # an author may loop through such a state for ever
         with self._lock:
             if not self.is_cut:
                 self.course.append((path, event))
 
-    def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
-        """Note what a leaf sees when it is executed."""
+    def _count(self) -> None:
         self._entries += 1
-        if self._entries == self.signals_at:
-            self.signal.set()
         if self._entries > MOST_ENTRIES:
             self.is_cut = True
             self.turns.end()
+
+    def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
+        """Note what a leaf sees when it is executed."""
+        self._count()
+        if self._entries == self.signals_at:
+            self.signal.set()
         self.tell(path, ('ENTRY', label, tuple(sorted(seen.items()))))
 
 

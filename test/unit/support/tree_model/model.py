@@ -114,13 +114,18 @@ class Model:
 
     def tell(self, path: str, event: Tuple[Any, ...]) -> None:
         """Note an event."""
+        if event[0] == 'DECISION' and event[-1] == 'held_back':
+            self._count()
         self.course.append((path, event))
 
-    def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
-        """Note what a leaf sees when it is executed."""
+    def _count(self) -> None:
         self.entries += 1
         if self.entries > MOST_ENTRIES:
             raise Cut()
+
+    def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
+        """Note what a leaf sees when it is executed."""
+        self._count()
         self.tell(path, ('ENTRY', label, tuple(sorted(seen.items()))))
 
     def number_of(self, *key: str) -> int:
