@@ -4,11 +4,11 @@
 import { vector } from '../drawing/transforms.js';
 import { unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
+import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
 import { DriveCamera } from './drive_camera.js';
 import { DriveInput } from './drive_input.js';
-import { NO_EMERGENCY_STOP } from './emergency.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { factsOf, lightOf } from './hand_state.js';
 
