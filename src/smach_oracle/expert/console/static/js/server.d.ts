@@ -281,6 +281,7 @@ export interface CountsRow {
   trials: number;
   endings: { success: number; failure: number; preempted: number; unfinished?: number };
   counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
+  unwell_s: number; // in which they waited, all together, until the robot was well
 }
 
 /** In how many trials, and how often in all. */
