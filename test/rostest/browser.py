@@ -111,6 +111,20 @@ class Browser:
                 key,
                 self.text()[:2000]))
 
+    def hold(self, key):
+        """Press a key and hold it, once the page takes it as meant."""
+        def held():
+            before = self._refused()
+            ActionChains(self.driver, duration=0).key_down(key).perform()
+            if self._refused() == before:
+                return True
+            ActionChains(self.driver, duration=0).key_up(key).perform()
+            return False
+        if not wait_for(held):
+            raise AssertionError('{!r} cannot be held; the page says:\n{}'.format(
+                key,
+                self.text()[:2000]))
+
     def tap(self, selector):
         """With a finger, in the middle of what is there and shown, once the page takes it as
         meant.

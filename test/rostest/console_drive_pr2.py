@@ -128,8 +128,10 @@ class Drive(unittest.TestCase):
             return False
 
     def key(self, name, down):
-        chain = ActionChains(self.browser.driver, duration=0)
-        (chain.key_down if down else chain.key_up)(name).perform()
+        if down:
+            self.browser.hold(name)
+        else:
+            ActionChains(self.browser.driver, duration=0).key_up(name).perform()
 
     def gone(self, begin, side, way=0.03):
         return wait_for(lambda: np.linalg.norm((self.robot.pose(TOOLS[side]) - begin)[:3, 3]) > way)

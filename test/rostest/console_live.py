@@ -112,8 +112,15 @@ class Live(ConsolePage, unittest.TestCase):
         try:
             self.assertTrue(self.browser.says('master silent for', '#status'))
             self.assertTrue(self.refused('the ROS master'))
+            # the robot hears of a stop nevertheless
+            self.browser.click('.detail [data-action=pause-machine]')
+            self.assertTrue(self.browser.says('KITCHEN is paused', '.detail .hand-reply'))
+            self.assertTrue(self.browser.says('Paused by operator.', '.detail .standing'))
+            self.assertFalse(self.browser.find('.detail [data-action=resume-machine]').is_enabled())
         finally:
             self.start_master()
+        self.browser.click('.detail [data-action=resume-machine]')
+        self.assertTrue(self.browser.says('goes on', '.detail .hand-reply'))
         self.assertTrue(self.answerable())
 
     def test_4_a_robot_that_is_stopped_is_silent(self):

@@ -37,6 +37,27 @@ const key = { key: " ", code: "Space", bubbles: true, cancelable: true };
 pad.dispatchEvent(new KeyboardEvent("keydown", key));
 box.remove();'''
 
+# the wheel is taken, and a letter pressed in the very frame in which it comes to move the hand
+KEY_AT_ONCE = '''
+const done = arguments[0];
+const wheel = document.querySelector(".wheel");
+const pad = document.querySelector(".pad[data-move=up]");
+const refused = () => Number(document.body.dataset.refused || 0);
+const before = refused();
+const key = (type) => document.body.dispatchEvent(new KeyboardEvent(type, { key: "r", code: "KeyR",
+  bubbles: true, cancelable: true }));
+const press = () => {
+  if (pad.disabled) { requestAnimationFrame(press); return; }
+  key("keydown");
+  setTimeout(() => { key("keyup"); done(refused() - before); }, 300);
+};
+const take = () => {
+  if (!wheel.hasAttribute("data-settled")) { requestAnimationFrame(take); return; }
+  wheel.click();
+  press();
+};
+take();'''
+
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Teleoperation(ConsolePage, unittest.TestCase):
@@ -52,6 +73,9 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         rospy.Subscriber('/manipulation_interface/command', TeleopCommand, cls.heard,
                          tcp_nodelay=True)
         cls.begin('console_teleoperation_robot.py', size=(1360, 1000))
+
+    def setUp(self):
+        open('/tmp/cr_tele_progress','a').write('%.0f %s\n' % (time.time(), self.id()))
 
     @classmethod
     def heard(cls, command):
@@ -86,8 +110,10 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(stays(lambda: self.arm.moved_s == moved_s, 0.5))
 
     def key(self, down):
-        chain = ActionChains(self.browser.driver, duration=0)
-        (chain.key_down if down else chain.key_up)('r').perform()
+        if down:
+            self.browser.hold('r')
+        else:
+            ActionChains(self.browser.driver, duration=0).key_up('r').perform()
 
     def hold_key(self):
         self.key(True)
@@ -169,6 +195,18 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(self.browser.says('You drive.', '.driver'), 'nothing else was pressed')
         self.assert_moves_nothing(lambda: browser.run(HELD_AT_ONCE))
         self.assertGreater(int(browser.run('return document.body.dataset.refused || 0')), 0)
+
+    def test_2_a_letter_moves_nothing_where_the_wheel_has_only_just_been_taken(self):
+        browser = self.browser
+        browser.click('.wheel')
+        self.assertTrue(browser.says('Take the wheel', '.wheel'))
+        browser.driver.set_script_timeout(60)
+        refused = []
+        self.assert_moves_nothing(
+            lambda: refused.append(browser.driver.execute_async_script(KEY_AT_ONCE)))
+        self.assertEqual(refused, [1])
+        self.hold_key()
+        self.key(False)
 
     def test_2_whoever_presses_stop_stops_it_though_the_key_is_held_on(self):
         press = 'document.querySelector("[data-action=stop-hand]").click()'
@@ -309,7 +347,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
 
     def test_7_the_gripper_and_the_end(self):
         browser = self.browser
-        ActionChains(browser.driver, duration=0).key_down('c').perform()
+        browser.hold('c')
         self.assertTrue(wait_for(lambda: self.states[-1].gripper_stalled), 'it has met something')
         ActionChains(browser.driver, duration=0).key_up('c').perform()
         self.assertTrue(browser.says('holds something', '.drive-facts'))

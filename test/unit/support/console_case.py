@@ -76,6 +76,21 @@ class FakeTeleoperation:
         self.drivers.discard(page)
 
 
+class FakeMachineHand:
+    """Remembers what it is told; one that stops waits until the test lets it."""
+
+    def __init__(self):
+        self.done = []
+
+    async def stop(self, command, person):
+        self.done.append((command.name, person.expert, person.role))
+        return CommandReply(True, 'asked to stop')
+
+    def carry_out(self, command, person, page):
+        self.done.append((command.name, person.expert, person.role))
+        return CommandReply(True, 'runs now: A in TASK')
+
+
 class FakeAudit:
     """Remembers what it is told."""
 
@@ -102,7 +117,9 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         self.teleoperation = FakeTeleoperation()
         self.access = AccessControl(settings, tokens.cookie_secret if tokens else 'secret',
                                     self.audit)
-        self.pages = OpenPages(self.sections, self.log, self.question_commands, self.teleoperation)
+        self.machine_hand = FakeMachineHand()
+        self.pages = OpenPages(self.sections, self.log, self.question_commands, self.teleoperation,
+                               self.machine_hand)
         self.sensors = SensorStreams()
         self.files = ImageStore()
         self.catalogue = BagCatalogue(self.folders(), self.sections)

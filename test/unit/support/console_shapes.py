@@ -41,7 +41,10 @@ from smach_oracle.expert.console.web.audit import Person
 from smach_oracle.expert.followed_server import ListedQuestion, ListNews
 from smach_oracle.expert.interface_outputs import InterfaceOutputs
 from smach_oracle.msg import (
+    ActiveState,
+    ControlStatus,
     InterfaceOutput,
+    MachineControl,
     OpenQuery,
     OracleEvent,
     OracleRates,
@@ -132,6 +135,9 @@ def put_machines(sections):
         transitions=[TransitionCount('TASK', 'A', 'ok', 'B', 3)]))
     alpha.on_event(OracleEvent(kind=OracleEvent.TRANSITION, path='TASK', state='A', target='B'))
     alpha.on_event(OracleEvent(kind=OracleEvent.FAILURE, path='TASK', state='B', rate=math.nan))
+    alpha.on_control(ControlStatus(machines=[MachineControl(
+        'TASK', True, True, 'breakpoint A', [ActiveState('TASK', 'A', 'breakpoint', True)], ['A'],
+        [], [], [], [])]))
     alpha.write_sections(sections, NoLayouter())
     structure = ContainerGraph('TASK', ('A',), ('done',), (GraphEdge('A', 'ok', 'done'),), 'ORACLE')
     place = (1.0, 2.0, 3.0, 4.0)

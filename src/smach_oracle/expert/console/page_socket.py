@@ -5,7 +5,7 @@ import json
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Optional, Set, Union
+from typing import Any, Callable, Coroutine, Optional, Set, Union
 
 import tornado.iostream
 import tornado.web
@@ -14,8 +14,10 @@ import tornado.websocket
 from .answering.onlookers import Onlookers
 from .answering.question_commands import QuestionCommands
 from .answering.teleoperation import Teleoperation
-from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse
-from .commands.driving import DRIVING_COMMANDS, STOPPING_COMMANDS, stops
+from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse, stops
+from .commands.driving import DRIVING_COMMANDS, STOPPING_COMMANDS
+from .commands.holding import HOLDING_COMMANDS, MACHINE_STOPS
+from .robots.machine_hand import MachineHand
 from .trials.trial_log import TrialLog
 from .web import sessions
 from .web.access import RateLimit, SocketRateLimits, may
@@ -43,11 +45,12 @@ class OpenPages:
     """What the sockets of all pages share."""
 
     def __init__(self, sections: PageSections, log: TrialLog, question_commands: QuestionCommands,
-                 teleoperation: Teleoperation) -> None:
+                 teleoperation: Teleoperation, machine_hand: MachineHand) -> None:
         self.sections = sections
         self.log = log
         self.question_commands = question_commands
         self.teleoperation = teleoperation
+        self.machine_hand = machine_hand
         self.onlookers = Onlookers(sections)
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
@@ -55,6 +58,13 @@ class OpenPages:
         self._trials_lock = threading.Lock()  # so that no older list is put last
         self._trials_version = -1  # of the list of live trials
         self.workers = ThreadPoolExecutor(8, 'command')
+
+    def worker(self, command: PageCommand) -> Callable[..., CommandReply]:
+        """Who carries out a command, in a thread."""
+        if command.name in HOLDING_COMMANDS:
+            return self.machine_hand.carry_out
+        return (self.teleoperation.carry_out if command.name in DRIVING_COMMANDS
+                else self.question_commands.carry_out)
 
     def close(self, session: sessions.BrowserSession) -> None:
         """Close the pages of a session that has ended.
@@ -186,8 +196,14 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._answer(command, reply)
             return
         # the next message is read meanwhile: a stop waits for no robot that hangs
+        if command.name in MACHINE_STOPS:
+            self._begin(self._stop_machine(command))
+            return
         self._at_work += 1
-        task = asyncio.get_running_loop().create_task(self._in_turn(command))
+        self._begin(self._in_turn(command))
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -235,7 +251,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return self._pages.teleoperation.drive(command, self._number)
         if command.name in STOPPING_COMMANDS:  # whatever else is at work
             return self._pages.teleoperation.stop(command, self._person, self._number)
-        if self._at_work >= MOST_AT_WORK:
+        if self._at_work >= MOST_AT_WORK and not stops(command):
             return self._note(command, CommandReply(False, 'too many commands at a time'))
         return None
 
@@ -248,13 +264,16 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         finally:
             self._at_work -= 1
 
+    async def _stop_machine(self, command: PageCommand) -> None:
+        """Without its turn: it waits for no other command."""
+        if self._person is not None:
+            self._answer(command, await self._pages.machine_hand.stop(command, self._person))
+
     async def _work(self, person: Person, command: PageCommand) -> CommandReply:
         try:
             loop = asyncio.get_running_loop()
-            carry_out = (self._pages.teleoperation.carry_out if command.name in DRIVING_COMMANDS
-                         else self._pages.question_commands.carry_out)
-            return await loop.run_in_executor(self._pages.workers, carry_out, command, person,
-                                              self._number)
+            return await loop.run_in_executor(self._pages.workers, self._pages.worker(command),
+                                              command, person, self._number)
         finally:
             if self._gone:  # while the robot was asked
                 self._pages.question_commands.leave(self._number)
@@ -339,7 +358,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
 
 def _by_anybody(command: PageCommand) -> bool:
     """Whether a command may come from somebody who has not said a name."""
-    return needed_role(command.name) == 'viewer' or stops(command.name, command.arguments)
+    return needed_role(command.name) == 'viewer' or stops(command)
 
 
 def _only_stops(message: Union[str, bytes]) -> bool:
@@ -350,4 +369,4 @@ def _only_stops(message: Union[str, bytes]) -> bool:
         command = parse(message)
     except CommandError:
         return False
-    return stops(command.name, command.arguments)
+    return stops(command)

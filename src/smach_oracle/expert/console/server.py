@@ -30,6 +30,7 @@ from .feeds.repeating import repeat
 from .graphs.layout_worker import LayoutWorker
 from .page_socket import OpenPages, PageSocket
 from .robots.followed_robots import FollowedRobots
+from .robots.machine_hand import MachineHand
 from .sensors.question_images import ImageStore, QuestionImages
 from .sensors.robot_clocks import ImageAges, RobotClocks
 from .sensors.sample_handlers import RobotAppearanceHandler, SampleHandler, SensorRequests
@@ -116,7 +117,10 @@ class Console:
                                      self._last_heard.refusal)
         self._question_sections = QuestionSections(self._front_end, self._log,
                                                    questions.sessions.session_of)
-        self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation)
+        self._machine_hand = MachineHand(self._robots.holdable, self._audit,
+                                         self._last_heard.robot_refusal)
+        self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation,
+                                self._machine_hand)
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         access = AccessControl(settings._replace(port=port), secret, self._audit)
         app = make_app(access, self._pages, self._discovery.sensors,
@@ -134,6 +138,7 @@ class Console:
         self._discovery.start()
         self._teleoperation.start()
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
+        repeat(self._machine_hand.look_up, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
         threading.Thread(target=self._catalogue.run, name='bags', daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()

@@ -10,7 +10,6 @@ import genpy
 import rospy
 
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.errors import OperatorError
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.srv import (
@@ -28,6 +27,7 @@ from smach_oracle.srv import (
     SetBreakpointResponse,
 )
 
+from .all_at_once import Command, command_all
 from .status_publisher import ControlPublisher
 from .viewer_commands import ViewerCommands
 
@@ -38,8 +38,6 @@ _CHANGES = frozenset([
     EventKind.TRIAL_START, EventKind.TRIAL_END, EventKind.HOLD_START, EventKind.HOLD_END,
     EventKind.OPERATOR_COMMAND, EventKind.SENT
 ])
-
-Command = Callable[[OperatorHand], str]
 
 
 class HandServer:
@@ -121,17 +119,11 @@ class HandServer:
         :param only: one machine must be meant.
         """
         hands = self._hands()
-        meant = [hand for each, hand in hands if _is_in(path, each)]
+        meant = [(each, hand) for each, hand in hands if _is_in(path, each)]
         if not meant or (only and len(meant) > 1):
             return False, 'there is no machine {!r} here; there are: {}'.format(
                 path, ', '.join(each for each, _ in hands) or 'none; the first has yet to run')
-        told: List[str] = []
-        refused: List[str] = []
-        for hand in meant:
-            try:
-                told.append(command(hand))
-            except OperatorError as err:
-                refused.append(str(err))
+        told, refused = command_all(meant, command)
         self._status.changed()
         return bool(told), '; '.join(told or refused)
 

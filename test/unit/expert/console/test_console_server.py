@@ -296,6 +296,10 @@ class TestPeople(console_case.ConsoleCase):
         assert self.question_commands.done == []
         for command in ('view', 'stop_hand', 'leave_wheel'):
             assert (await self.say(socket, 6, do=command, question='q'))['ok']
+        for command, ok in (('stop_machine', True), ('pause_machine', True),
+                            ('resume_machine', False)):
+            assert (await self.say(socket, 7, do=command, robot='/r', path=''))['ok'] is ok
+        assert [name for name, *_ in self.machine_hand.done] == ['stop_machine', 'pause_machine']
 
     @tornado.testing.gen_test
     async def test_a_page_tells_all_others_which_question_it_shows(self):

@@ -1,10 +1,12 @@
 """Which machines of a node a command means."""
+import threading
+
 import pytest
 import rospy
 
 import smach
 from smach_oracle.oracle import OperatorHand, OracleContainer
-from smach_oracle.ros.hand import hand_server
+from smach_oracle.ros.hand import all_at_once, hand_server
 from smach_oracle.ros.hand.hand_server import HandServer
 from smach_oracle.srv import CommandMachineRequest, SendMachineRequest, SetBreakpointRequest
 
@@ -59,6 +61,38 @@ def test_a_path_means_one_machine_and_no_path_all(services):
     refused = pause(CommandMachineRequest(path='other'))
     assert (refused.ok, refused.message) == (
         False, "there is no machine 'other' here; there are: task, task_2")
+
+
+class Hanging(smach.StateMachine):
+    """Its request_preempt does not return before the test lets it."""
+
+    free = threading.Event()
+
+    def request_preempt(self):
+        assert self.free.wait(60)
+        super().request_preempt()
+
+
+def test_a_machine_that_hangs_delays_no_other_one(services, monkeypatch):
+    monkeypatch.setattr(all_at_once, 'ANSWER_LIMIT_S', 0.2)
+    monkeypatch.setattr(Hanging, 'is_running', lambda _: True)
+    hanging = Hanging(outcomes=['done', 'preempted'])
+    with hanging:
+        smach.StateMachine.add('A', smach.CBState(lambda ud: 'done', outcomes=['done']))
+    server = HandServer()
+    server.watch(OracleContainer.wrap(hanging, name='a_first'))
+    server.watch(machine('task'))
+    preempt = services['~oracle/preempt']
+    replies = []
+    asked = threading.Thread(target=lambda: replies.append(preempt(CommandMachineRequest())),
+                             daemon=True)
+    asked.start()
+    asked.join(20)
+    assert replies and replies[0].ok, 'the first one has held the other up'
+    assert replies[0].message == 'task does not run; a_first has not answered yet'
+    alone = preempt(CommandMachineRequest(path='a_first'))
+    assert (alone.ok, alone.message) == (False, 'a_first has not answered yet')
+    Hanging.free.set()
 
 
 def test_going_somewhere_needs_one_machine(services):

@@ -70,13 +70,20 @@ class LastHeard:
         if command.name not in ANSWERING:
             return ''
         now_s = time.monotonic()
-        seen = command.arguments.get('seen')
+        return self.robot_refusal(listed.goal.robot, command.arguments.get('seen')) or _silence(
+            listed.server, _came_s(self._front_end.news(listed.server)), now_s)
+
+    def robot_refusal(self, robot: str, seen: Optional[float]) -> str:
+        """Why nothing is sent to a robot that would have it go on; '' where it may be.
+
+        :param seen: the newest beat that the page had seen, s; None: it does not say.
+        """
+        now_s = time.monotonic()
         if seen is not None and now_s - seen > OLDEST_SEEN_S:
             return ('This was said of what the page knew {:.0f} s ago: it is not carried out. '
                     'Look again, and answer again.'.format(now_s - seen))
         return _silence('The ROS master', self._master_heard_s(), now_s) or _silence(
-            listed.server, _came_s(self._front_end.news(listed.server)), now_s) or _silence(
-                listed.goal.robot, self._robot_heard_s(listed.goal.robot), now_s)
+            robot, self._robot_heard_s(robot), now_s)
 
     def _follow(self) -> None:
         nodes = {robot: sorted(found) for robot, found in self._nodes().items()}
@@ -111,4 +118,4 @@ def _age(heard_s: Optional[float], now_s: float) -> Optional[float]:
 def _silence(name: str, heard_s: Optional[float], now_s: float) -> str:
     if heard_s is None or now_s - heard_s <= SILENT_AFTER_S:
         return ''  # who was never heard is new, or cannot be asked
-    return '{} has been silent for {:.0f} s: the answer was not sent.'.format(name, now_s - heard_s)
+    return '{} has been silent for {:.0f} s: it was not sent.'.format(name, now_s - heard_s)

@@ -10,6 +10,8 @@ from smach_oracle.ros.strict_json import load_json
 
 from .checks import QUESTION, CommandSpec, one_of, outputs, seen, shown, text, whole
 from .driving import DRIVING_COMMANDS
+from .driving import stops as stops_hand
+from .holding import HOLDING_COMMANDS, MACHINE_STOPS
 from .marking import MARKING_COMMANDS
 
 MOST_BYTES = 65536
@@ -76,6 +78,11 @@ def needed_role(name: str) -> str:
     return COMMANDS[name].role
 
 
+def stops(command: PageCommand) -> bool:
+    """Whether it can only stop something: it is never refused, and waits for nothing."""
+    return command.name in MACHINE_STOPS or stops_hand(command.name, command.arguments)
+
+
 def _decode(text: object) -> Dict[str, Any]:
     if not isinstance(text, str):
         raise CommandError('commands are text')
@@ -111,4 +118,5 @@ COMMANDS: Dict[str, CommandSpec] = {
              outputs=outputs, why=text(2000), seen=seen)),
     **MARKING_COMMANDS,
     **DRIVING_COMMANDS,
+    **HOLDING_COMMANDS,
 }

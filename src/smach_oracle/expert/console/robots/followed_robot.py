@@ -1,10 +1,11 @@
 """One robot as its topics show it: containers, active states, learned rates."""
 import threading
-from typing import Any, Dict, FrozenSet, List
+from typing import Any, Dict, FrozenSet, List, Optional
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.msg import OracleEvent, OracleRates
+from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
 
+from ..feeds.control_view import MachineView, control_view
 from ..feeds.views import number, rates_view
 from ..graphs.container_graph import (
     ContainerGraph,
@@ -44,6 +45,8 @@ class FollowedRobot:
         self._counts: Dict[str, List[List[Any]]] = {}
         self._trial = ''
         self._unwell = ''  # why it waits until it is well
+        # how its machines stand; None: they cannot be held
+        self.machines: Optional[List[MachineView]] = None
 
     def on_structure(self, message: SmachContainerStructure) -> None:
         """A container's graph; most repeat what is known."""
@@ -79,6 +82,21 @@ class FollowedRobot:
             self._counts.update({path: shares(counts) for path, counts in rows.items()})
             self.changed = True
             self._reshaped = self._reshaped or any(path not in self._structures for path in rates)
+
+    def on_control(self, message: ControlStatus) -> None:
+        """How its machines stand as operators see them."""
+        machines = control_view(message)
+        with self._lock:
+            if machines != self.machines:
+                self.machines = machines
+                self.changed = True
+
+    def containers(self) -> FrozenSet[str]:
+        """The paths of all that is known of it."""
+        with self._lock:
+            known = [machine['path'] for machine in self.machines or []]
+            active = [each['path'] for machine in self.machines or [] for each in machine['active']]
+            return frozenset([*known, *active, *self._all_structures()])
 
     def on_event(self, message: OracleEvent) -> None:
         """The path that is taken, and where it failed."""
@@ -117,7 +135,8 @@ class FollowedRobot:
                 'trial': self._trial, 'alive': self.alive, 'unwell': self._unwell,
                 'active': dict(self._active), 'latest': dict(self._latest),
                 'failed': dict(self._failed), 'rates': dict(self._rates),
-                'counts': dict(self._counts), 'paths': sorted(structures)
+                'counts': dict(self._counts), 'paths': sorted(structures),
+                'control': self.machines
             }
         sections.put('live ' + self.name, live)
         if reshaped:

@@ -8,7 +8,7 @@ import rosgraph
 import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.msg import OracleEvent, OracleRates
+from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
 
 from ..feeds.views import event_of
 from ..graphs.layout_worker import LayoutWorker
@@ -23,6 +23,7 @@ _GONE_AFTER = 2  # rounds without any of its topics
 _QUEUE = 2000
 _TOPICS: Dict[str, Tuple[Any, str]] = {
     '/oracle/events': (OracleEvent, 'on_event'), '/oracle/rates': (OracleRates, 'on_rates'),
+    '/oracle/control': (ControlStatus, 'on_control'),
     '/smach/container_structure': (SmachContainerStructure, 'on_structure'),
     '/smach/container_status': (SmachContainerStatus, 'on_status')}
 
@@ -79,6 +80,12 @@ class FollowedRobots:
             return {name: self._nodes.get(name) or frozenset([name])
                     for name, robot in self._robots.items() if robot.alive}
 
+    def holdable(self) -> Dict[str, FrozenSet[str]]:
+        """The robots whose machines can be held, each with the paths of its containers."""
+        with self._lock:
+            robots = list(self._robots.items())
+        return {name: robot.containers() for name, robot in robots if robot.machines is not None}
+
     def write_sections(self) -> None:
         """Bring the sections up to date."""
         with self._lock:
@@ -106,7 +113,7 @@ class FollowedRobots:
 
     def _receiver(self, robot: FollowedRobot, method: str) -> Callable[[Any], None]:
         take_in = getattr(robot, method)
-        if method == 'on_rates':  # latched: its stamp may be of long ago
+        if method in ('on_rates', 'on_control'):  # latched: its stamp may be of long ago
             return take_in
 
         def take(message: Any) -> None:

@@ -16,13 +16,14 @@ import rospy
 from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
 from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
 from smach_oracle.analysis.trials import TrialSummary
-from smach_oracle.analysis.variants import Count, count_variants
+from smach_oracle.analysis.variants import Count, count_variant, find_variants
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.packages import lacking
 
 from ..web.sections import PageSections
 from .bag_folders import BagFolders, FileState
 from .bag_process import read_bags
+from .counts_table import unwell
 
 SECTION = 'bags'
 SCAN_PERIOD_S = 5.0
@@ -258,11 +259,13 @@ def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
     if not summaries:
         return []
     rows = []
-    for variant in count_variants(list(summaries)):
+    for found in find_variants(list(summaries)):
+        variant = count_variant(found)
         rows.append({'experiment': variant.experiment, 'arm': variant.name,
                      'trials': variant.trials,
                      'endings': {key: variant.of(name).trials for key, name in _ENDINGS.items()},
-                     'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()}})
+                     'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()},
+                     'unwell_s': unwell(found.trials)})
     return rows
 
 

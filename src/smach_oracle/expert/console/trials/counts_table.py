@@ -3,9 +3,10 @@
 Definitions: doc/statistics.md.
 """
 from collections import Counter
-from typing import Any, Dict, Iterable, List, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
+from smach_oracle.analysis.trials import TrialSummary
 
 ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.PREEMPTED)
 COUNTED = ('failures', 'recoveries', 'questions', 'answered')
@@ -34,8 +35,14 @@ def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[
     return {
         'experiment': experiment, 'oracle': oracle, 'trials': len(trials),
         'endings': {ending.value: endings[ending] for ending in ENDINGS},
-        'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED}
+        'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED},
+        'unwell_s': unwell(trials)
     }
+
+
+def unwell(trials: Iterable[Union[TrialCounter, TrialSummary]]) -> float:
+    """For how long (s) they waited, all together, until the robot was well."""
+    return round(sum(trial.unwell_s for trial in trials), 1)
 
 
 def _count(numbers: Sequence[int]) -> Dict[str, int]:

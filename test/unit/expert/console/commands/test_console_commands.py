@@ -128,7 +128,8 @@ def test_halves_of_surrogate_pairs_do_not_get_to_the_wire():
 
 def test_viewers_may_only_look_and_stop():
     assert {name for name in COMMANDS if needed_role(name) == 'viewer'
-            } == {'hello', 'watch', 'look', 'view', 'leave_wheel', 'stop_hand'}
+            } == {'hello', 'watch', 'look', 'view', 'leave_wheel', 'stop_hand',
+                 'stop_machine', 'pause_machine'}
     assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
     assert {name
             for name in COMMANDS
@@ -140,5 +141,5 @@ def test_no_command_names_a_topic_a_service_or_a_type():
     assert fields == {
         'xsrf', 'expert', 'trial', 'at', 'question', 'kind', 'name', 'outputs', 'why', 'stamp',
         'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent',
-        'arm', 'container', 'seen'
+        'arm', 'container', 'seen', 'robot', 'path', 'pattern', 'remove'
     }

@@ -56,6 +56,7 @@ def test_they_are_counted_as_the_analysis_counts_them(folder):
     assert row['counts']['recoveries'] == {'trials': group.of('oracle recoveries').trials,
                                            'events': group.of('oracle recoveries').events}
     assert row['endings']['failure'] == group.of('ended in failure').trials
+    assert row['unwell_s'] == sum(each.unwell_s for each in found)
     assert {each['id'] for each in section()['trials']} == {each.trial_id for each in found}
     starts = [each['start'] for each in section()['trials']]
     assert starts == sorted(starts, reverse=True)

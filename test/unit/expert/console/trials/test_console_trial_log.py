@@ -116,6 +116,17 @@ def test_the_table_counts_trials_in_which_it_happened_and_how_often():
                                             for summary in of_bags) > 0
 
 
+def test_the_table_lists_the_time_in_which_trials_waited_until_the_robot_was_well():
+    trials = run_trials(3)
+    for waited_s, events in zip((2.5, 4.0), trials):
+        at_s = events[-1].wall_time
+        events[-1:-1] = [
+            events[-1]._replace(kind=EventKind.HEALTH_WAIT_START),
+            events[-1]._replace(kind=EventKind.HEALTH_WAIT_END, wall_time=at_s + waited_s)]
+    row, = counts_table(map(count, trials))
+    assert row['unwell_s'] == 6.5
+
+
 def test_a_trial_that_runs_is_not_in_the_table_and_one_heard_of_late_says_so():
     events = run_trials(1)[0]
     running = count(events[:-1])

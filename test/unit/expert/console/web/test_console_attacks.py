@@ -21,7 +21,8 @@ ARGUMENTS = {
     'question': 'q', 'kind': 'goto', 'name': 'x', 'held': True, 'frame': 'tool',
     'linear': [0, 0, 0], 'angular': [0, 0, 0], 'gripper': '', 'sent': 1.0, 'xsrf': 'x',
     'trial': 't', 'outcome': 'succeeded', 'stamp': '1.000000000', 'region': [[0, 0], [9, 0],
-                                                                             [9, 9]], 'strokes': []
+                                                                             [9, 9]], 'strokes': [],
+    'robot': '/r', 'path': '', 'pattern': 'A', 'remove': False
 }
 FRAMES = {'use_frame': 'fresh', 'drive': 'tool'}
 
@@ -186,6 +187,8 @@ class TestPages(console_case.ConsoleCase):
             await page.write_message(json.dumps({'id': number, 'do': 'claim', 'question': 'q'}))
         assert (await self.say(page, 99, do='stop_hand', question='q'))['ok']
         assert (await self.say(page, 100, do='leave_wheel', question='q'))['ok']
+        for command in ('stop_machine', 'pause_machine'):
+            assert (await self.say(page, 101, do=command, robot='/r', path=''))['ok']
 
     @tornado.testing.gen_test
     async def test_what_a_page_drives_stops_as_soon_as_the_page_is_closed_for_too_much(self):

@@ -30,9 +30,12 @@ class Socket(page_socket.PageSocket):
 
 
 def test_a_stop_is_carried_out_before_the_socket_is_closed_for_too_many_commands():
-    for command, done in (('stop_hand', ['stop_hand']), ('claim', [])):
+    question, machine = {'question': 'q'}, {'robot': '/r', 'path': ''}
+    for command, arguments, done in (('stop_hand', question, ['stop_hand']),
+                                     ('stop_machine', machine, ['stop_machine']),
+                                     ('claim', question, [])):
         socket = Socket()
-        message = json.dumps({'id': 1, 'do': command, 'question': 'q'})
+        message = json.dumps(dict(arguments, id=1, do=command))
         asyncio.run(socket.on_message(message))
         assert socket.done == done + [page_socket.TOO_FAST]
 
@@ -51,7 +54,7 @@ def test_of_two_threads_that_write_the_list_of_trials_the_later_one_lasts():
             return {'heard': version, 'trials': []}
 
     log, sections = Log(), PageSections()
-    pages = page_socket.OpenPages(sections, log, None, None)
+    pages = page_socket.OpenPages(sections, log, None, None, None)
     socket = Socket()
     socket.lists = SimpleNamespace(looks=True)
     pages.sockets.add(socket)

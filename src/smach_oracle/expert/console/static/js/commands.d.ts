@@ -7,6 +7,9 @@ import { DriveFrame } from './server';
 
 interface OfQuestion { question: string } // its key
 
+/** A machine of a robot, by the path of a container of it; '': all of the robot's. */
+interface OfMachine { robot: string; path: string }
+
 /** A value for the userdata. */
 export interface Output { key: string; value: unknown; type: string }
 
@@ -49,6 +52,12 @@ export interface Commands {
   take_wheel: OfQuestion;
   leave_wheel: OfQuestion;
   stop_hand: OfQuestion;
+  stop_machine: OfMachine;
+  pause_machine: OfMachine;
+  resume_machine: OfMachine & { seen?: number };
+  step_machine: OfMachine & { seen?: number };
+  confirm_state: OfMachine & { seen?: number };
+  set_breakpoint: OfMachine & { pattern: string; remove: boolean };
   drive: OfQuestion & DriveWish & { frame: DriveFrame; arm: string; sent: number }; // ms
 }
 

@@ -3,6 +3,7 @@
 // the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 import { Colour, Vector } from './drawing/types';
+import { HeldMachine } from './holding';
 
 export type Role = 'viewer' | 'operator' | 'teleoperator';
 
@@ -182,6 +183,7 @@ export interface LiveMachines {
   rates: ByPath<ByState<LearnedRate>>;
   counts: ByPath<TransitionCount[]>;
   paths: string[];
+  control: HeldMachine[] | null; // null: its machines cannot be held
 }
 
 export interface LearnedRate {
@@ -279,6 +281,7 @@ export interface CountsRow {
   trials: number;
   endings: { success: number; failure: number; preempted: number; unfinished?: number };
   counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
+  unwell_s: number; // in which they waited, all together, until the robot was well
 }
 
 /** In how many trials, and how often in all. */
@@ -384,3 +387,4 @@ export interface HandState {
 }
 
 export * from './commands';
+export * from './holding';

@@ -2,6 +2,7 @@
 // What a person holds: buttons by mouse, touch, Enter and Space, keys, a gamepad. Everything is let
 // go where it cannot be seen to be held.
 import { vector } from '../drawing/transforms.js';
+import { longSince, sayTooSoon } from '../page/deliberate.js';
 import { modified, typing } from '../page/dom.js';
 import { keysOn } from '../page/shortcuts.js';
 import { MOTIONS, MOVE_OF_KEY } from './drive_moves.js';
@@ -18,13 +19,23 @@ export class DriveInput {
    */
   constructor(changed) {
     this.changed = changed;
-    this.active = false;
+    this.sinceMs = Infinity; // when keys and the gamepad have come to move the hand
     this.gamepad = new GamepadInput();
     /** @type {Map<string | symbol, Move>} */
     this.pressed = new Map(); // by what holds it: a key, a button
     this.off = new AbortController();
     this.listen();
   }
+
+  /** Whether what is held moves the hand. */
+  get active() { return this.sinceMs < Infinity; }
+
+  set active(active) {
+    if (active !== this.active) this.sinceMs = active ? performance.now() : Infinity;
+  }
+
+  /** They mean something else now, or nobody has seen what they mean. */
+  unsettle() { if (this.active) this.sinceMs = performance.now(); }
 
   listen() {
     const first = { signal: this.off.signal, capture: true };
@@ -35,7 +46,10 @@ export class DriveInput {
       window.addEventListener(type, releaseAll, first);
     }
     window.addEventListener('contextmenu', (event) => this.menu(event), first);
-    document.addEventListener('visibilitychange', releaseAll, first);
+    document.addEventListener('visibilitychange', () => {
+      this.unsettle();
+      this.releaseAll();
+    }, first);
   }
 
   stop() {
@@ -57,8 +71,11 @@ export class DriveInput {
     }
     event.preventDefault();
     event.stopImmediatePropagation(); // these letters mean something else elsewhere on the page
-    if (down && !event.repeat) this.press(event.code, move);
-    else if (!down) this.release(event.code);
+    if (!down) this.release(event.code); // never too soon
+    else if (!event.repeat) {
+      if (longSince(this.sinceMs)) this.press(event.code, move);
+      else sayTooSoon();
+    }
   }
 
   /**
@@ -125,7 +142,9 @@ export class DriveInput {
   read() {
     const wish = this.readPressed();
     const before = this.gamepad.held;
-    this.gamepad.read(wish, this.active && document.hasFocus() && !document.hidden);
+    const meant = longSince(this.sinceMs);
+    if (!meant) this.gamepad.release(); // what is held by then does not count later
+    this.gamepad.read(wish, meant && document.hasFocus() && !document.hidden);
     const letGo = before && !this.gamepad.held && !this.pressed.size;
     if (letGo) this.changed(false); // which reads again
     /** @param {number} value */

@@ -4,11 +4,11 @@
 import { vector } from '../drawing/transforms.js';
 import { unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
+import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
 import { DriveCamera } from './drive_camera.js';
 import { DriveInput } from './drive_input.js';
-import { NO_EMERGENCY_STOP } from './emergency.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { factsOf, lightOf } from './hand_state.js';
 
@@ -265,7 +265,10 @@ export class ManipulationPanel {
     for (const name of /** @type {DriveFrame[]} */ (Object.keys(this.frames))) {
       this.frames[name].hidden = !frames.includes(name);
     }
-    if (frames.length && !frames.includes(this.frame)) this.frame = this.choose(frames[0]);
+    if (frames.length && !frames.includes(this.frame)) {
+      this.frame = this.choose(frames[0]);
+      this.input.unsettle(); // the person has not chosen it
+    }
     this.showArms(now || UNKNOWN);
     const { text, kind } = lightOf(state);
     setText(this.light, text);
@@ -280,8 +283,10 @@ export class ManipulationPanel {
     const may = this.app.role === 'teleoperator';
     this.wheelButton.disabled = !may || !now || !connected;
     setText(this.wheelButton, this.mine ? 'Leave the wheel' : 'Take the wheel');
-    if (this.mine) delete this.wheelButton.dataset['deliberate']; // to leave it is always possible
-    else this.wheelButton.dataset['deliberate'] = 'take the wheel';
+    if (this.mine) { // to leave it is always possible
+      delete this.wheelButton.dataset['deliberate'];
+      delete this.wheelButton.dataset['settled'];
+    } else this.wheelButton.dataset['deliberate'] = 'take the wheel';
     const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
     const driver = now && now.driver ? now.driver + ' drives.' : nobody;
     const shown = this.mine ? 'You drive.' : driver;

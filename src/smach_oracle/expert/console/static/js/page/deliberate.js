@@ -53,6 +53,12 @@ function settled(element) {
   return nowMs - rest.sinceMs >= SETTLING_MS;
 }
 
+/**
+ * Whether something has been the same, seen, for long enough to be meant.
+ * @param {number} sinceMs
+ */
+export function longSince(sinceMs) { return performance.now() - sinceMs >= SETTLING_MS; }
+
 /** Say that a press was refused, for that it came too soon. */
 export function sayTooSoon() {
   const { dataset } = document.body;

@@ -9,10 +9,12 @@
 
 /** @type {Set<Name>} */
 const ANSWERING = new Set(['answer', 'hand_over']);
+/** @type {Set<Name>} */
+const GOING_ON = new Set(['resume_machine', 'step_machine', 'confirm_state']);
 // what a robot, its record or other people have under a name
 /** @type {Set<Name>} */
 const NAMED = new Set(['claim', 'take_over', 'answer', 'mark', 'use_frame', 'hand_over',
-  'give_up_interface', 'take_wheel']);
+  'give_up_interface', 'take_wheel', 'set_breakpoint', ...GOING_ON]);
 const NO_NAME = 'Not done: your name is needed for it.';
 
 export class Gate {
@@ -29,13 +31,15 @@ export class Gate {
 
   /**
    * @param {Name} name
-   * @param {{ question?: string }} args
+   * @param {{ question?: string, robot?: string }} args
    * @returns {Promise<Reply | null> | null} a refusal that is there already; null: it is sent
    */
-  before(name, { question }) {
+  before(name, { question, robot }) {
     const asked = ANSWERING.has(name)
       && this.liveness.store.questions.find(({ key }) => key === question);
-    const refusal = asked ? this.liveness.refusal(asked) : '';
+    const held = GOING_ON.has(name) && robot;
+    const refusal = asked ? this.liveness.refusal(asked)
+      : held && this.liveness.refusalOfRobot(held);
     if (refusal) return Promise.resolve(refused(refusal));
     if (!NAMED.has(name) || this.named()) return null;
     return this.askName().then((given) => (given ? null : refused(NO_NAME)));
@@ -45,7 +49,9 @@ export class Gate {
    * What is told with a command beside its arguments.
    * @param {Name} name
    */
-  beside(name) { return ANSWERING.has(name) ? { seen: this.liveness.beat } : {}; }
+  beside(name) {
+    return ANSWERING.has(name) || GOING_ON.has(name) ? { seen: this.liveness.beat } : {};
+  }
 }
 
 /**

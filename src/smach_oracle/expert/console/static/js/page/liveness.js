@@ -68,19 +68,29 @@ export class Liveness {
    * @param {Question} question
    */
   whoIsSilent({ server, robot }) {
+    return this.whoOf(robot) || (tooOld(this.server(server)) ? server : '');
+  }
+
+  /**
+   * Who must be heard for a robot to be commanded, and is not; '' where all are.
+   * @param {string} robot
+   */
+  whoOf(robot) {
     if (this.silent) return this.silent === 'console' ? 'the console' : 'the ROS master';
-    if (tooOld(this.robot(robot))) return robot;
-    return tooOld(this.server(server)) ? server : '';
+    return tooOld(this.robot(robot)) ? robot : '';
   }
 
   /**
    * Why no answer is sent; '' where one may be.
    * @param {Question} question
    */
-  refusal(question) {
-    const who = this.whoIsSilent(question);
-    return who && 'Not sent: nothing is heard from ' + who + ' any more.';
-  }
+  refusal(question) { return unheard(this.whoIsSilent(question)); }
+
+  /**
+   * Why nothing is sent that would have a robot go on; '' where it may be.
+   * @param {string} robot
+   */
+  refusalOfRobot(robot) { return unheard(this.whoOf(robot)); }
 
   /**
    * Why a question is gone, where its robot is; '' where that is not known: from a console or a
@@ -98,6 +108,9 @@ export class Liveness {
   /** For the top bar. */
   ages() { return 'console ' + aged(this.console) + ' · master ' + aged(this.master); }
 }
+
+/** @param {string} who is silent; '' where nobody is */
+function unheard(who) { return who && 'Not sent: nothing is heard from ' + who + ' any more.'; }
 
 /**
  * @param {number | null} age s

@@ -8,6 +8,7 @@ import { NoReply, unlessLost } from '../page/connection.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
+import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { ClaimBar } from './claim_bar.js';
 import { Onlookers } from './onlookers.js';
@@ -51,6 +52,7 @@ export class QuestionDetail {
     this.interfacePanel = null;
     this.interfaceSeen = false;
     this.machine = new MachineView(machinesNow(app.store), () => {});
+    this.hand = new MachineHand(app);
     this.camera = new SituationCamera(app, question);
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
@@ -67,6 +69,7 @@ export class QuestionDetail {
     this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
     this.root = this.build();
     this.machine.show(question.robot, question.path);
+    this.hand.show(question.robot, question.path);
     this.show();
   }
 
@@ -77,8 +80,8 @@ export class QuestionDetail {
       this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
-          h('section', { class: 'card mini-machine' }, this.machine.root), visitsCard(question),
-          userdataCard(question)),
+          h('section', { class: 'card mini-machine' }, this.hand.root, this.machine.root),
+          visitsCard(question), userdataCard(question)),
         this.answers));
   }
 
@@ -185,7 +188,10 @@ export class QuestionDetail {
     else if (this.mine && !this.settled) this.form.press(key);
   }
 
-  tick() { this.show(); }
+  tick() {
+    this.show();
+    this.hand.update();
+  }
 
   showTime() {
     const { now } = this;
@@ -278,6 +284,7 @@ export class QuestionDetail {
     if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
     if (machines || changed('questions')) this.machine.update();
+    if (machines) this.hand.update();
     if (this.followUp) this.followUp.update();
   }
 

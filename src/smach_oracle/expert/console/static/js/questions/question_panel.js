@@ -1,6 +1,6 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
-import { NO_EMERGENCY_STOP } from '../interfaces/emergency.js';
+import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';

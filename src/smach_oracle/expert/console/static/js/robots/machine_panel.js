@@ -5,6 +5,7 @@ import { aged } from '../page/liveness.js';
 import { remember, remembered } from '../page/preferences.js';
 import { arrange, redraw } from '../page/redraw.js';
 import { takeArrowKeys } from '../page/tree_keys.js';
+import { MachineHand } from './machine_hand.js';
 import { MachineView, machinesNow } from './machine_view.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -34,6 +35,7 @@ class MachinePanel {
     this.path = '';
     this.source = machinesNow(app.store);
     this.view = new MachineView(this.source, (path) => this.open(this.robot, path));
+    this.hand = new MachineHand(app);
     this.view.prefersList = remembered(PREFERENCE, 'no') === 'yes';
     this.picker = h('div', { class: 'picker', role: 'tree',
       'aria-label': 'Robots and their machines' });
@@ -44,7 +46,7 @@ class MachinePanel {
     this.toggle = h('button', { class: 'tool', onclick: () => this.toggleList() });
     this.body = h('section', { class: 'card machine-card' },
       h('div', { class: 'row head' }, this.title, this.state, h('span', { class: 'spacer' }),
-        this.toggle), this.view.root, legend());
+        this.toggle), this.hand.root, this.view.root, legend());
     this.root = h('div', { class: 'panel machines' }, this.picker, this.body);
     this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
     this.showToggle();
@@ -93,6 +95,7 @@ class MachinePanel {
       + (age === null ? '' : ' · heard ' + aged(age) + ' ago')
       + (unwell ? ' · waits until it is well: ' + unwell : ''));
     if (this.robot) this.view.show(this.robot, this.path);
+    this.hand.show(this.robot, this.path);
     this.toggle.hidden = !this.view.drawable;
   }
 

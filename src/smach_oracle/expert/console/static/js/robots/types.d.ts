@@ -1,10 +1,11 @@
 // Shapes of machines as they are drawn.
-import { ByPath, ByState, Graph, LearnedRate, TransitionCount } from '../server';
+import { ByPath, ByState, Graph, HeldMachine, LearnedRate, TransitionCount } from '../server';
 
 /** What the containers of a robot do at a moment. */
 export interface MachineState {
   alive?: boolean; // false: the robot is gone
   unwell?: string; // why it waits until it is well
+  control?: HeldMachine[] | null; // how its machines stand as operators see them
   active: ByPath<string[]>;
   latest: ByPath<[from: string, to: string]>;
   failed: ByPath<{ state: string }>;

@@ -1,12 +1,12 @@
 // @ts-check
 // The counts of the paper's Table I.
 import { h } from '../page/dom.js';
-import { percent } from '../page/format.js';
+import { duration, percent } from '../page/format.js';
 
 /** @typedef {import('../server').CountsRow} CountsRow */
 
 const COLUMNS = ['Experiment', 'Variant', 'Trials', 'Failures', 'Oracle recoveries', 'Questions',
-  'Expert interventions', 'Ended in failure'];
+  'Expert interventions', 'Ended in failure', 'Waited until well'];
 
 /**
  * @param {string} caption
@@ -19,7 +19,7 @@ export function countsTable(caption, rows) {
 }
 
 /** @param {CountsRow} row */
-function rowOf({ experiment, arm, oracle, trials, counts, endings }) {
+function rowOf({ experiment, arm, oracle, trials, counts, endings, unwell_s: unwell }) {
   /** @param {number} found of the trials */
   const share = (found) => h('td', { class: 'number' }, found,
     h('span', { class: 'dim' }, ' ' + percent(found / trials)));
@@ -27,5 +27,6 @@ function rowOf({ experiment, arm, oracle, trials, counts, endings }) {
     h('td', {}, arm || (oracle ? 'with oracle' : 'without oracle')),
     h('td', { class: 'number' }, trials),
     share(counts.failures.trials), share(counts.recoveries.trials), share(counts.questions.trials),
-    share(counts.answered.trials), share(endings.failure));
+    share(counts.answered.trials), share(endings.failure),
+    h('td', { class: 'number' }, unwell ? duration(unwell) : '–'));
 }

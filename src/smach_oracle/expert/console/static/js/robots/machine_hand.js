@@ -1,0 +1,162 @@
+// @ts-check
+// Holding a machine: stop it, have it wait, let it go on. To stop and to pause is there for whoever
+// sees the robot, and is sent at once. The two keep their places: what lets a machine go on never
+// lies where they were.
+import { unlessLost } from '../page/connection.js';
+import { h, setText } from '../page/dom.js';
+import { NO_EMERGENCY_STOP } from '../page/emergency.js';
+import { redraw } from '../page/redraw.js';
+import { Breakpoints } from './breakpoints.js';
+import { byContainer, listed, machineOf, resumable, standingWords, waiting } from './hand_words.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').HeldMachine} HeldMachine */
+/** @typedef {'stop_machine' | 'pause_machine'} Stop */
+/** @typedef {'resume_machine' | 'step_machine' | 'confirm_state'} Start */
+
+const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
+const NEEDS_ROLE = 'To let it go on needs the role of an operator.';
+
+export class MachineHand {
+  /** @param {App} app */
+  constructor(app) {
+    this.app = app;
+    this.robot = '';
+    this.path = '';
+    this.key = ''; // of what may let it go on
+    this.stopButton = h('button', { class: 'stop', 'data-action': 'stop-machine',
+      title: 'Ask the machine to stop: it is preempted',
+      onclick: () => this.send('stop_machine', this.machine?.path || '') });
+    this.pauseButton = h('button', { 'data-action': 'pause-machine',
+      title: 'What runs goes on to its end; then the machine waits',
+      onclick: () => this.send('pause_machine', this.machine?.path || '') }, '❚❚ Pause');
+    this.standing = h('p', { class: 'standing', role: 'status' });
+    this.goOn = h('div', { class: 'row wrap go-on' });
+    this.reply = h('p', { class: 'dim hand-reply', role: 'status' });
+    this.problem = h('p', { class: 'problem', role: 'alert' });
+    this.breakpoints = new Breakpoints((pattern, remove) => this.breakAt(pattern, remove));
+    this.root = h('section', { class: 'machine-hand', 'aria-label': 'Stop or hold the machine' },
+      h('div', { class: 'row wrap' }, this.stopButton, this.pauseButton, this.standing),
+      this.goOn, this.problem, this.reply,
+      h('div', { class: 'row wrap hand-foot' }, this.breakpoints.root,
+        h('span', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP)));
+  }
+
+  /**
+   * How the machine stands; undefined where it cannot be held.
+   * @returns {HeldMachine | undefined}
+   */
+  get machine() {
+    return machineOf(this.app.store.get(`live ${this.robot}`)?.control || [], this.path);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {string} path of a container
+   */
+  show(robot, path) {
+    const before = this.machine?.path;
+    const robotBefore = this.robot;
+    this.robot = robot;
+    this.path = path;
+    if (robot !== robotBefore || before !== this.machine?.path) {
+      setText(this.reply, '');
+      setText(this.problem, '');
+    }
+    this.update();
+  }
+
+  update() {
+    const { machine } = this;
+    this.root.hidden = !machine;
+    if (!machine) return;
+    setText(this.stopButton, '■ Stop ' + machine.path);
+    setText(this.standing, standingWords(machine));
+    this.root.classList.toggle('held', machine.paused || waiting(machine).length > 0);
+    this.showGoOn(machine);
+    this.breakpoints.show(machine.breakpoints, this.app.mayAnswer);
+  }
+
+  /** @param {HeldMachine} machine */
+  showGoOn(machine) {
+    const { app, robot } = this;
+    const may = app.mayAnswer && app.connection.connected && !app.liveness.whoOf(robot);
+    const key = JSON.stringify([robot, machine.path, machine.paused, machine.active, may]);
+    if (key === this.key) return;
+    this.key = key;
+    const waits = waiting(machine);
+    const asks = waits.filter(({ confirm }) => confirm);
+    redraw(this.goOn, machine.paused && this.button('resume_machine', machine.path, 'Resume',
+      listed(resumable(machine)), may),
+    byContainer(waits).map(([path, states]) => (
+      this.button('step_machine', path, 'Step', listed(states), may))),
+    byContainer(asks).map(([path, states]) => (
+      this.button('confirm_state', path, 'Confirm', listed(states), may))),
+    (machine.paused || waits.length > 0) && !app.mayAnswer
+      && h('span', { key: 'role', class: 'dim' }, NEEDS_ROLE));
+  }
+
+  /**
+   * @param {Start} command
+   * @param {string} path
+   * @param {string} word
+   * @param {string} runs what will run
+   * @param {boolean} may
+   */
+  button(command, path, word, runs, may) {
+    const action = command.replace('_', '-');
+    return h('button', { key: [this.robot, command, path].join(' '), class: 'go-on-button',
+      'data-action': action, disabled: !may,
+      'data-deliberate': [command, this.robot, path, runs].join(' '),
+      onclick: () => this.send(command, path) },
+    h('strong', {}, word), runs && ': ' + runs + ' will run');
+  }
+
+  /**
+   * @param {Stop | Start} command
+   * @param {string} path
+   */
+  async send(command, path) {
+    setText(this.problem, '');
+    setText(this.reply, '');
+    const { robot } = this;
+    try {
+      const reply = await this.app.connection.request(command, { robot, path });
+      this.tell(robot, reply.ok, reply.message);
+    } catch (err) {
+      unlessLost(err);
+      if (command === 'stop_machine' || command === 'pause_machine') {
+        this.tell(robot, false, CANNOT_STOP);
+      }
+    }
+  }
+
+  /**
+   * @param {string} pattern
+   * @param {boolean} remove
+   */
+  async breakAt(pattern, remove) {
+    const { robot, machine } = this;
+    try {
+      const reply = await this.app.connection.request('set_breakpoint', { robot, pattern, remove,
+        path: machine?.path || '' });
+      this.tell(robot, reply.ok, reply.message);
+      return reply.ok;
+    } catch (err) {
+      unlessLost(err);
+      return false;
+    }
+  }
+
+  /**
+   * What a robot has answered, unless another one is shown by now.
+   * @param {string} robot
+   * @param {boolean} ok
+   * @param {string} message
+   */
+  tell(robot, ok, message) {
+    if (robot !== this.robot) return;
+    setText(this.reply, ok ? message : '');
+    setText(this.problem, ok ? '' : message);
+  }
+}
