@@ -49,7 +49,7 @@ class Departure:
 
     def result_of(self, node: TreeNode) -> VisitResult:
         """Return how the visit counts that a container was in when it was left."""
-        decided_there = self.verdict.is_failure_above and self.arrives_at is node
+        decided_there = self.verdict.decided_by is node
         return VisitResult.FAILURE if decided_there else VisitResult.PREEMPTED
 
 

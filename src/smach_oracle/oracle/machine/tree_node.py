@@ -102,8 +102,8 @@ class TreeNode:
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
         self.gave_up = False  # the latest execution ended so
-        # a state that is executed as a precondition now
-        self.as_precondition: Optional[smach.State] = None
+        # the states that are executed as preconditions now
+        self.as_preconditions: Tuple[smach.State, ...] = ()
         self.join(tree)
 
     def take_name(self, name: str) -> None:
@@ -208,9 +208,10 @@ class TreeNode:
         settings = self.in_force.of_state(self.relative_path, label)
         if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
             return settings
-        # beside a branch is no state that could be run for it
+        # beside a branch is no state that could be run for it; a path names one elsewhere
         return replace(settings, preconditions=tuple(
-            spec for spec in settings.preconditions if not spec.labels()))
+            spec for spec in settings.preconditions
+            if all('/' in label for label in spec.labels())))
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""
@@ -239,6 +240,20 @@ class TreeNode:
         return record
 
     # -- what goes on
+
+    def begin_precondition(self, state: smach.State) -> bool:
+        """Note that a state is executed as a precondition; False where it is so already."""
+        with self.tree.departures_lock:
+            is_free = not any(each is state for each in self.as_preconditions)
+            if is_free:
+                self.as_preconditions += (state,)
+            return is_free
+
+    def end_precondition(self, state: smach.State) -> None:
+        """Note that it has ended."""
+        with self.tree.departures_lock:
+            self.as_preconditions = tuple(each for each in self.as_preconditions
+                                          if each is not state)
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""

@@ -3,12 +3,12 @@ from typing import Any, FrozenSet, List, NamedTuple, Optional
 
 import smach
 
-from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..places.levels import is_direct, levels_above
 from ..places.place import Place
+from ..places.stepping_back import failure_context
 from ..places.way import Way, way_to
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
@@ -89,12 +89,14 @@ def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
 def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
     child, above = node, node.parent
-    while above is not None and above.machine._is_running:
+    while above is not None:
         state = above.machine._states.get(child.below[0])
         label = above.machine._current_label
-        if above.as_precondition is state or (label is not None and above.is_oracle(label)):
+        if any(each is state for each in above.as_preconditions):
             return True
-        if above.machine._current_state is not state:
+        if above.machine._is_running and label is not None and above.is_oracle(label):
+            return True
+        if not above.machine._is_running or above.machine._current_state is not state:
             return False
         child, above = above, above.parent
     return False
@@ -115,9 +117,10 @@ def levels_that_may_decide(node: TreeNode) -> List[TreeNode]:
 class OuterDecision(NamedTuple):
     """A recovery that a level above has decided on.
 
-    `written`: its userdata keys that survive a restore.
+    `written`: userdata keys that survive a restore, where the way ends at that level.
     """
 
+    decided_by: TreeNode
     way: Way
     text: str
     written: FrozenSet[str]
@@ -136,8 +139,7 @@ class OuterLevel:
         self._record: StateRecord = node.record(failure.state)
         self._failure = failure
         self._below = below
-        self._context = node.records.failure_context(self._record,
-                                                     node.machine._initial_state_label or '')
+        self._context = failure_context(node, self._record)
         self._continuous = node.in_force.policy.is_continuous(self._context)
         self._deciding = Deciding(node, self._record, failure, self._context, self._continuous,
                                   stop)
@@ -148,13 +150,17 @@ class OuterLevel:
         self._deciding.cancel()
 
     def decide(self) -> Optional[OuterDecision]:
-        """Return the recovery; None where this level asks too."""
+        """Return the recovery; None where this level asks too, or has been left meanwhile."""
         record = self._record
+        if way_to(self._below, Place(self._node, record.label)) is None:
+            return None
         rate, failure_class = record.rate, record.failure_class
         record.learn(True)
         decider, facts = self._deciding.decide()
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
-        if facts.action is Action.ASK:
+        decided = self._deciding.way
+        way = way_to(self._below, decided.down[-1]) if decided is not None else None
+        if decided is None or way is None:
             record.take_back_failure()
             self.tried.append('{}: {}: asks too'.format(self._node.path, cause_of(facts)))
             return None
@@ -168,10 +174,8 @@ class OuterLevel:
                    failure_class=int(record.failure_class), rate=record.rate,
                    continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
         record.recoveries += 1
-        way = way_to(self._below, Place(self._node, facts.target))
-        if way is None:  # it has been left meanwhile
-            return None
-        return OuterDecision(way, sentence, frozenset(self._deciding.watch.written()))
+        written = () if decided.left else self._deciding.watch.written()
+        return OuterDecision(self._node, way, sentence, frozenset(written))
 
     def _emit(self, kind: EventKind, **fields: object) -> None:
         self._node.emit(kind, state=self._record.label, **fields)

@@ -84,7 +84,7 @@ class Recovery:
         if facts.action is not Action.ASK:
             self._tell_decision(decided)
             record.recoveries += 1
-            return self._jump(self._way_to(facts.target), self._watch.written())
+            return self._jump(self._way_decided(), self._written_on(self._way_decided()))
         nobody = self._why_nobody_is_asked()
         levels = [] if nobody else self._levels_that_may_decide(decider)
         asked = ('the oracle above' if levels
@@ -95,7 +95,7 @@ class Recovery:
             return self._ended_early()
         if outer is not None:
             record.recoveries += 1
-            return self._jump(outer.way, outer.written, outer.text, is_failure_above=True)
+            return self._jump(outer.way, outer.written, outer.text, outer.decided_by)
         return self._give_way(nobody) if nobody else self._ask()
 
     def _tell_decision(self, decided: Decided) -> None:
@@ -169,8 +169,15 @@ class Recovery:
                                     level.in_force.failing)
         return None
 
+    def _way_decided(self) -> Way:
+        return self._deciding.way or self._way_to(self._record.label)
+
     def _way_to(self, label: str) -> Way:
         return Way((), self._node, (Place(self._node, label),))
+
+    def _written_on(self, way: Way) -> Iterable[str]:
+        """Return the keys that survive a restore: none where the container is left."""
+        return () if way.left else self._watch.written()
 
     # -- asking
 
@@ -231,11 +238,11 @@ class Recovery:
                                           self._natural_ending))
 
     def _jump(self, way: Way, written: Iterable[str], text: str = '',
-              is_failure_above: bool = False) -> Verdict:
-        """Go to a place, once the robot is well."""
+              decided_by: Optional[TreeNode] = None) -> Verdict:
+        """Go to a place, once the robot is well; `decided_by`: the level above that decided it."""
         return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
                                        written=frozenset(written),
-                                       is_failure_above=is_failure_above))
+                                       decided_by=decided_by))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""
@@ -284,8 +291,7 @@ class Recovery:
             problem = self._why_not_fall_back(way) or self._budget.take_recovery()
             if way is not None and not problem:
                 self._record.fallbacks += 1
-                written = () if way.left else self._watch.written()
-                return self._jump(way, written, why)
+                return self._jump(way, self._written_on(way), why)
             self.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
         elif verb == 'give_up':
             if target in self._machine.get_registered_outcomes():
