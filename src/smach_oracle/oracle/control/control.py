@@ -23,13 +23,21 @@ class Engine(Protocol):
 
 
 class Jump(NamedTuple):
-    """A state to which a container goes at its next state boundary."""
+    """A state to which a container goes at its next state boundary.
+
+    `container`: path of the container of the state; '': it is the one that goes.
+    """
 
     state: str
     by: str = ''
     text: str = ''
     repeats: Tuple[str, ...] = ()  # the guarded states of which it was confirmed that they repeat
     written: Tuple[str, ...] = ()  # userdata keys that were written for it
+    container: str = ''
+
+    def named(self) -> str:
+        """Return the state, with the path of its container where that is another one."""
+        return '{}/{}'.format(self.container, self.state) if self.container else self.state
 
 
 class Control:
