@@ -263,18 +263,33 @@ class OperatorHand:
         if not top.machine.is_running():
             return '{} does not run; it will wait before its first state'.format(top.path)
         waits = [_in_words(each) for each in self._active() if each.held_by]
-        runs = self._what_runs()
+        runs, asks = self._what_runs(), self._what_recovers()
         told = ['waits before ' + ', '.join(waits)] if waits else []
+        if asks:
+            told.append('the oracle is at work in ' + ', '.join(asks))
         if runs:
             told.append('runs to its end: ' + ', '.join(runs))
         return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
 
     def _what_runs(self) -> List[str]:
-        """Return the states that run, in words, but for those within which others are active."""
+        """Return the states that run, in words, but for those within which others are active.
+
+        A Concurrence or an Iterator is such a one, too, and the oracle's own is none.
+        """
         active = self._active()
-        around = {each.path for each in active}
+        around = [each.path + '/' for each in active]
         return [_in_words(each) for each in active
-                if not each.held_by and '{}/{}'.format(each.path, each.state) not in around]
+                if not each.held_by and not any(
+                    path.startswith('{}/{}/'.format(each.path, each.state)) for path in around)
+                and not self._is_oracle(each)]
+
+    def _what_recovers(self) -> List[str]:
+        """Return the paths of the containers whose oracle decides or asks now."""
+        return [each.path for each in self._active() if self._is_oracle(each)]
+
+    def _is_oracle(self, active: ActiveState) -> bool:
+        return any(node.path == active.path and node.is_oracle(active.state)
+                   for node in nodes_of(self._top.machine))
 
     def _what_goes_on(self, held: Sequence[Hold]) -> str:
         top = self._top

@@ -1,4 +1,6 @@
 """A running machine that an operator sends to a state, with the checks of an expert's jump."""
+import threading
+
 import pytest
 from held_machines import Gate, Held, eventually
 from machines import FakeExpert, Scripted, chain_of, contents, goto
@@ -259,3 +261,30 @@ def test_a_jump_into_another_container_has_the_checks_of_an_experts_jump() -> No
         gate.opened.set()
         assert held.end() == 'done'
     assert pour.runs == 2
+
+
+@pytest.mark.parametrize('command, told', [
+    ('resume', 'runs now: C in SM_ROOT'), ('step', 'runs now: C in SM_ROOT'),
+    ('confirm', 'runs now: C in SM_ROOT once it is resumed')])
+def test_a_command_right_after_a_jump_finds_what_waits_where_it_leads(command, told) -> None:
+    """The machine is on its way meanwhile: a callback of its author's takes its time."""
+    on_its_way, let_go = threading.Event(), threading.Event()
+
+    def callback(userdata, active, *args) -> None:
+        if active == ['C']:
+            on_its_way.set()
+            assert let_go.wait(20)
+
+    machine = chain_of(Scripted(), Scripted(), Scripted())
+    machine.register_transition_cb(callback)
+    held = Held(machine, settings={'states': {'C': {'autonomy': 'confirm'}}}
+                if command == 'confirm' else {})
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        held.hand.go_to('', 'C')
+        assert on_its_way.wait(20)
+        threading.Timer(0.05, let_go.set).start()  # no command tells that it has begun to wait
+        assert getattr(held.hand, command)() == told
+        held.hand.resume()
+        assert held.end() == 'done'

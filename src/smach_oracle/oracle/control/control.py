@@ -4,13 +4,15 @@ The machines look at it before each state. It wakes them by one flag of their en
 which they look at in any case: where nothing is set, a step costs nothing more.
 """
 import threading
-from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Set, Tuple
 
 from ..settings.settings import CONFIRM_FIRST
 from .hold import HeldBy, HeldPlace, Hold, LetGo
 from .path_pattern import PathPattern
 
 _LOOK_PERIOD_S = 0.05  # how soon a wait sees a preempt or a shutdown, of which nobody tells it
+
+_SETTLE_S = 1.0  # how long a command waits at most for a container that is being sent
 
 EndedBy = Callable[[], Optional[LetGo]]
 
@@ -53,6 +55,7 @@ class Control:
         self._jumps: Dict[str, Jump] = {}
         self._breakpoints: Dict[str, PathPattern] = {}
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
+        self._moving: Set[str] = set()  # keys of containers that are sent from where they wait
         self._stopping = False  # an operator has asked the machine to stop
         self.paused = False
         self.paused_by = ''
@@ -65,6 +68,7 @@ class Control:
         """A pause, breakpoints and levels stay from the trial before; jumps do not."""
         with self._changed:
             self._jumps.clear()
+            self._moving.clear()
             self.in_trial = True
             self._note_change()
 
@@ -84,6 +88,7 @@ class Control:
         """Forget a machine whose execution is over; return the jump that it has not made."""
         with self._changed:
             self._engines.pop(id(engine), None)
+            self._note_arrived(path)
             return self._pop_jump(path)
 
     def calm(self, engine: Engine) -> None:
@@ -118,7 +123,9 @@ class Control:
     def begin(self, hold: Hold) -> None:
         """Show that a container waits; the operator may let it go from now on."""
         with self._changed:
+            self._judge_level(hold)  # it may have been set since it was looked up
             self._holds.append(hold)
+            self._note_arrived(hold.key)
 
     def end(self, hold: Hold) -> None:
         """Show that it waits no more."""
@@ -163,6 +170,16 @@ class Control:
                 return level
         return default
 
+    def arrived(self, path: str) -> None:
+        """Note that a container does not wait any more, or waits elsewhere."""
+        with self._changed:
+            self._note_arrived(path)
+
+    def _note_arrived(self, path: str) -> None:
+        if path in self._moving:
+            self._moving.discard(path)
+            self._note_change()
+
     def take_jump(self, path: str) -> Optional[Jump]:
         """Return where the container at `path` is to go, once."""
         with self._changed:
@@ -193,6 +210,7 @@ class Control:
     def resume(self) -> Tuple[Hold, ...]:
         """Lift the pause; return what waited because of it."""
         with self._changed:
+            self._settle()
             held = self._held('')
             self.paused, self.paused_by = False, ''
             self._note_change()
@@ -205,6 +223,7 @@ class Control:
         :returns: what goes on.
         """
         with self._changed:
+            self._settle()
             held = self._held(path)
             for hold in held:
                 hold.stepped = True
@@ -217,11 +236,16 @@ class Control:
         :param path: of the container; '': every one.
         """
         with self._changed:
+            self._settle()
             held = tuple(each for each in self._held(path) if each.waits_for_confirmation)
             for hold in held:
                 hold.confirmed = True
             self._changed.notify_all()
             return held
+
+    def _settle(self) -> None:
+        """Wait a moment for containers that were just sent from where they waited."""
+        self._changed.wait_for(lambda: not self._moving, _SETTLE_S)
 
     def _held(self, path: str) -> Tuple[Hold, ...]:
         return tuple(each for each in self._holds
@@ -238,6 +262,8 @@ class Control:
         A later wish for the same container takes the place of an earlier one.
         """
         with self._changed:
+            if any(hold.may_be_sent and hold.key == path for hold in self._held('')):
+                self._moving.add(path)
             self._jumps[path] = jump
             self._note_change()
 
@@ -275,8 +301,12 @@ class Control:
                 self._levels[pattern.text] = (pattern, level)
             for hold in self._holds:
                 if pattern.matches(*hold.place):
-                    hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
+                    self._judge_level(hold)
             self._note_change()
+
+    def _judge_level(self, hold: Hold) -> None:
+        if hold.asks:
+            hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
 
     def levels(self) -> Dict[str, str]:
         """Return the autonomy that was set at run time, by pattern."""
@@ -285,7 +315,8 @@ class Control:
 
     def _note_change(self) -> None:
         """Wake who waits, and have machines look that execute."""
-        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps)
+        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps
+                           or self._moving)
         if self.is_set:
             for engine in list(self._engines.values()):
                 engine.attentive = True

@@ -55,8 +55,11 @@ class OracleVisit:
         `outcome`: with what it ended then. It returns, and raises, what `run` does.
         """
         meta = self._pass_to_meta(outcome, outcome or 'taken_out')
-        return self._leave(meta, self._recover(meta, TakenOutRecovery(
-            self._node, self._record, self._failure, context, answer)))
+        verdict = self._recover(meta, TakenOutRecovery(
+            self._node, self._record, self._failure, context, answer))
+        if verdict.kind is VerdictKind.SUPERSEDE:
+            self._node.records.history.count_superseded(verdict.outcome)
+        return self._leave(meta, verdict)
 
     def _enter(self) -> OracleState:
         self._tell_failure()
@@ -174,8 +177,7 @@ class OracleVisit:
         node.gave_up = ending.state is None
         node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
                   target=ending.state or '', by=verdict.by, text=told)
-        if ending.error is not None:
-            smach.logerr(str(ending.error))
+        if ending.error is not None:  # SMACH has logged it where it was made
             raise ending.error
         if ending.state is not None:
             self._go_on(ending.state, by=verdict.by, text=text)
