@@ -229,3 +229,17 @@ def test_a_level_above_that_has_been_left_tells_no_failure_and_spends_nothing(mo
     assert {event.state for event in machine.of(EventKind.FAILURE)} == {'GRASP'}
     assert machine.rate('ARM').failures == machine.rate('ARM').recoveries == 0
     assert machine.machine._oracle.tree.budget._recoveries == machine.rate('GRASP').recoveries == 1
+
+
+def test_an_item_that_is_passed_over_from_two_levels_below_is_told():
+    iterator = smach.Iterator(outcomes=list(OUTCOMES), input_keys=[], output_keys=[], it=[1, 2],
+                              it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', chain(ARM=chain(GRASP=Scripted('aborted'))),
+                                           loop_outcomes=['done', 'aborted'])
+    expert = FakeExpert(supersede('ok'))
+    machine = Watched(chain(ALL=iterator), name='TOP', expert=expert,
+                      settings={'max_recoveries': 0})
+    assert machine.run() == 'done' and not expert.questions
+    assert [(event.path, event.text) for event in machine.of(EventKind.WARNING)] == [
+        ('TOP/ALL/EACH/ARM', 'its item is passed over with aborted')]

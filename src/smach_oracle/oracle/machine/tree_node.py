@@ -72,6 +72,14 @@ class BranchPort(Protocol):
         """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
 
 
+class DeparturePort(Protocol):
+    """A verdict that leaves containers for a level above (`execution.departure`)."""
+
+    @property
+    def arrives_at(self) -> 'TreeNode':
+        """That level."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -98,8 +106,8 @@ class TreeNode:
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
-        # where a verdict from below or here ends the present state (execution.departure)
-        self.departure: object = None
+        # where a verdict from below or here ends the present state
+        self.departure: Optional[DeparturePort] = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
         self.gave_up = False  # the latest execution ended so
         # the states that are executed as preconditions now

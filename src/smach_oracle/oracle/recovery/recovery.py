@@ -21,12 +21,12 @@ from ..settings.failing_outcomes import PREEMPTED
 from .deciding import Decided, Deciding
 from .failure import ContainerEnding, Failure, natural_ending
 from .levels import (
+    Foreseen,
     OuterDecision,
     OuterLevel,
     failure_above,
     foreseen_above,
     levels_that_may_decide,
-    passed_over,
     runs_as_precondition,
 )
 from .obeying import verdict_of
@@ -88,7 +88,7 @@ class Recovery:
         nobody = self._why_nobody_is_asked()
         levels = [] if nobody else self._levels_that_may_decide(decider)
         asked = ('the oracle above' if levels
-                 else 'nobody, since ' + nobody if nobody else self._asked_in_words())
+                 else 'nobody, since ' + nobody.text if nobody else self._asked_in_words())
         self._tell_decision((decider, facts._replace(asked=asked)))
         outer = self._decided_above(levels)
         if self._stop.is_over():
@@ -128,21 +128,21 @@ class Recovery:
 
     # -- the levels above
 
-    def _why_nobody_is_asked(self) -> str:
-        """Say why the end of the container is left to a level above; '' where it is not."""
+    def _why_nobody_is_asked(self) -> Optional[Foreseen]:
+        """Return why the end of the container is left to a level above; None where it is not."""
         if runs_as_precondition(self._node):
-            return 'it runs as a precondition'
+            return Foreseen('it runs as a precondition')
         if self._failure.is_held_back:  # no other oracle can confirm that it is repeated
-            return ''
+            return None
         foreseen = foreseen_above(self._node, self._natural_ending())
-        return 'its author goes on from there ({})'.format(foreseen) if foreseen else ''
+        return foreseen and foreseen._replace(
+            text='its author goes on from there ({})'.format(foreseen.text))
 
-    def _give_way(self, why: str) -> Verdict:
+    def _give_way(self, why: Foreseen) -> Verdict:
         """End the container, and leave all else to who is above it."""
-        outcome = passed_over(self._node, self._natural_ending())
-        if outcome:
-            self.warn('its item is passed over with {}'.format(outcome))
-        return self._give_up('{}: {}'.format(self._cause, why))
+        if why.passed_over:
+            self.warn('its item is passed over with {}'.format(why.passed_over))
+        return self._give_up('{}: {}'.format(self._cause, why.text))
 
     def _levels_that_may_decide(self, decider: Decider) -> List[TreeNode]:
         """Return them, innermost first; none where the failure is to be asked about at once."""
