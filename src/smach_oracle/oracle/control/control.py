@@ -4,7 +4,7 @@ The machines look at it before each state. It wakes them by one flag of their en
 which they look at in any case: where nothing is set, a step costs nothing more.
 """
 import threading
-from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Set, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
 from ..settings.settings import CONFIRM_FIRST
 from .hold import HeldBy, HeldPlace, Hold, LetGo
@@ -55,7 +55,8 @@ class Control:
         self._jumps: Dict[str, Jump] = {}
         self._breakpoints: Dict[str, PathPattern] = {}
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
-        self._moving: Set[str] = set()  # keys of containers that are sent from where they wait
+        # where containers go, by key, that are sent from where they wait
+        self._moving: Dict[str, HeldPlace] = {}
         self._stopping = False  # an operator has asked the machine to stop
         self.paused = False
         self.paused_by = ''
@@ -176,8 +177,7 @@ class Control:
             self._note_arrived(path)
 
     def _note_arrived(self, path: str) -> None:
-        if path in self._moving:
-            self._moving.discard(path)
+        if self._moving.pop(path, None) is not None:
             self._note_change()
 
     def take_jump(self, path: str) -> Optional[Jump]:
@@ -208,13 +208,18 @@ class Control:
             self._note_change()
 
     def resume(self) -> Tuple[Hold, ...]:
-        """Lift the pause; return what waited because of it."""
+        """Lift the pause; return what waited because of it, or was sent from where it waited."""
         with self._changed:
-            self._settle()
-            held = self._held('')
+            held, moving = self._held(''), dict(self._moving) if self.paused else {}
             self.paused, self.paused_by = False, ''
             self._note_change()
-            return held
+            if not moving:
+                return held
+            self._settle()
+            now = [each for each in self._held('') if each.key in moving]
+            return (*held, *now, *(Hold(place, HeldBy.PAUSE, False)
+                                   for key, place in moving.items()
+                                   if not any(each.key == key for each in now)))
 
     def step(self, path: str = '') -> Tuple[Hold, ...]:
         """Let what waits enter one state each, also what waits for a confirmation.
@@ -262,8 +267,9 @@ class Control:
         A later wish for the same container takes the place of an earlier one.
         """
         with self._changed:
-            if any(hold.may_be_sent and hold.key == path for hold in self._held('')):
-                self._moving.add(path)
+            for hold in self._held(''):
+                if hold.may_be_sent and hold.key == path:
+                    self._moving[path] = HeldPlace(jump.container or hold.place.path, jump.state)
             self._jumps[path] = jump
             self._note_change()
 
