@@ -11,9 +11,10 @@ from .control.control import Jump
 from .control.hold import HeldPlace, Hold
 from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
-from .execution.sending import Prospect, prospect_of
+from .execution.sending import Prospect, prospect_of, way_for
 from .machine.nesting import nodes_of
 from .machine.tree_node import TreeNode
+from .places.place import Place
 from .records.events import EventKind
 from .settings.settings import AUTONOMY_LEVELS
 
@@ -37,7 +38,8 @@ class HandStatus(NamedTuple):
     active: Tuple[ActiveState, ...]
     breakpoints: Tuple[str, ...]  # patterns
     autonomy: Mapping[str, str]  # that was set at run time: level by pattern
-    jumps: Mapping[str, str]  # still to be made: state by path of the container
+    # still to be made: state, with its path where that is another one, by path of the container
+    jumps: Mapping[str, str]
 
 
 class OperatorHand:
@@ -126,9 +128,11 @@ class OperatorHand:
 
     def go_to(self, path: str, state: str, by: str = '', confirm_repeats: bool = False,
               written: Sequence[str] = ()) -> str:
-        """Send a container to a state, at its next state boundary.
+        """Send the machine to a state, at the next state boundary of the state's container.
 
-        One that does not run begins there from now on.
+        Where that does not run, the innermost container around it that runs goes to it, and those
+        below begin in the states that lead there. Where none runs, the state's container begins
+        there from now on.
 
         :param path: of the container, as in events; '': the top machine.
         :param confirm_repeats: states that are not to be repeated by themselves may be.
@@ -137,14 +141,17 @@ class OperatorHand:
             entered now, and where an unconfirmed state may be repeated.
         """
         node = self._node_at(path, state)
-        prospect = prospect_of(node, state, tuple(written))
+        place = Place(node, state)
+        prospect = prospect_of(place, tuple(written))
         if prospect.why_not:
             raise OperatorError(prospect.why_not)
         if prospect.repeats and not confirm_repeats:
             raise OperatorError('going to {} may repeat {}: confirm that it may'.format(
                 state, ', '.join(prospect.repeats)))
-        if node.machine.is_running():
-            text = self._ask_jump(node, Jump(state, by, '', prospect.repeats, tuple(written)))
+        sent = way_for(place).meets
+        if sent.machine.is_running():
+            text = self._ask_jump(sent, Jump(state, by, '', prospect.repeats, tuple(written),
+                                             '' if sent is node else node.path))
         else:
             node.machine.set_initial_state([state])
             text = '{} does not run; it will begin in {}'.format(node.path, state)
@@ -171,8 +178,8 @@ class OperatorHand:
         control.ask_jump(node.key, jump)
         if is_held:
             return '{} goes to {} instead of {}{}'.format(
-                node.path, jump.state, label, ', where it waits' if control.paused else '')
-        return '{} goes to {} once {} has ended'.format(node.path, jump.state, label)
+                node.path, jump.named(), label, ', where it waits' if control.paused else '')
+        return '{} goes to {} once {} has ended'.format(node.path, jump.named(), label)
 
     # -- what is set
 
@@ -226,7 +233,7 @@ class OperatorHand:
     def status(self) -> HandStatus:
         """Return how the machine stands, and what is set."""
         top, control = self._top, self._top.tree.control
-        jumps = {path: jump.state for path, jump in control.jumps().items()}
+        jumps = {path: jump.named() for path, jump in control.jumps().items()}
         return HandStatus(top.path, top.machine.is_running(), control.paused, control.paused_by,
                           tuple(self._active()), control.breakpoints(), control.levels(), jumps)
 
@@ -256,18 +263,33 @@ class OperatorHand:
         if not top.machine.is_running():
             return '{} does not run; it will wait before its first state'.format(top.path)
         waits = [_in_words(each) for each in self._active() if each.held_by]
-        runs = self._what_runs()
+        runs, asks = self._what_runs(), self._what_recovers()
         told = ['waits before ' + ', '.join(waits)] if waits else []
+        if asks:
+            told.append('the oracle is at work in ' + ', '.join(asks))
         if runs:
             told.append('runs to its end: ' + ', '.join(runs))
         return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
 
     def _what_runs(self) -> List[str]:
-        """Return the states that run, in words, but for those within which others are active."""
+        """Return the states that run, in words, but for those within which others are active.
+
+        A Concurrence or an Iterator is such a one, too, and the oracle's own is none.
+        """
         active = self._active()
-        around = {each.path for each in active}
+        around = [each.path + '/' for each in active]
         return [_in_words(each) for each in active
-                if not each.held_by and '{}/{}'.format(each.path, each.state) not in around]
+                if not each.held_by and not any(
+                    path.startswith('{}/{}/'.format(each.path, each.state)) for path in around)
+                and not self._is_oracle(each)]
+
+    def _what_recovers(self) -> List[str]:
+        """Return the paths of the containers whose oracle decides or asks now."""
+        return [each.path for each in self._active() if self._is_oracle(each)]
+
+    def _is_oracle(self, active: ActiveState) -> bool:
+        return any(node.path == active.path and node.is_oracle(active.state)
+                   for node in nodes_of(self._top.machine))
 
     def _what_goes_on(self, held: Sequence[Hold]) -> str:
         top = self._top

@@ -4,6 +4,9 @@ from held_machines import Gate, Held
 from machines import Scripted, chain_of
 
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.control.control import Control
+from smach_oracle.oracle.control.hold import HeldPlace, LetGo
+from smach_oracle.oracle.control.path_pattern import PathPattern
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
@@ -124,3 +127,14 @@ def test_wrong_levels_and_patterns_are_refused() -> None:
         hand.set_breakpoint('')
     with pytest.raises(OperatorError, match='nothing waits for a confirmation'):
         hand.confirm()
+
+
+def test_a_level_that_is_set_just_before_a_wait_begins_counts() -> None:
+    control, place = Control(), HeldPlace('TOP', 'A')
+    control.set_level(PathPattern('A'), 'confirm')
+    hold = control.hold_before(place, control.level_of(place, 'run') == 'confirm')
+    assert hold is not None
+    control.set_level(PathPattern('A'), 'run')
+    control.begin(hold)
+    assert not hold.waits_for_confirmation
+    assert control.wait(hold, lambda: None) is LetGo.RESUMED

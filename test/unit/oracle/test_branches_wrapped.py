@@ -10,7 +10,7 @@ import smach
 from smach_oracle.oracle import OracleContainer, unwrap
 from smach_oracle.oracle.records.events import EventKind
 
-ASKS = {'max_recoveries': 0, 'escalate': False}
+ASKS = {'max_recoveries': 0}
 
 
 class Held(smach.State):

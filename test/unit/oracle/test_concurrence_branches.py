@@ -18,7 +18,7 @@ from machines import (
 import smach
 from smach_oracle.oracle.records.events import EventKind
 
-ASKS = {'max_recoveries': 0, 'escalate': False}
+ASKS = {'max_recoveries': 0}
 
 
 def watched(concurrence, **wrap):

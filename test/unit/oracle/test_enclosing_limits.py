@@ -22,7 +22,7 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.machine import limited_run
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
-SETTINGS = {'escalate': False, 'max_recoveries': 0, 'deadline_s': 0,
+SETTINGS = {'max_recoveries': 0, 'deadline_s': 0,
             'interfaces': {'hand': {'action': 'hand/assist'}}}
 
 

@@ -6,6 +6,7 @@ from guarded_machines import chain
 from machines import FakeExpert, Gate, Scripted, Watched, give_up, goto, in_thread, supersede
 
 import smach
+from smach_oracle.oracle.execution.departure import Departure
 from smach_oracle.oracle.records.events import EventKind
 
 ASKED = {'max_recoveries': 0}
@@ -248,3 +249,13 @@ def test_nobody_answers_and_the_machine_goes_to_the_place_that_the_settings_name
         'GRASP': {'prior': 0.9, 'memory': 1000}, 'D': {'prior': 0.9, 'memory': 1000}})
     assert outcome == 'done'
     assert [jump[:3] for jump in jumps(watched)] == [('TOP', 'PICK', 'HOME'), ('TOP', 'C', 'HOME')]
+
+
+def test_an_expert_who_supersedes_at_the_arrival_of_a_jump_is_counted(monkeypatch):
+    monkeypatch.setattr(Departure, 'why_not', lambda self: 'A was done meanwhile')
+    machine = chain(A=Scripted(), PICK=chain(GRASP=Scripted('aborted')), C=Scripted())
+    watched, expert, outcome = run(machine, to('TOP', 'A'), supersede('done'))
+    assert outcome == 'done' and len(expert.questions) == 2
+    visits = watched.machine._oracle.records.history.latest()
+    assert [(visit.state, visit.outcome, visit.result.name) for visit in visits] == [
+        ('A', 'ok', 'SUCCESS'), ('PICK', 'done', 'SUPERSEDED'), ('C', 'ok', 'SUCCESS')]

@@ -17,7 +17,7 @@ import smach
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 
-ASKS = {'max_recoveries': 0, 'escalate': False}
+ASKS = {'max_recoveries': 0}
 # no failure of the item by its name, but one of the Iterator
 STUCK = ('ok', 'stuck', 'preempted')
 TO_ABORTED = {'loop_outcomes': ['ok'], 'final_outcome_map': {'stuck': 'aborted'}}

@@ -5,6 +5,7 @@ from machines import FakeExpert, Scripted, Watched, give_up, goto, supersede
 
 import smach
 from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.recovery import levels
 
 HIGH = {'prior': 0.9, 'memory': 1000}
 UNSURE = {'prior': 0.5, 'memory': 1000}  # its policy asks at the second failure in a row
@@ -202,3 +203,43 @@ def test_an_item_that_its_author_passes_over_is_passed_over_with_a_word():
     assert machine.run() == 'done' and grasp.runs == 2 and not expert.questions
     assert [event.text for event in machine.of(EventKind.WARNING)] == [
         'its item is passed over with aborted']
+
+
+@pytest.fixture
+def errors(monkeypatch):
+    told = []
+    monkeypatch.setattr(smach, 'logerr', told.append)
+    return told
+
+
+def test_the_traceback_of_an_exception_is_one_error_in_the_log_on_all_levels(errors):
+    machine = Watched(three_levels(Scripted(ValueError('no grasp'))),
+                      settings={'max_recoveries': 0})
+    with pytest.raises(smach.InvalidUserCodeError, match='no grasp'):
+        machine.run()
+    assert len([text for text in errors if 'Traceback' in text]) == 1, errors
+
+
+def test_a_level_above_that_has_been_left_tells_no_failure_and_spends_nothing(monkeypatch):
+    monkeypatch.setattr(levels, 'way_to', lambda below, place: None)
+    machine = Watched(three_levels(Scripted('aborted', 'aborted')), name='TOP', settings={
+        'escalate': True, 'budget': {'recoveries': 9}, 'states': {'GRASP': UNSURE}},
+        expert=FakeExpert(supersede('ok')))
+    assert machine.run() == 'done'
+    assert {event.state for event in machine.of(EventKind.FAILURE)} == {'GRASP'}
+    assert machine.rate('ARM').failures == machine.rate('ARM').recoveries == 0
+    assert machine.machine._oracle.tree.budget._recoveries == machine.rate('GRASP').recoveries == 1
+
+
+def test_an_item_that_is_passed_over_from_two_levels_below_is_told():
+    iterator = smach.Iterator(outcomes=list(OUTCOMES), input_keys=[], output_keys=[], it=[1, 2],
+                              it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', chain(ARM=chain(GRASP=Scripted('aborted'))),
+                                           loop_outcomes=['done', 'aborted'])
+    expert = FakeExpert(supersede('ok'))
+    machine = Watched(chain(ALL=iterator), name='TOP', expert=expert,
+                      settings={'max_recoveries': 0})
+    assert machine.run() == 'done' and not expert.questions
+    assert [(event.path, event.text) for event in machine.of(EventKind.WARNING)] == [
+        ('TOP/ALL/EACH/ARM', 'its item is passed over with aborted')]

@@ -1,7 +1,9 @@
 """Pause, resume, step and preempt of a running machine, and its breakpoints."""
+import threading
+
 import pytest
 from held_machines import Gate, Held, eventually
-from machines import Scripted, chain_of
+from machines import FakeExpert, Scripted, chain_of
 
 import smach
 from smach_oracle.oracle.errors import OperatorError
@@ -238,3 +240,30 @@ def test_once_resumed_the_machine_takes_the_short_way_again() -> None:
         held.hand.resume()
         assert held.end() == 'done'
         assert not held.machine._oracle.engine.attentive
+
+
+def test_an_oracle_that_asks_is_no_state_that_runs_to_its_end() -> None:
+    def wait(question, cancelled, progress):
+        asked.set()
+        assert cancelled.wait(20)
+
+    asked = threading.Event()
+    with Held(chain_of(Scripted('aborted')), expert=FakeExpert(wait), name='TOP',
+              settings={'max_recoveries': 0}).begin() as held:
+        assert asked.wait(20)
+        assert held.hand.pause() == 'TOP is paused; the oracle is at work in TOP'
+
+
+def test_a_concurrence_is_no_state_that_runs_to_its_end_where_its_states_do() -> None:
+    gate = Gate()
+    both = smach.Concurrence(['done', 'aborted', 'preempted'], 'done')
+    with both:
+        smach.Concurrence.add('INNER', chain_of(Scripted(gate)))
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('BOTH', both)
+    with Held(machine, name='TOP').begin() as held:
+        assert gate.entered.wait(20)
+        assert held.hand.pause() == (
+            'TOP is paused; runs to its end: A in TOP/BOTH/INNER')
+        gate.opened.set()

@@ -151,7 +151,7 @@ def test_a_preempt_in_a_query_of_a_nested_machine_ends_all():
     with outer:
         smach.StateMachine.add('INNER', inner, {'done': 'done'})
     machine = Watched(outer, expert=FakeExpert(waits),
-                      settings={'escalate': False, 'deadline_s': 0, 'max_recoveries': 0})
+                      settings={'deadline_s': 0, 'max_recoveries': 0})
     asked = threading.Event()
     machine.machine.events.observers.append(
         lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)

@@ -1,4 +1,6 @@
 """A running machine that an operator sends to a state, with the checks of an expert's jump."""
+import threading
+
 import pytest
 from held_machines import Gate, Held, eventually
 from machines import FakeExpert, Scripted, chain_of, contents, goto
@@ -197,3 +199,92 @@ def test_a_preempt_comes_before_a_jump() -> None:
         held.hand.preempt()
         assert (held.end(), third.runs) == ('preempted', 0)
     assert not held.of(EventKind.SENT)
+
+
+def nested(**states):
+    """A machine of these states, each of which leads to the next."""
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    labels = list(states)
+    with machine:
+        for label, following in zip(labels, labels[1:] + ['done']):
+            good = 'ok' if isinstance(states[label], Scripted) else 'done'
+            smach.StateMachine.add(label, states[label], {good: following})
+    return machine
+
+
+def test_it_can_be_sent_into_the_middle_of_a_machine_that_does_not_run() -> None:
+    gate, look, aim = Gate(), Scripted(), Scripted()
+    between = Scripted()
+    machine = nested(FIRST=Scripted(gate), BETWEEN=between, SEE=nested(ARM=nested(AIM=aim,
+                                                                                  LOOK=look)))
+    with Held(machine).begin() as held:
+        assert gate.entered.wait(20)
+        assert held.hand.go_to('SM_ROOT/SEE/ARM', 'LOOK', 'eva') == (
+            'SM_ROOT goes to SM_ROOT/SEE/ARM/LOOK once FIRST has ended')
+        assert held.hand.status().jumps == {'SM_ROOT': 'SM_ROOT/SEE/ARM/LOOK'}
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert (between.runs, aim.runs, look.runs) == (0, 0, 1)
+    sent, = held.of(EventKind.SENT)
+    assert (sent.path, sent.state, sent.target) == ('SM_ROOT', 'BETWEEN', 'SEE')
+    assert sent.data['to'] == 'SM_ROOT/SEE/ARM/LOOK'
+    assert held.machine.execute() == 'done' and aim.runs == 1, 'later it begins at its own start'
+
+
+def test_a_paused_machine_goes_into_another_container_and_waits_on_the_way() -> None:
+    held = Held(nested(FIRST=Scripted(), SEE=nested(AIM=Scripted(), LOOK=Scripted())))
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/FIRST')
+        assert held.hand.go_to('SM_ROOT/SEE', 'LOOK') == (
+            'SM_ROOT goes to SM_ROOT/SEE/LOOK instead of FIRST, where it waits')
+        held.waits_before('SM_ROOT/SEE')
+        held.hand.step()
+        held.waits_before('SM_ROOT/SEE/LOOK')
+        held.hand.resume()
+        assert held.end() == 'done'
+
+
+def test_a_jump_into_another_container_has_the_checks_of_an_experts_jump() -> None:
+    gate = Gate()
+    pour = Scripted()
+    machine = nested(SEE=nested(POUR=pour, LOOK=Scripted(input_keys=['lamp'])),
+                     WAIT=Scripted(gate), LAST=Scripted())
+    held = Held(machine, settings={'states': {'POUR': {'on_retry': 'confirm'}}})
+    with held.begin():
+        assert gate.entered.wait(20)
+        with pytest.raises(OperatorError, match='may repeat SEE/POUR: confirm that it may'):
+            held.hand.go_to('SM_ROOT/SEE', 'POUR')
+        assert held.hand.go_to('SM_ROOT/SEE', 'LOOK', confirm_repeats=True).endswith(
+            '; without its input keys lamp; it may repeat SEE/POUR')
+        held.hand.go_to('SM_ROOT/SEE', 'POUR', confirm_repeats=True)
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert pour.runs == 2
+
+
+@pytest.mark.parametrize('command, told', [
+    ('resume', 'runs now: C in SM_ROOT'), ('step', 'runs now: C in SM_ROOT'),
+    ('confirm', 'runs now: C in SM_ROOT once it is resumed')])
+def test_a_command_right_after_a_jump_finds_what_waits_where_it_leads(command, told) -> None:
+    """The machine is on its way meanwhile: a callback of its author's takes its time."""
+    on_its_way, let_go = threading.Event(), threading.Event()
+
+    def callback(userdata, active, *args) -> None:
+        if active == ['C']:
+            on_its_way.set()
+            assert let_go.wait(20)
+
+    machine = chain_of(Scripted(), Scripted(), Scripted())
+    machine.register_transition_cb(callback)
+    held = Held(machine, settings={'states': {'C': {'autonomy': 'confirm'}}}
+                if command == 'confirm' else {})
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        held.hand.go_to('', 'C')
+        assert on_its_way.wait(20)
+        threading.Timer(0.05, let_go.set).start()  # no command tells that it has begun to wait
+        assert getattr(held.hand, command)() == told
+        held.hand.resume()
+        assert held.end() == 'done'

@@ -149,7 +149,7 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'failing_outcomes', 'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys',
         'time_limit_s', 'grace_period_s', 'on_retry', 'autonomy', 'budget', 'deadline_s',
         'on_no_answer',
-        'escalate', 'still_running_s', 'still_running_factor', 'watch_preconditions',
-        'history_length', 'rates_file', 'oracle_label', 'nested', 'interfaces', 'states',
-        'healthy', 'health_settle_s'
+        'escalate', 'step_back_across', 'still_running_s', 'still_running_factor',
+        'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
+        'interfaces', 'states', 'healthy', 'health_settle_s'
     }

@@ -124,11 +124,17 @@ MISTAKES = [
     (precondition('HOEM'), "line 3: states.PICK.preconditions: 'HOEM' is not allowed; allowed: "
      'the labels of the other states there: HOME'),
     (precondition('PICK'), "'PICK' is not allowed"),
+    (precondition('/HOEM'), "'/HOEM' is not allowed"),
     (precondition('{check: "python:checks:clear", achieve: HOEM}'), "'HOEM' is not allowed"),
     ('oracle_label: PICK\n', "line 1: oracle_label: 'PICK' is not allowed; allowed: a name that is "
      'no state or outcome of TASK'),
     ('oracle_label: succeeded\n', "oracle_label: 'succeeded' is not allowed"),
 ]
+
+
+def test_a_path_of_the_machine_is_believed(run):
+    code, out, errors = run(precondition('/HOME'))
+    assert (code, out.count('STATE RUNS')) == (0, 2), errors
 
 
 @pytest.mark.parametrize('settings, text', MISTAKES)

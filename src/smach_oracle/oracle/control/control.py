@@ -12,6 +12,8 @@ from .path_pattern import PathPattern
 
 _LOOK_PERIOD_S = 0.05  # how soon a wait sees a preempt or a shutdown, of which nobody tells it
 
+_SETTLE_S = 1.0  # how long a command waits at most for a container that is being sent
+
 EndedBy = Callable[[], Optional[LetGo]]
 
 
@@ -23,13 +25,21 @@ class Engine(Protocol):
 
 
 class Jump(NamedTuple):
-    """A state to which a container goes at its next state boundary."""
+    """A state to which a container goes at its next state boundary.
+
+    `container`: path of the container of the state; '': it is the one that goes.
+    """
 
     state: str
     by: str = ''
     text: str = ''
     repeats: Tuple[str, ...] = ()  # the guarded states of which it was confirmed that they repeat
     written: Tuple[str, ...] = ()  # userdata keys that were written for it
+    container: str = ''
+
+    def named(self) -> str:
+        """Return the state, with the path of its container where that is another one."""
+        return '{}/{}'.format(self.container, self.state) if self.container else self.state
 
 
 class Control:
@@ -45,6 +55,8 @@ class Control:
         self._jumps: Dict[str, Jump] = {}
         self._breakpoints: Dict[str, PathPattern] = {}
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
+        # where containers go, by key, that are sent from where they wait
+        self._moving: Dict[str, HeldPlace] = {}
         self._stopping = False  # an operator has asked the machine to stop
         self.paused = False
         self.paused_by = ''
@@ -57,6 +69,7 @@ class Control:
         """A pause, breakpoints and levels stay from the trial before; jumps do not."""
         with self._changed:
             self._jumps.clear()
+            self._moving.clear()
             self.in_trial = True
             self._note_change()
 
@@ -76,6 +89,7 @@ class Control:
         """Forget a machine whose execution is over; return the jump that it has not made."""
         with self._changed:
             self._engines.pop(id(engine), None)
+            self._note_arrived(path)
             return self._pop_jump(path)
 
     def calm(self, engine: Engine) -> None:
@@ -110,7 +124,9 @@ class Control:
     def begin(self, hold: Hold) -> None:
         """Show that a container waits; the operator may let it go from now on."""
         with self._changed:
+            self._judge_level(hold)  # it may have been set since it was looked up
             self._holds.append(hold)
+            self._note_arrived(hold.key)
 
     def end(self, hold: Hold) -> None:
         """Show that it waits no more."""
@@ -155,6 +171,15 @@ class Control:
                 return level
         return default
 
+    def arrived(self, path: str) -> None:
+        """Note that a container does not wait any more, or waits elsewhere."""
+        with self._changed:
+            self._note_arrived(path)
+
+    def _note_arrived(self, path: str) -> None:
+        if self._moving.pop(path, None) is not None:
+            self._note_change()
+
     def take_jump(self, path: str) -> Optional[Jump]:
         """Return where the container at `path` is to go, once."""
         with self._changed:
@@ -183,12 +208,18 @@ class Control:
             self._note_change()
 
     def resume(self) -> Tuple[Hold, ...]:
-        """Lift the pause; return what waited because of it."""
+        """Lift the pause; return what waited because of it, or was sent from where it waited."""
         with self._changed:
-            held = self._held('')
+            held, moving = self._held(''), dict(self._moving) if self.paused else {}
             self.paused, self.paused_by = False, ''
             self._note_change()
-            return held
+            if not moving:
+                return held
+            self._settle()
+            now = [each for each in self._held('') if each.key in moving]
+            return (*held, *now, *(Hold(place, HeldBy.PAUSE, False)
+                                   for key, place in moving.items()
+                                   if not any(each.key == key for each in now)))
 
     def step(self, path: str = '') -> Tuple[Hold, ...]:
         """Let what waits enter one state each, also what waits for a confirmation.
@@ -197,6 +228,7 @@ class Control:
         :returns: what goes on.
         """
         with self._changed:
+            self._settle()
             held = self._held(path)
             for hold in held:
                 hold.stepped = True
@@ -209,11 +241,16 @@ class Control:
         :param path: of the container; '': every one.
         """
         with self._changed:
+            self._settle()
             held = tuple(each for each in self._held(path) if each.waits_for_confirmation)
             for hold in held:
                 hold.confirmed = True
             self._changed.notify_all()
             return held
+
+    def _settle(self) -> None:
+        """Wait a moment for containers that were just sent from where they waited."""
+        self._changed.wait_for(lambda: not self._moving, _SETTLE_S)
 
     def _held(self, path: str) -> Tuple[Hold, ...]:
         return tuple(each for each in self._holds
@@ -230,6 +267,9 @@ class Control:
         A later wish for the same container takes the place of an earlier one.
         """
         with self._changed:
+            for hold in self._held(''):
+                if hold.may_be_sent and hold.key == path:
+                    self._moving[path] = HeldPlace(jump.container or hold.place.path, jump.state)
             self._jumps[path] = jump
             self._note_change()
 
@@ -267,8 +307,12 @@ class Control:
                 self._levels[pattern.text] = (pattern, level)
             for hold in self._holds:
                 if pattern.matches(*hold.place):
-                    hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
+                    self._judge_level(hold)
             self._note_change()
+
+    def _judge_level(self, hold: Hold) -> None:
+        if hold.asks:
+            hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
 
     def levels(self) -> Dict[str, str]:
         """Return the autonomy that was set at run time, by pattern."""
@@ -277,7 +321,8 @@ class Control:
 
     def _note_change(self) -> None:
         """Wake who waits, and have machines look that execute."""
-        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps)
+        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps
+                           or self._moving)
         if self.is_set:
             for engine in list(self._engines.values()):
                 engine.attentive = True

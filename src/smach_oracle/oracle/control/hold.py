@@ -38,7 +38,7 @@ class Hold:
     """One wait; `Control` alone writes to it."""
 
     __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent',
-                 'autonomy', 'key')
+                 'asks', 'autonomy', 'key')
 
     def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
         self.place = place
@@ -47,7 +47,8 @@ class Hold:
         self.confirmed = False
         self.stepped = False
         self.may_be_sent = True  # whether the container can go to another state from here
-        self.autonomy = ''  # of the state, by its settings
+        self.asks = True  # whether the autonomy of its state counts
+        self.autonomy = ''  # that by its settings
         self.key = place.path  # by which jumps of the container are asked for
 
     @property

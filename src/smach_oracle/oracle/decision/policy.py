@@ -32,7 +32,9 @@ class FailureContext(NamedTuple):
     """What the visits before say about a failure of `state`."""
 
     state: str
-    initial: str  # the container's initial state
+    # where a step back leads if nothing was before: the container's initial state, or with
+    # `step_back_across` the path of the state that ran before in a container above
+    initial: str
     failed_last: bool  # the container's most recent failure of this trial was of `state`
     failing_since: bool  # and `state` has not succeeded since
     unconditioned: Optional[str]  # state of the latest earlier visit that has no preconditions
@@ -65,7 +67,11 @@ class Policy:
         raise NotImplementedError
 
     def step_back_target(self, context: FailureContext) -> str:
-        """Return the state that a step back leads to."""
+        """Return the state that a step back leads to.
+
+        It is a label of the container, or a path below the top machine, such as KITCHEN/LOOK or
+        /HOME.
+        """
         raise NotImplementedError
 
 

@@ -6,8 +6,10 @@ from ..machine.tree_node import TreeNode
 from ..places.way import Way
 from ..records.facts import LEFT
 from ..records.state_record import StateRecord
+from ..records.visits import VisitResult
 from ..recovery.arrival_recovery import ArrivalRecovery
 from ..recovery.failure import Failure
+from ..recovery.verdict import VerdictKind
 from .departure import Departure
 from .oracle_visit import OracleVisit
 
@@ -35,7 +37,15 @@ class ArrivingVisit(OracleVisit):
         if why_not:
             verdict = self._recover(meta, ArrivalRecovery(
                 self._node, self._record, self._failure, context, why_not))
+        if verdict.kind is VerdictKind.SUPERSEDE:
+            self._note_superseded(verdict.outcome)
         return self._leave(meta, verdict)
+
+    def _note_superseded(self, outcome: str) -> None:
+        if self._departure.result_of(self._node) is VisitResult.FAILURE:
+            super()._note_superseded(outcome)
+        else:
+            self._node.records.history.count_superseded(outcome)
 
     def _across(self, way: Way) -> Mapping[str, str]:
         return {'from': self._departure.failed, **super()._across(way)}

@@ -57,7 +57,9 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     hold = control.hold_before(place, level == CONFIRM_FIRST and not was_preempted,
                                not (stops or was_preempted))
     if hold is not None:
-        hold.autonomy, hold.key = autonomy, node.key
+        hold.autonomy, hold.key, hold.asks = autonomy, node.key, not was_preempted
+    else:
+        control.arrived(node.key)
     if hold is not None and (stops or (was_preempted and control.paused)):
         return _end_preempted(node)
     if level == ANNOUNCE:

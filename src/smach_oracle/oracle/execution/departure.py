@@ -49,7 +49,7 @@ class Departure:
 
     def result_of(self, node: TreeNode) -> VisitResult:
         """Return how the visit counts that a container was in when it was left."""
-        decided_there = self.verdict.is_failure_above and self.arrives_at is node
+        decided_there = self.verdict.decided_by is node
         return VisitResult.FAILURE if decided_there else VisitResult.PREEMPTED
 
 
@@ -94,7 +94,7 @@ def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
 def _claim(nodes: List[TreeNode], departure: Departure) -> bool:
     tree = departure.arrives_at.tree
     with tree.departures_lock:
-        if any(isinstance(each.departure, Departure) for each in nodes):
+        if any(each.departure is not None for each in nodes):
             return False
         for each in nodes:
             each.departure = departure
@@ -107,9 +107,9 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> bool:
 
 def take_departure(node: TreeNode) -> Optional[Departure]:
     """Return the departure that the end of the present state is part of, once."""
-    departure = node.departure
+    departure = cast(Optional[Departure], node.departure)
     node.departure = None
-    if not isinstance(departure, Departure):
+    if departure is None:
         return None
     stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
     return None if stopped or node.is_left_behind() else departure

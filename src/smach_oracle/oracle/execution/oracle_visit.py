@@ -6,11 +6,10 @@ import smach
 from ..asking.question import Answer
 from ..decision.policy import FailureContext
 from ..machine.learned_rates import save_rates
-from ..machine.repeats import leave_for, note_superseded
-from ..machine.snapshots import restore
+from ..machine.repeats import note_superseded
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
-from ..places.way import Way, missing_on
+from ..places.way import Way
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
@@ -20,7 +19,7 @@ from ..recovery.recovery import Recovery
 from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
 from .departure import depart, leaving_outcome
-from .going_on import ask_to_go_on
+from .entering import prepare_entry
 from .oracle_state import OracleState
 from .transitions import go_to, message_of, terminate
 
@@ -56,8 +55,11 @@ class OracleVisit:
         `outcome`: with what it ended then. It returns, and raises, what `run` does.
         """
         meta = self._pass_to_meta(outcome, outcome or 'taken_out')
-        return self._leave(meta, self._recover(meta, TakenOutRecovery(
-            self._node, self._record, self._failure, context, answer)))
+        verdict = self._recover(meta, TakenOutRecovery(
+            self._node, self._record, self._failure, context, answer))
+        if verdict.kind is VerdictKind.SUPERSEDE:
+            self._node.records.history.count_superseded(verdict.outcome)
+        return self._leave(meta, verdict)
 
     def _enter(self) -> OracleState:
         self._tell_failure()
@@ -144,24 +146,10 @@ class OracleVisit:
         return self._terminate(self._leaving())
 
     def _jump(self, way: Way, verdict: Verdict) -> None:
-        node, target = self._node, way.first
-        snapshot = node.record(target).snapshot
-        missing = missing_on(way, verdict.written)
-        restores = snapshot if node.settings.userdata == 'restore' else None
-        if restores is not None:
-            restore(self._machine.userdata._data, restores, verdict.written,
-                    node.in_force.deep_copy_keys)
-        leave_for(node, target, way.down[1:])
-        for place in way.down:
-            ask_to_go_on(place.node, place.label)
-        if missing:
-            place = way.down[-1]
-            place.node.warn('jumping there without its input keys {}'.format(', '.join(missing)),
-                            place.label)
-        self._note_entry(target)
-        node.record(target).go_down(way.down[1:])
-        self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,
-                    verdict.text, self._across(way))
+        entry = prepare_entry(way, verdict.written, 'jumping')
+        self._note_entry(way.first)
+        self._go_on(way.first, entry.userdata, entry.missing, verdict.by, verdict.text,
+                    self._across(way))
 
     def _across(self, way: Way) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""
@@ -189,8 +177,7 @@ class OracleVisit:
         node.gave_up = ending.state is None
         node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
                   target=ending.state or '', by=verdict.by, text=told)
-        if ending.error is not None:
-            smach.logerr(str(ending.error))
+        if ending.error is not None:  # SMACH has logged it where it was made
             raise ending.error
         if ending.state is not None:
             self._go_on(ending.state, by=verdict.by, text=text)

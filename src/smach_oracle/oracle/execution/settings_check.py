@@ -6,6 +6,7 @@ import smach
 from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
 from ..machine.tree_node import TreeNode
+from ..places.fitness import allowed_for, why_unfit
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec
 
@@ -54,19 +55,20 @@ def _named_states(top: TreeNode) -> List[Tuple[str, str]]:
 
 
 def check_preconditions(node: TreeNode) -> None:
-    """Check that preconditions name other states of their container.
+    """Check that preconditions name states that can be run for the state.
+
+    These are others of its container by label, and states of other containers by path.
 
     :raises SettingsError: where one does not; it is logged instead where the node is not strict.
     """
     for label in node.labels():
         for spec in _preconditions_of(node, label):
             for named in spec.labels():
-                if (named not in node.machine._states or named == label
-                        or node.is_oracle(named)):
-                    others = ', '.join(sorted(other for other in node.labels() if other != label))
+                why_not = why_unfit(node, label, named)
+                if why_not:
                     _refuse(node, SettingsError(
                         'states.{}.preconditions'.format(label), named,
-                        'the labels of the other states of {}: {}'.format(node.path, others)))
+                        '{} ({})'.format(allowed_for(node, label), why_not)))
 
 
 def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:

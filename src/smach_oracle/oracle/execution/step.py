@@ -11,6 +11,7 @@ from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
 from ..machine.workers import recall_preempts
+from ..places.stepping_back import failure_context
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
 from ..records.state_record import StateRecord
@@ -243,8 +244,7 @@ class Step:
 
     def _context(self) -> FailureContext:
         """Return what the visits so far say about a failure of the state."""
-        return self._node.records.failure_context(self._record,
-                                                  self._machine._initial_state_label or '')
+        return failure_context(self._node, self._record)
 
     def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
         """Count the failure and recover from it; `why_unwell`: the robot is not well."""

@@ -72,6 +72,14 @@ class BranchPort(Protocol):
         """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
 
 
+class DeparturePort(Protocol):
+    """A verdict that leaves containers for a level above (`execution.departure`)."""
+
+    @property
+    def arrives_at(self) -> 'TreeNode':
+        """That level."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -98,12 +106,12 @@ class TreeNode:
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
-        # where a verdict from below or here ends the present state (execution.departure)
-        self.departure: object = None
+        # where a verdict from below or here ends the present state
+        self.departure: Optional[DeparturePort] = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
         self.gave_up = False  # the latest execution ended so
-        # a state that is executed as a precondition now
-        self.as_precondition: Optional[smach.State] = None
+        # the states that are executed as preconditions now
+        self.as_preconditions: Tuple[smach.State, ...] = ()
         self.join(tree)
 
     def take_name(self, name: str) -> None:
@@ -208,9 +216,10 @@ class TreeNode:
         settings = self.in_force.of_state(self.relative_path, label)
         if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
             return settings
-        # beside a branch is no state that could be run for it
+        # beside a branch is no state that could be run for it; a path names one elsewhere
         return replace(settings, preconditions=tuple(
-            spec for spec in settings.preconditions if not spec.labels()))
+            spec for spec in settings.preconditions
+            if all('/' in label for label in spec.labels())))
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""
@@ -239,6 +248,20 @@ class TreeNode:
         return record
 
     # -- what goes on
+
+    def begin_precondition(self, state: smach.State) -> bool:
+        """Note that a state is executed as a precondition; False where it is so already."""
+        with self.tree.departures_lock:
+            is_free = not any(each is state for each in self.as_preconditions)
+            if is_free:
+                self.as_preconditions += (state,)
+            return is_free
+
+    def end_precondition(self, state: smach.State) -> None:
+        """Note that it has ended."""
+        with self.tree.departures_lock:
+            self.as_preconditions = tuple(each for each in self.as_preconditions
+                                          if each is not state)
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""

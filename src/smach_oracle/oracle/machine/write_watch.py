@@ -53,7 +53,7 @@ class WriteWatch:
         """
         data = self._machine.userdata._data
         if getattr(self._machine, 'shares_userdata', False):
-            self._take_back_own(begun)
+            self.take_back_own(begun)
             return
         for key, value in begun.data.items():
             if key in begun.prints and fingerprint(value) != begun.prints[key]:
@@ -65,7 +65,7 @@ class WriteWatch:
             del data[key]
         self.gate.written.clear()
 
-    def _take_back_own(self, begun: UserdataMark) -> None:
+    def take_back_own(self, begun: UserdataMark) -> None:
         """Take back what passed the gate alone: others write the userdata at the same time."""
         data = self._machine.userdata._data
         for key in self.gate.written:

@@ -1,6 +1,7 @@
 """Places: the states of all containers of a tree."""
 from typing import Iterator, NamedTuple, Optional
 
+from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from .levels import nodes_of_tree
 
@@ -35,15 +36,18 @@ def place_at(node: TreeNode, container: str, label: str) -> Optional[Place]:
     return None
 
 
-def place_named(node: TreeNode, name: str) -> Optional[Place]:
+def place_named(node: TreeNode, name: str, at_rest: bool = False) -> Optional[Place]:
     """Return the place that a setting names, None where there is none.
 
-    :param name: a label of the container itself, or the path of a state below the top machine.
+    :param name: a label of the container itself, or the path of a state below the top machine,
+        which may begin with '/'.
+    :param at_rest: whether the whole tree is looked through, and not what is being executed.
     """
     if name in node.labels():
         return Place(node, name)
-    for each in nodes_of_tree(node):
+    path = name[1:] if name.startswith('/') else name
+    for each in nodes_of(node.top().machine) if at_rest else nodes_of_tree(node):
         above = each.relative_path + '/' if each.relative_path else ''
-        if name.startswith(above) and name[len(above):] in each.labels():
-            return Place(each, name[len(above):])
+        if path.startswith(above) and path[len(above):] in each.labels():
+            return Place(each, path[len(above):])
     return None

@@ -1,12 +1,10 @@
 """The way from a failure to a place, and what is told of it before the machine goes there."""
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
+from typing import Iterable, List, NamedTuple, Optional, Set, Tuple
 
-import smach
-
-from ..machine.protocols import Machine
 from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import constants_of, keys_after_jump
+from ..machine.userdata_view import keys_after_jump, missing_keys
+from .handing_over import links_to
 from .levels import levels_above
 from .place import Place
 
@@ -54,6 +52,16 @@ def why_closed_on(way: Way) -> str:
     return ''
 
 
+def closed_in_words(way: Way, name: str) -> str:
+    """Say that a place of this name, or what lies on the way down, is closed; '' where it is not.
+
+    It is a clause.
+    """
+    why = why_closed_on(way)
+    # of what lies on the way down it names the path
+    return '{} {}'.format(name, why) if why and not why.startswith(way.meets.path) else why
+
+
 def repeated_on(way: Way) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a place."""
     return repeated_by_going_to(way.meets, way.first)
@@ -65,35 +73,20 @@ def missing_on(way: Way, written: Iterable[str]) -> Tuple[str, ...]:
     :param written: keys of the container `meets` that survive a restore.
     """
     keys = set(keys_after_jump(way.meets, way.first, tuple(written)))
-    for above, below in zip(way.down, way.down[1:]):
-        keys = _keys_below(above.node, below.node, keys)
+    for below in way.down[1:]:
+        keys = _keys_below(below.node, keys)
     node, label = way.down[-1]
-    present = keys.union(constants_of(node.machine, label))
-    return tuple(sorted(_missing(node.machine, label, node.machine._states[label], present)))
+    return missing_keys(node.machine, label, keys)
 
 
-def _missing(machine: Machine, label: str, state: smach.State, present: Set[str]) -> List[str]:
-    remapping = machine._remappings.get(label) or {}
-    return [key for key in state.get_registered_input_keys()
-            if remapping.get(key, key) not in present]
-
-
-def _keys_below(above: TreeNode, below: TreeNode, keys: Set[str]) -> Set[str]:
+def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
     """Return the userdata keys of a container when it begins, from those of the one above it."""
-    container: Any = above.machine
-    for label in below.below:
-        child: Any = _child(container, label)
-        remapping: Dict[str, str] = (getattr(container, '_remappings', None) or {}).get(label) or {}
+    for link in links_to(below):
+        child = link.below
         keys = set(child.userdata._data).union(
-            key for key in child.get_registered_input_keys() if remapping.get(key, key) in keys)
+            key for key in child.get_registered_input_keys()
+            if link.remapping.get(key, key) in keys)
         item = getattr(child, '_items_label', None)
         if item is not None:  # an Iterator: its state works on its own userdata
             keys.add(item)
-        container = child
     return keys
-
-
-def _child(container: Any, label: str) -> Any:
-    if isinstance(container, smach.StateMachine):
-        return container._states[label]
-    return container.get_children()[label]

@@ -116,8 +116,12 @@ class History:
         self._streak = _Streak(state, successes, anchor, True)
 
     def supersede(self, outcome: str) -> None:
-        """Count the latest visit as neither success nor failure: an expert did its work."""
+        """Count the latest visit, a failure, as neither: an expert did its work."""
         self._streak = self._before
+        self.count_superseded(outcome)
+
+    def count_superseded(self, outcome: str) -> None:
+        """Count the latest visit, which was no failure, as one whose work an expert did."""
         self.visits[-1] = self.visits[-1]._replace(outcome=outcome, result=VisitResult.SUPERSEDED)
 
     def _latest_other(self, state: str) -> Optional[str]:

@@ -3,11 +3,11 @@ from typing import Any, List, Optional, Tuple
 
 from ..decision.policy import Action, FailureContext, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, going_would_repeat
-from ..machine.repeats import has_visited, why_closed
+from ..machine.repeats import has_visited
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
-from ..places.place import Place
-from ..places.way import Way, repeated_on
+from ..places.place import Place, place_named
+from ..places.way import Way, closed_in_words, repeated_on, way_to
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.state_record import StateRecord
@@ -40,6 +40,7 @@ class Deciding:
         self.watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, record.settings, self.watch)
         self.tried: List[str] = []
+        self.way: Optional[Way] = None  # that was decided on
 
     def cancel(self) -> None:
         """Preempt the precondition that runs."""
@@ -60,51 +61,65 @@ class Deciding:
         if spent:
             return Decider.BUDGET, self.facts_of(ask, blocked=spent)
         if record.settings.on_retry != ALLOW:
-            return Decider.ON_RETRY, self.facts_of(ask, blocked=self.why_repeats(record.label))
+            return Decider.ON_RETRY, self.facts_of(ask, blocked=self._why_repeats(record.label))
         return None
 
     def _follow_policy(self) -> Decided:
         record, policy = self._record, self._node.in_force.policy
         preconditions = self._run_preconditions()
         action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
-        target = ''
-        if action is not Action.ASK:
-            target = (record.label if action is Action.REVISIT
-                      else policy.step_back_target(self._context))
-        decider, why_not = self._what_prevents(target) if target else (Decider.POLICY, '')
+        if action is Action.ASK:
+            return Decider.POLICY, self.facts_of(action)
+        name = (record.label if action is Action.REVISIT
+                else policy.step_back_target(self._context))
+        way = self._way_to(name)
+        if way is None:
+            return Decider.POLICY, self.facts_of(
+                Action.ASK, blocked='there is no state {!r} to go back to'.format(name))
+        decider, why_not = self._what_prevents(way)
         if why_not:
-            action, target = Action.ASK, ''
-        return decider, self.facts_of(action, target=target, blocked=why_not)
+            return decider, self.facts_of(Action.ASK, blocked=why_not)
+        self.way = way
+        return decider, self.facts_of(action, target=self._named(way))
 
-    def _what_prevents(self, target: str) -> Tuple[Decider, str]:
-        """Spend a recovery on going to a state; or return what prevents it, and why."""
-        for decider, why_not in ((Decider.ON_RETRY, self.why_repeats),
+    def _way_to(self, name: str) -> Optional[Way]:
+        """Return the way to a state by its label, or its path below the top machine."""
+        place = place_named(self._node, name)
+        return way_to(self._node, place) if place is not None else None
+
+    def _named(self, way: Way) -> str:
+        """Return the label of a place, or its path where it is in another container."""
+        place = way.down[-1]
+        return place.label if place.node is self._node else place.path
+
+    def _what_prevents(self, way: Way) -> Tuple[Decider, str]:
+        """Spend a recovery on going to a place; or return what prevents it, and why."""
+        for decider, why_not in ((Decider.ON_RETRY, self.why_repeats_on),
                                  (Decider.POLICY, self._why_not)):
-            reason = why_not(target)
+            reason = why_not(way)
             if reason:
                 return decider, reason
         spent = self._budget.take_recovery()
         return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
 
-    def why_repeats(self, target: str) -> str:
+    def _why_repeats(self, label: str) -> str:
         """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
-        return self.why_repeats_on(Way((), self._node, (Place(self._node, target),)))
+        return self.why_repeats_on(Way((), self._node, (Place(self._node, label),)))
 
     def why_repeats_on(self, way: Way) -> str:
         """Say what would be repeated if the machine went to a place by itself; '' if nothing."""
         repeated, place = repeated_on(way), way.down[-1]
         if not repeated:
             return ''
-        target = place.label if place.node is self._node else place.path
+        target = self._named(way)
         if not has_visited(place.node, place.label):
             return 'this trial has not been in {}, and going there may repeat {}'.format(
                 target, ', '.join(repeated))
         return going_would_repeat(self._record.label, target, repeated)
 
-    def _why_not(self, target: str) -> str:
-        """Return why the machine cannot go on to a state by itself now, '' where it can."""
-        blocked = why_closed(self._node, target)
-        return '{} {}'.format(target, blocked) if blocked else self._function_that_runs()
+    def _why_not(self, way: Way) -> str:
+        """Return why the machine cannot go on to a place by itself now, '' where it can."""
+        return closed_in_words(way, self._named(way)) or self._function_that_runs()
 
     def _function_that_runs(self) -> str:
         """Return which function among the preconditions was left behind and runs, '' for none."""

@@ -1,6 +1,6 @@
 """Judges how a state has ended: where its outcome leads, or what kind of failure it is."""
-from functools import partial
-from typing import Any, NamedTuple, Optional, Union
+from functools import lru_cache, partial
+from typing import Any, Callable, NamedTuple, Optional, Union
 
 import smach
 
@@ -49,7 +49,7 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
     if error is not None:
         return Failure(label, FailureKind.EXCEPTION, '',
                        '{}: {}'.format(type(error).__name__, error), None,
-                       partial(raised_error, label, state, error), traceback_of(error))
+                       _once(partial(raised_error, label, state, error)), traceback_of(error))
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
     if isinstance(outcome, HeldBack):
@@ -62,7 +62,7 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
                            Route(outcome, False))
         return Failure(label, FailureKind.UNREGISTERED_OUTCOME,
                        outcome if isinstance(outcome, str) else '', text, None,
-                       partial(smach.InvalidTransitionError, text))
+                       _once(partial(smach.InvalidTransitionError, text)))
     route = route_of(machine, label, outcome)
     kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:
@@ -70,7 +70,13 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
     if route.target:
         return Failure(label, kind, outcome, _description(node, label, state), route)
     text = unbound_text(label, outcome, machine.get_registered_outcomes())
-    return Failure(label, kind, outcome, text, route, partial(smach.InvalidTransitionError, text))
+    return Failure(label, kind, outcome, text, route,
+                   _once(partial(smach.InvalidTransitionError, text)))
+
+
+def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
+    """Have an error made once: SMACH logs each that is made."""
+    return lru_cache(maxsize=1)(make)
 
 
 def _description(node: TreeNode, label: str, state: smach.State) -> str:

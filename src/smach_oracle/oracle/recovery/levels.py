@@ -1,20 +1,27 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
-from typing import Any, FrozenSet, List, NamedTuple, Optional
+from typing import Any, FrozenSet, List, NamedTuple, Optional, Tuple
 
 import smach
 
-from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..places.levels import is_direct, levels_above
 from ..places.place import Place
+from ..places.stepping_back import failure_context
 from ..places.way import Way, way_to
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
 from .deciding import Deciding
-from .failure import ContainerEnding, Failure, author_recovers, failure_kind, route_of
+from .failure import (
+    ContainerEnding,
+    Failure,
+    Route,
+    author_recovers,
+    failure_kind,
+    route_of,
+)
 from .stop import RecoveryStop
 
 
@@ -24,22 +31,27 @@ def _is_overridden(above: TreeNode, below: Labels) -> bool:
     return above.in_force.of_state(path, below[-1]).author_recoveries == 'override'
 
 
-def passed_over(node: TreeNode, ending: ContainerEnding) -> str:
-    """Return the outcome with which an Iterator around a container goes on, '' for none."""
-    above = next(levels_above(node), None)
-    if above is None or is_direct(node) or node.branch is not None or ending.outcome is None:
-        return ''
+class Foreseen(NamedTuple):
+    """Why the end of a container is left to who is above it."""
+
+    text: str
+    passed_over: str = ''  # the outcome with which an item of an Iterator is passed over
+
+
+def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
+    """Whether an Iterator around a container goes on after it has ended with an outcome."""
+    if node.branch is not None:
+        return False
     around: Any = above.machine._states[node.below[0]]
     for label in node.below[1:-1]:
         around = around.get_children()[label]
-    goes_on = (isinstance(around, smach.Iterator) and ending.outcome in around._loop_outcomes
-               and not _is_overridden(above, node.below))
     # what only the settings call a failure its author has not foreseen
-    return ending.outcome if goes_on and ending.outcome in node.in_force.failing else ''
+    return (isinstance(around, smach.Iterator) and outcome in around._loop_outcomes
+            and not _is_overridden(above, node.below) and outcome in node.in_force.failing)
 
 
-def foreseen_above(node: TreeNode, ending: ContainerEnding) -> str:
-    """Return which transition of the author's recovers from the end of a container, '' for none.
+def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen]:
+    """Return what the author has drawn after the end of a container, None where that is nothing.
 
     It may be one of any level above: a failing outcome falls through from one to the next. Where a
     Concurrence lies between, nobody knows before it has ended.
@@ -48,23 +60,29 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> str:
     while outcome is not None and node.parent is not None:
         above = node.parent
         if above is not next(levels_above(node), None):
-            return ''
+            return None
         if not is_direct(node):
-            goes_on = passed_over(node, ContainerEnding(outcome=outcome))
-            return '{} {} -> the next item'.format(node.path, outcome) if goes_on else ''
+            return (Foreseen('{} {} -> the next item'.format(node.path, outcome), outcome)
+                    if _is_passed_over(node, above, outcome) else None)
         label = node.below[0]
-        settings = above.settings_of(label)
-        route = route_of(above.machine, label, outcome)
-        kind = failure_kind(outcome, route, settings.failure_outcomes, above.in_force.failing)
+        route, kind = _judged_above(above, label, outcome)
         if kind is FailureKind.NOT_A_FAILURE or not route.target:
-            return ''
+            return None
+        settings = above.settings_of(label)
         if author_recovers(outcome, route, kind, settings.failure_outcomes,
                            settings.author_recoveries):
-            return '{}/{} {} -> {}'.format(above.path, label, outcome, route.target)
+            return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
         if route.is_state:  # `author_recoveries: override`
-            return ''
+            return None
         node, outcome = above, route.target
-    return ''
+    return None
+
+
+def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, FailureKind]:
+    """Return where the end of a container leads on the level above, and what it is there."""
+    route = route_of(above.machine, label, outcome)
+    return route, failure_kind(outcome, route, above.settings_of(label).failure_outcomes,
+                               above.in_force.failing)
 
 
 def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
@@ -78,9 +96,7 @@ def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
         return Failure(label, FailureKind.EXCEPTION, '', text, None, lambda: error)
     if ending.outcome is None:
         return None
-    route = route_of(above.machine, label, ending.outcome)
-    kind = failure_kind(ending.outcome, route, above.settings_of(label).failure_outcomes,
-                        above.in_force.failing)
+    route, kind = _judged_above(above, label, ending.outcome)
     if kind is FailureKind.NOT_A_FAILURE:
         return None
     return Failure(label, kind, ending.outcome, text, route)
@@ -89,12 +105,14 @@ def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
 def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
     child, above = node, node.parent
-    while above is not None and above.machine._is_running:
+    while above is not None:
         state = above.machine._states.get(child.below[0])
         label = above.machine._current_label
-        if above.as_precondition is state or (label is not None and above.is_oracle(label)):
+        if any(each is state for each in above.as_preconditions):
             return True
-        if above.machine._current_state is not state:
+        if above.machine._is_running and label is not None and above.is_oracle(label):
+            return True
+        if not above.machine._is_running or above.machine._current_state is not state:
             return False
         child, above = above, above.parent
     return False
@@ -115,9 +133,10 @@ def levels_that_may_decide(node: TreeNode) -> List[TreeNode]:
 class OuterDecision(NamedTuple):
     """A recovery that a level above has decided on.
 
-    `written`: its userdata keys that survive a restore.
+    `written`: userdata keys that survive a restore, where the way ends at that level.
     """
 
+    decided_by: TreeNode
     way: Way
     text: str
     written: FrozenSet[str]
@@ -136,8 +155,7 @@ class OuterLevel:
         self._record: StateRecord = node.record(failure.state)
         self._failure = failure
         self._below = below
-        self._context = node.records.failure_context(self._record,
-                                                     node.machine._initial_state_label or '')
+        self._context = failure_context(node, self._record)
         self._continuous = node.in_force.policy.is_continuous(self._context)
         self._deciding = Deciding(node, self._record, failure, self._context, self._continuous,
                                   stop)
@@ -148,13 +166,17 @@ class OuterLevel:
         self._deciding.cancel()
 
     def decide(self) -> Optional[OuterDecision]:
-        """Return the recovery; None where this level asks too."""
+        """Return the recovery; None where this level asks too, or has been left meanwhile."""
         record = self._record
+        if way_to(self._below, Place(self._node, record.label)) is None:
+            return None
         rate, failure_class = record.rate, record.failure_class
         record.learn(True)
         decider, facts = self._deciding.decide()
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
-        if facts.action is Action.ASK:
+        decided = self._deciding.way
+        way = way_to(self._below, decided.down[-1]) if decided is not None else None
+        if decided is None or way is None:
             record.take_back_failure()
             self.tried.append('{}: {}: asks too'.format(self._node.path, cause_of(facts)))
             return None
@@ -168,10 +190,8 @@ class OuterLevel:
                    failure_class=int(record.failure_class), rate=record.rate,
                    continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
         record.recoveries += 1
-        way = way_to(self._below, Place(self._node, facts.target))
-        if way is None:  # it has been left meanwhile
-            return None
-        return OuterDecision(way, sentence, frozenset(self._deciding.watch.written()))
+        written = () if decided.left else self._deciding.watch.written()
+        return OuterDecision(self._node, way, sentence, frozenset(written))
 
     def _emit(self, kind: EventKind, **fields: object) -> None:
         self._node.emit(kind, state=self._record.label, **fields)

@@ -9,6 +9,7 @@ from typing import List, NamedTuple, Optional
 from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
+from ..places.place import place_named
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 
@@ -70,9 +71,10 @@ class LivePreconditionProbe(PreconditionProbe):
             return PreconditionStatus(None, '{} returned None; True is met'.format(spec.name))
         return PreconditionStatus(bool(result), '{} returned {!r}'.format(spec.name, result)[:300])
 
-    def _last(self, label: str) -> str:
+    def _last(self, name: str) -> str:
+        place = place_named(self._node, name)
+        visits = place.node.records.history.latest() if place is not None else ()
         last: Optional[VisitResult] = next(
-            (visit.result
-             for visit in reversed(self._node.records.history.latest()) if visit.state == label),
-            None)
+            (visit.result for visit in reversed(visits)
+             if place is not None and visit.state == place.label), None)
         return '; its last visit ' + _LAST[last] if last is not None else ''

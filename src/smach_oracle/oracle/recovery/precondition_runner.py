@@ -4,33 +4,39 @@ Runs of preconditions do not count as visits.
 """
 import contextlib
 import threading
-from typing import Any, Iterator, Optional
+from typing import Any, Iterator, List, NamedTuple, Optional
 
 import smach
 
 from ..control.hold import HeldPlace
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import behind
+from ..machine.userdata_gate import UserdataGate, behind
 from ..machine.userdata_view import constants_of, view_behind, write_constants
 from ..machine.write_watch import WriteWatch
+from ..places.fitness import why_unfit
+from ..places.place import place_named
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import RUN, StateSettings
 from .failure import failure_kind, route_of
 from .operator_wait import wait_for_operator
+from .precondition_elsewhere import NotMet, RunElsewhere
 
 
-class NotMet(Exception):
-    """Why a precondition is not met, in words; never leaves this module."""
+class _Site(NamedTuple):
+    """A container of which a state is run, and what its userdata is written through."""
+
+    node: TreeNode
+    gate: UserdataGate
 
 
 class PreconditionRunner:
     """Runs the preconditions of one failure, one after the other.
 
-    They read and write the container's userdata through a gate. A state of the container keeps its
-    own time limit; all else has that of the state whose preconditions they are.
+    They read and write the container's userdata through a gate. A state of the tree keeps its own
+    time limit; all else has that of the state whose preconditions they are.
 
     `cancel` may be called from any thread, at any time: the state that runs is preempted, a
     function that runs is left behind, nothing more begins.
@@ -39,10 +45,11 @@ class PreconditionRunner:
     def __init__(self, node: TreeNode, settings: StateSettings, watch: WriteWatch) -> None:
         """`settings`: of the state whose preconditions are to be run."""
         self._settings = settings
-        self._machine = node.machine
         self._node = node
         self._watch = watch
         self._gate = watch.gate
+        self._own = _Site(node, watch.gate)
+        self._elsewhere: List[RunElsewhere] = []
         self._lock = threading.Lock()
         self._running: Optional[Any] = None
         self._cancelled = False
@@ -61,9 +68,12 @@ class PreconditionRunner:
         What an unmet one wrote is taken back.
         """
         begun = self._watch.begin()
+        self._elsewhere = []
         try:
             self._achieve(spec)
         except NotMet as why:
+            for each in reversed(self._elsewhere):
+                each.take_back()
             self._watch.take_back(begun)
             return str(why)
         return ''
@@ -78,19 +88,18 @@ class PreconditionRunner:
         elif spec.kind is PreconditionKind.CALLABLE:
             self._call(spec)
         elif spec.kind is PreconditionKind.STATE:
-            with self._noted(self._label_of(spec.target)):
-                self._judge(spec.target, '', self._execute(spec.target, ''))
+            with self._noted(self._own, self._label_of(spec.target)):
+                self._judge(self._own, spec.target, '', self._execute(self._own, spec.target, ''))
         else:
             self._run_label(spec.target)
 
-    def _wait_for_operator(self, name: str, label: str = '') -> None:
+    def _wait_for_operator(self, node: TreeNode, name: str, label: str = '') -> None:
         """Wait where an operator holds the tree; `label`: of a state of the container."""
-        node = self._node
         autonomy = node.settings_of(label).autonomy if label else RUN
         wait_for_operator(node, HeldPlace(node.path, name), autonomy, self._stopped)
 
     def _call(self, spec: PreconditionSpec) -> None:
-        self._wait_for_operator(spec.name)
+        self._wait_for_operator(self._node, spec.name)
         self._check_free(spec.target)
         gate = self._gate.branch()
         ended = self._node.tree.workers.call(spec.target, behind(gate), gate,
@@ -122,63 +131,79 @@ class PreconditionRunner:
         if blocked:
             raise NotMet(blocked)
 
-    def _run_label(self, label: str) -> None:
-        state = self._machine._states.get(label)
-        if state is None or self._node.is_oracle(label):
-            raise NotMet('there is no state {!r}'.format(label))
-        with self._noted(label):
-            self._judge(state, label, self._execute(state, label))
+    def _run_label(self, name: str) -> None:
+        place = place_named(self._node, name)
+        why_not = why_unfit(self._node, '', name) if '/' in name else ''
+        if place is None or why_not:
+            raise NotMet('{!r} cannot be run: {}'.format(name, why_not or 'there is no such state'))
+        if place.node is self._node:
+            self._run_in(self._own, place.label)
+            return
+        elsewhere = RunElsewhere(self._node, place, self._gate)
+        self._elsewhere.append(elsewhere)
+        self._run_in(_Site(place.node, elsewhere.gate), place.label)
+        elsewhere.hand_over()
+
+    def _run_in(self, site: _Site, label: str) -> None:
+        state = site.node.machine._states[label]
+        with self._noted(site, label):
+            self._judge(site, state, label, self._execute(site, state, label))
 
     def _label_of(self, state: smach.State) -> str:
         """Return the label of a state that was given itself, '' where the container has it not."""
         return next((label for label in self._node.labels()
-                     if self._machine._states[label] is state), '')
+                     if self._node.machine._states[label] is state), '')
 
     @contextlib.contextmanager
-    def _noted(self, label: str) -> Iterator[None]:
+    def _noted(self, site: _Site, label: str) -> Iterator[None]:
         """Note that a state of the container is executed.
 
         :raises NotMet: where it, or a state within, would be repeated and is not to be.
         """
-        repeated = repeated_by_running(self._node, label) if label else ()
+        repeated = repeated_by_running(site.node, label) if label else ()
         if repeated:
             raise NotMet('{} was done in this trial and is not repeated by itself'.format(
                 ', '.join(repeated)))
         if label:
-            self._check_free(self._machine._states[label])
-            note_precondition(self._node, label)
+            self._check_free(site.node.machine._states[label])
+            note_precondition(site.node, label)
         try:
             yield
         finally:
             if label:
-                note_precondition(self._node, label)
+                note_precondition(site.node, label)
 
-    def _execute(self, state: smach.State, label: str) -> object:
-        self._wait_for_operator(label or type(state).__name__, label)
+    def _execute(self, site: _Site, state: smach.State, label: str) -> object:
+        self._wait_for_operator(site.node, label or type(state).__name__, label)
         self._check_free(state)
         with self._lock:
             if self._cancelled:
                 raise NotMet('preempted')
             self._running = state
-        self._node.as_precondition = state
+        if not site.node.begin_precondition(state):
+            self._running = None
+            raise NotMet('is being run as a precondition already')
         try:
             if label:
-                write_constants(behind(self._gate), constants_of(self._machine, label))
-            return self._with_limit(state, label)
+                write_constants(behind(site.gate), constants_of(site.node.machine, label))
+            return self._with_limit(site, state, label)
         except NotMet:
             raise
         except Exception as err:
             raise NotMet('raised {!r}'.format(err)) from err
         finally:
+            site.node.end_precondition(state)
             self._ended(state)
 
-    def _with_limit(self, state: smach.State, label: str) -> object:
-        settings = self._node.settings_of(label) if label else self._settings
+    def _with_limit(self, site: _Site, state: smach.State, label: str) -> object:
+        machine, settings = site.node.machine, self._settings
+        if label:
+            settings = site.node.settings_of(label)
         if settings.time_limit_s is None:
-            return state.execute(view_behind(self._gate, self._machine, label, state))
-        gate = self._gate.branch()
+            return state.execute(view_behind(site.gate, machine, label, state))
+        gate = site.gate.branch()
         result = self._node.tree.workers.run(
-            state, view_behind(gate, self._machine, label, state), gate, label,
+            state, view_behind(gate, machine, label, state), gate, label,
             settings.time_limit_s, settings.grace_period_s)
         if result.error is not None:
             raise result.error
@@ -187,22 +212,21 @@ class PreconditionRunner:
         return result.outcome
 
     def _ended(self, state: smach.State) -> None:
-        self._node.as_precondition = None
         with self._lock:
             self._running = None
             cancelled = self._cancelled
         if cancelled and not self._node.tree.workers.blocked(state):
             state.recall_preempt()  # the meta state services the request in its place
 
-    def _judge(self, state: smach.State, label: str, outcome: Any) -> None:
+    def _judge(self, site: _Site, state: smach.State, label: str, outcome: Any) -> None:
         if self._cancelled:
             raise NotMet('preempted')
         if outcome not in state.get_registered_outcomes():
             raise NotMet('returned {!r}, which is no outcome of it'.format(outcome))
-        failing = self._node.in_force.failing
+        failing = site.node.in_force.failing
         if label:
-            listed = self._node.settings_of(label).failure_outcomes
-            route = route_of(self._machine, label, outcome)
+            listed = site.node.settings_of(label).failure_outcomes
+            route = route_of(site.node.machine, label, outcome)
             failed = failure_kind(outcome, route, listed, failing) not in (
                 FailureKind.NOT_A_FAILURE, FailureKind.UNREGISTERED_OUTCOME)
         else:

@@ -21,12 +21,12 @@ from ..settings.failing_outcomes import PREEMPTED
 from .deciding import Decided, Deciding
 from .failure import ContainerEnding, Failure, natural_ending
 from .levels import (
+    Foreseen,
     OuterDecision,
     OuterLevel,
     failure_above,
     foreseen_above,
     levels_that_may_decide,
-    passed_over,
     runs_as_precondition,
 )
 from .obeying import verdict_of
@@ -84,18 +84,18 @@ class Recovery:
         if facts.action is not Action.ASK:
             self._tell_decision(decided)
             record.recoveries += 1
-            return self._jump(self._way_to(facts.target), self._watch.written())
+            return self._jump(self._way_decided(), self._written_on(self._way_decided()))
         nobody = self._why_nobody_is_asked()
         levels = [] if nobody else self._levels_that_may_decide(decider)
         asked = ('the oracle above' if levels
-                 else 'nobody, since ' + nobody if nobody else self._asked_in_words())
+                 else 'nobody, since ' + nobody.text if nobody else self._asked_in_words())
         self._tell_decision((decider, facts._replace(asked=asked)))
         outer = self._decided_above(levels)
         if self._stop.is_over():
             return self._ended_early()
         if outer is not None:
             record.recoveries += 1
-            return self._jump(outer.way, outer.written, outer.text, is_failure_above=True)
+            return self._jump(outer.way, outer.written, outer.text, outer.decided_by)
         return self._give_way(nobody) if nobody else self._ask()
 
     def _tell_decision(self, decided: Decided) -> None:
@@ -128,21 +128,21 @@ class Recovery:
 
     # -- the levels above
 
-    def _why_nobody_is_asked(self) -> str:
-        """Say why the end of the container is left to a level above; '' where it is not."""
+    def _why_nobody_is_asked(self) -> Optional[Foreseen]:
+        """Return why the end of the container is left to a level above; None where it is not."""
         if runs_as_precondition(self._node):
-            return 'it runs as a precondition'
+            return Foreseen('it runs as a precondition')
         if self._failure.is_held_back:  # no other oracle can confirm that it is repeated
-            return ''
+            return None
         foreseen = foreseen_above(self._node, self._natural_ending())
-        return 'its author goes on from there ({})'.format(foreseen) if foreseen else ''
+        return foreseen and foreseen._replace(
+            text='its author goes on from there ({})'.format(foreseen.text))
 
-    def _give_way(self, why: str) -> Verdict:
+    def _give_way(self, why: Foreseen) -> Verdict:
         """End the container, and leave all else to who is above it."""
-        outcome = passed_over(self._node, self._natural_ending())
-        if outcome:
-            self.warn('its item is passed over with {}'.format(outcome))
-        return self._give_up('{}: {}'.format(self._cause, why))
+        if why.passed_over:
+            self.warn('its item is passed over with {}'.format(why.passed_over))
+        return self._give_up('{}: {}'.format(self._cause, why.text))
 
     def _levels_that_may_decide(self, decider: Decider) -> List[TreeNode]:
         """Return them, innermost first; none where the failure is to be asked about at once."""
@@ -169,8 +169,15 @@ class Recovery:
                                     level.in_force.failing)
         return None
 
+    def _way_decided(self) -> Way:
+        return self._deciding.way or self._way_to(self._record.label)
+
     def _way_to(self, label: str) -> Way:
         return Way((), self._node, (Place(self._node, label),))
+
+    def _written_on(self, way: Way) -> Iterable[str]:
+        """Return the keys that survive a restore: none where the container is left."""
+        return () if way.left else self._watch.written()
 
     # -- asking
 
@@ -231,11 +238,11 @@ class Recovery:
                                           self._natural_ending))
 
     def _jump(self, way: Way, written: Iterable[str], text: str = '',
-              is_failure_above: bool = False) -> Verdict:
-        """Go to a place, once the robot is well."""
+              decided_by: Optional[TreeNode] = None) -> Verdict:
+        """Go to a place, once the robot is well; `decided_by`: the level above that decided it."""
         return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
                                        written=frozenset(written),
-                                       is_failure_above=is_failure_above))
+                                       decided_by=decided_by))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""
@@ -284,8 +291,7 @@ class Recovery:
             problem = self._why_not_fall_back(way) or self._budget.take_recovery()
             if way is not None and not problem:
                 self._record.fallbacks += 1
-                written = () if way.left else self._watch.written()
-                return self._jump(way, written, why)
+                return self._jump(way, self._written_on(way), why)
             self.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
         elif verb == 'give_up':
             if target in self._machine.get_registered_outcomes():

@@ -19,6 +19,7 @@ from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from .failure import Failure
 from .question_making import Account, make_question, targets_of
+from .stop import why_stopped
 
 
 class TakenOut(NamedTuple):
@@ -114,7 +115,7 @@ class WatchedVisit:
             return
         reply = self._inquire(expert)
         if self.stopped():
-            self._close(self._why_stopped())
+            self._close(why_stopped(self._node, self._machine.preempt_requested()))
         elif reply.answer is None:
             why_over = self._budget.why_over()
             self._expire('; '.join(filter(None, (reply.why_none, why_over))))
@@ -172,11 +173,6 @@ class WatchedVisit:
         """Whether the state has ended, or a preempt or a shutdown ends the visit."""
         return (self._ended.is_set() or self._machine.preempt_requested() or smach.is_shutdown()
                 or self._node.is_left_behind())
-
-    def _why_stopped(self) -> str:
-        if self._machine.preempt_requested():
-            return 'preempted'
-        return 'left behind' if self._node.is_left_behind() else 'shutdown'
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the state; `deadline_s`: seconds left, 0 without end."""

@@ -8,6 +8,13 @@ from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
 
 
+def why_stopped(node: TreeNode, preempted: bool) -> str:
+    """Return why what goes on in a container is stopped, where that is so."""
+    if preempted:
+        return 'preempted'
+    return 'left behind' if node.is_left_behind() else 'shutdown'
+
+
 class RecoveryStop:
     """Whether one recovery is over. `cancelled` is set by a preempt, from any thread."""
 
@@ -22,9 +29,7 @@ class RecoveryStop:
 
     def why(self) -> str:
         """Return why it is stopped."""
-        if self.cancelled.is_set():
-            return 'preempted'
-        return 'left behind' if self._node.is_left_behind() else 'shutdown'
+        return why_stopped(self._node, self.cancelled.is_set())
 
     def is_over(self) -> bool:
         """Whether it is stopped, or the trial's time is over."""

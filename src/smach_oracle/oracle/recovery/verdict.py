@@ -27,7 +27,8 @@ class Verdict(NamedTuple):
     text: str = ''
     # JUMP: userdata keys of the container where the ways meet that survive a restore
     written: FrozenSet[str] = frozenset()
-    is_failure_above: bool = False  # JUMP: the level decided on it, as if its own state had failed
+    # JUMP: the level above that decided on it, as if its own state had failed
+    decided_by: Optional[TreeNode] = None
     level: Optional[TreeNode] = None  # GIVE_UP: the container that ends; None: that of the failure
 
     @property

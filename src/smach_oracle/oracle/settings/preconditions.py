@@ -1,8 +1,10 @@
 """What must hold before a state, as its designer wrote it (paper, section IV-B). Pure.
 
-Four kinds: the label of another state of the same container; a `smach.State`; a callable
-`f(userdata) -> bool`; a pair (check, achieve) whose second half runs only if the first does not
-hold. In YAML: a label, 'python:module:attribute', or {check: ..., achieve: ...}.
+Four kinds: the label of another state of the same container, or the path of one of another
+container below the top machine; a `smach.State`; a callable `f(userdata) -> bool`; a pair (check,
+achieve) whose second half runs only if the first does not hold. In YAML: a label, a path
+(KITCHEN/LOOK, or /LOOK for a state of the top machine), 'python:module:attribute', or {check: ...,
+achieve: ...}.
 """
 from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
@@ -28,10 +30,11 @@ class PreconditionSpec(NamedTuple):
 
     kind: PreconditionKind
     name: str
-    target: Any  # the label, the state, the callable, or the pair of specs (check, achieve)
+    # the label or path, the state, the callable, or the pair of specs (check, achieve)
+    target: Any
 
     def labels(self) -> Tuple[str, ...]:
-        """Return the labels of other states that it names."""
+        """Return the labels and paths of other states that it names."""
         if self.kind is PreconditionKind.LABEL:
             return (self.target,)
         if self.kind is PreconditionKind.PAIR:
@@ -48,8 +51,8 @@ class PreconditionSpec(NamedTuple):
 
 
 _ALLOWED = (
-    'the label of a state, a smach.State, a callable f(userdata) -> bool, a pair (check, achieve) '
-    'of these, '
+    'the label of a state, PATH/LABEL of one elsewhere, a smach.State, '
+    'a callable f(userdata) -> bool, a pair (check, achieve) of these, '
     "'python:module:attribute' or {check: ..., achieve: ...}")
 
 

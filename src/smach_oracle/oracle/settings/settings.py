@@ -68,6 +68,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'deadline_s': values.deadline,
     'on_no_answer': values.on_no_answer,
     'escalate': values.flag,
+    'step_back_across': values.flag,
     'still_running_s': values.number(0, math.inf, 'seconds from 0'),
     'still_running_factor': values.number(1, math.inf, 'a number from 1'),
     'watch_preconditions': values.flag,
@@ -113,6 +114,8 @@ class Settings:
     # long as ever before; 0 s: never
     still_running_s: float = 60.0
     still_running_factor: float = 10.0
+    # whether a step back may lead to what ran before in the container above
+    step_back_across: bool = False
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

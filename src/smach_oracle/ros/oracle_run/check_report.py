@@ -55,7 +55,8 @@ def _heading(container: ContainerProspect) -> List[str]:
         lines += wrapped('Before it asks, the oracle of the machine around it may decide.', 2)
     back = ('each state is on its own, so that a step back is a retry' if container.has_branches
             else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
-                container.initial))
+                'what ran before it in the machine around it, or to ' + container.initial
+                if settings.step_back_across and not container.is_top else container.initial))
     lines += _entry('policy', '{}; {}'.format(settings.policy, back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)

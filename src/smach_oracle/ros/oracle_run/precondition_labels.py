@@ -19,12 +19,14 @@ def misplaced_preconditions(machine: smach.StateMachine,
                             settings: Settings) -> List[SettingsError]:
     """Return the preconditions that name no other state beside the state that they are for.
 
-    A label may occur in several nested machines: it is enough that the precondition fits one.
+    A label may occur in several nested machines: it is enough that the precondition fits one. A
+    path has to be that of a state.
     """
     wrong: Dict[Tuple[str, str], _Use] = {}
     right = set()
+    paths = set(_paths(machine, ''))
     for use in _uses(machine, settings, ''):
-        if use.named in use.others:
+        if use.named in use.others or ('/' in use.named and use.named.lstrip('/') in paths):
             right.add(use[:2])
         else:
             wrong.setdefault(use[:2], use)
@@ -59,6 +61,15 @@ def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator
                     yield _Use('states.{}.preconditions'.format(key), named, others)
         if settings.nested and isinstance(state, smach.Container):
             yield from _uses(state, settings, below)
+
+
+def _paths(container: smach.Container, above: str) -> Iterator[str]:
+    """Yield the paths of all states in a container."""
+    for label, state in _children(container).items():
+        path = '{}/{}'.format(above, label) if above else label
+        yield path
+        if isinstance(state, smach.Container):
+            yield from _paths(state, path)
 
 
 def _children(container: smach.Container) -> Dict[str, smach.State]:

@@ -1,0 +1,87 @@
+"""Userdata on its way between containers, through the input and output keys of its author."""
+from typing import Any, Iterator, Mapping, NamedTuple, Sequence, Set, Tuple
+
+import smach
+
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_view import constants_of
+
+
+class Link(NamedTuple):
+    """A container in the container around it, which may be a Concurrence or an Iterator."""
+
+    above: Any
+    label: str
+    below: Any
+
+    @property
+    def remapping(self) -> Mapping[str, str]:
+        """Key of the container above by key of the one below, where they differ."""
+        remappings = getattr(self.above, '_remappings', None) or {}
+        return remappings.get(self.label) or {}
+
+
+def links_to(node: TreeNode) -> Iterator[Link]:
+    """Yield the links from the wrapped container above one to it, from above to below.
+
+    The top machine has none.
+    """
+    above: Any = node.parent.machine if node.parent is not None else None
+    for label in node.below:
+        below = child_of(above, label)
+        yield Link(above, label, below)
+        above = below
+
+
+def child_of(container: Any, label: str) -> Any:
+    """Return a state of a container of whatever kind."""
+    if isinstance(container, smach.StateMachine):
+        return container._states[label]
+    return container.get_children()[label]
+
+
+def hand_down(link: Link) -> None:
+    """Give a container its input keys, as when it begins."""
+    given = {**link.above.userdata._data, **_constants(link)}
+    for key, named in _inputs(link):
+        if named in given:
+            link.below.userdata[key] = given[named]
+
+
+def hand_up(link: Link, written: Set[str], into: Any) -> Set[str]:
+    """Hand output keys of a container that were written to the one above it.
+
+    :param into: where they are written, by keys of the container above.
+    :returns: the keys written there.
+    """
+    found = set()
+    for key in link.below.get_registered_output_keys():
+        if key in written and key in link.below.userdata._data:
+            named = link.remapping.get(key, key)
+            into[named] = link.below.userdata._data[key]
+            found.add(named)
+    return found
+
+
+def hand_on(link: Link, written: Set[str], into: Any) -> Set[str]:
+    """Hand what was written in a container to the one below it that runs, by its input keys.
+
+    :param into: where it is written, by keys of the container below.
+    :returns: the keys written there.
+    """
+    found = set()
+    for key, named in _inputs(link):
+        if named in written and named in link.above.userdata._data:
+            into[key] = link.above.userdata._data[named]
+            found.add(key)
+    return found
+
+
+def _inputs(link: Link) -> Sequence[Tuple[str, str]]:
+    return [(key, link.remapping.get(key, key))
+            for key in link.below.get_registered_input_keys()]
+
+
+def _constants(link: Link) -> Mapping[str, Any]:
+    return (constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine)
+            else {})
