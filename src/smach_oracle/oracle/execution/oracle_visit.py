@@ -22,6 +22,7 @@ from ..recovery.verdict import Verdict, VerdictKind
 from .departure import depart, leaving_outcome
 from .going_on import ask_to_go_on
 from .oracle_state import OracleState
+from .starting_over import restore_start
 from .transitions import go_to, message_of, terminate
 
 
@@ -146,6 +147,9 @@ class OracleVisit:
     def _jump(self, way: Way, verdict: Verdict) -> None:
         node, target = self._node, way.first
         snapshot = node.record(target).snapshot
+        if verdict.restarts:
+            self._start_over(way, verdict)
+            return
         missing = missing_on(way, verdict.written)
         restores = snapshot if node.settings.userdata == 'restore' else None
         if restores is not None:
@@ -161,6 +165,15 @@ class OracleVisit:
         node.record(target).go_down(way.down[1:])
         self._go_on(target, 'keep' if restores is None else 'restore', missing, verdict.by,
                     verdict.text, self._across(way))
+
+    def _start_over(self, way: Way, verdict: Verdict) -> None:
+        """Enter the initial state, with the userdata of the start in all containers."""
+        node, target = self._node, way.first
+        restore_start(node)
+        leave_for(node, target)
+        ask_to_go_on(node, target)
+        self._note_entry(target)
+        self._go_on(target, 'start', by=verdict.by, text=verdict.text, across=self._across(way))
 
     def _across(self, way: Way) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""

@@ -1,13 +1,14 @@
 """What the oracle of one level decides about a failure of its state (paper, Algorithm 1)."""
-from typing import Any, List, Optional, Tuple
+from typing import Any, Callable, List, Optional, Tuple
 
-from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, going_would_repeat
 from ..machine.repeats import has_visited, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
+from ..places.levels import levels_above
 from ..places.place import Place
-from ..places.way import Way, repeated_on
+from ..places.way import Way, repeated_on, way_to
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.state_record import StateRecord
@@ -20,8 +21,14 @@ from .stop import RecoveryStop
 Decided = Tuple[Decider, DecisionFacts]
 
 
+def _nothing_above() -> str:
+    return ''
+
+
 class Deciding:
     """One decision of one container's oracle; `tried` says what was done before it.
+
+    `place`: where it has decided to go, None where it goes nowhere.
 
     `decide` is called in the machine's thread, `cancel` from any thread.
     """
@@ -40,14 +47,21 @@ class Deciding:
         self.watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, record.settings, self.watch)
         self.tried: List[str] = []
+        self.place: Optional[Place] = None
 
     def cancel(self) -> None:
         """Preempt the precondition that runs."""
         self._preconditions.cancel()
 
-    def decide(self) -> Decided:
-        """Run the preconditions that the policy wants, and say what it does."""
-        return self._ask_at_once() or self._follow_policy()
+    def decide(self, why_not_above: Callable[[], str] = _nothing_above) -> Decided:
+        """Run the preconditions that the policy wants, and say what it does.
+
+        :param why_not_above: says why no level above is to be disturbed by this failure.
+        """
+        decider, facts = self._ask_at_once() or self._follow_policy(why_not_above)
+        if facts.action is Action.ASK and not self._node.in_force.policy.asks:
+            return decider, facts._replace(action=Action.GIVE_UP)
+        return decider, facts
 
     def _ask_at_once(self) -> Optional[Decided]:
         """Return the decision where no policy has a say, and no precondition is run."""
@@ -63,24 +77,46 @@ class Deciding:
             return Decider.ON_RETRY, self.facts_of(ask, blocked=self.why_repeats(record.label))
         return None
 
-    def _follow_policy(self) -> Decided:
+    def _follow_policy(self, why_not_above: Callable[[], str]) -> Decided:
         record, policy = self._record, self._node.in_force.policy
         preconditions = self._run_preconditions()
-        action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
-        target = ''
-        if action is not Action.ASK:
-            target = (record.label if action is Action.REVISIT
-                      else policy.step_back_target(self._context))
-        decider, why_not = self._what_prevents(target) if target else (Decider.POLICY, '')
+        situation = Situation(record.failure_class, preconditions, self._continuous, self._past())
+        action = policy.decide(situation)
+        if action in (Action.ASK, Action.GIVE_UP):
+            return Decider.POLICY, self.facts_of(action, blocked=policy.why(situation))
+        place = self._place_of(action)
+        why_not = why_not_above() if action is Action.RESTART else ''
+        decider, why_not = (Decider.AUTHOR, why_not) if why_not else self._what_prevents(place)
         if why_not:
-            action, target = Action.ASK, ''
-        return decider, self.facts_of(action, target=target, blocked=why_not)
+            return decider, self.facts_of(Action.ASK, blocked=why_not)
+        self.place = place
+        return decider, self.facts_of(
+            action, target=place.label if place.node is self._node else place.path,
+            wait_s=policy.wait_s(situation))
 
-    def _what_prevents(self, target: str) -> Tuple[Decider, str]:
-        """Spend a recovery on going to a state; or return what prevents it, and why."""
-        for decider, why_not in ((Decider.ON_RETRY, self.why_repeats),
-                                 (Decider.POLICY, self._why_not)):
-            reason = why_not(target)
+    def _past(self) -> Past:
+        record, tree = self._record, self._node.tree
+        return Past(record.recoveries, tree.restarts.count,
+                    '{}/{} {}'.format(self._node.path, record.label, record.visits),
+                    tree.trials - 1)
+
+    def _place_of(self, action: Action) -> Place:
+        """Return where a decision leads."""
+        node = self._node
+        if action is Action.REVISIT:
+            return Place(node, self._record.label)
+        if action is Action.STEP_BACK:
+            return Place(node, node.in_force.policy.step_back_target(self._context))
+        top = [node, *levels_above(node)][-1]
+        return Place(top, top.machine._initial_state_label or '')
+
+    def _what_prevents(self, place: Place) -> Tuple[Decider, str]:
+        """Spend a recovery on going to a place; or return what prevents it, and why."""
+        way = way_to(self._node, place)
+        if way is None:
+            return Decider.POLICY, 'there is no way to {}'.format(place.path)
+        for decider, reason in ((Decider.ON_RETRY, self.why_repeats_on(way)),
+                                (Decider.POLICY, self._why_not(place))):
             if reason:
                 return decider, reason
         spent = self._budget.take_recovery()
@@ -101,10 +137,10 @@ class Deciding:
                 target, ', '.join(repeated))
         return going_would_repeat(self._record.label, target, repeated)
 
-    def _why_not(self, target: str) -> str:
-        """Return why the machine cannot go on to a state by itself now, '' where it can."""
-        blocked = why_closed(self._node, target)
-        return '{} {}'.format(target, blocked) if blocked else self._function_that_runs()
+    def _why_not(self, place: Place) -> str:
+        """Return why the machine cannot go on to a place by itself now, '' where it can."""
+        blocked = why_closed(place.node, place.label)
+        return '{} {}'.format(place.label, blocked) if blocked else self._function_that_runs()
 
     def _function_that_runs(self) -> str:
         """Return which function among the preconditions was left behind and runs, '' for none."""

@@ -8,13 +8,19 @@ from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..places.levels import is_direct, levels_above
-from ..places.place import Place
 from ..places.way import Way, way_to
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
 from .deciding import Deciding
-from .failure import ContainerEnding, Failure, author_recovers, failure_kind, route_of
+from .failure import (
+    ContainerEnding,
+    Failure,
+    author_recovers,
+    failure_kind,
+    natural_ending,
+    route_of,
+)
 from .stop import RecoveryStop
 
 
@@ -121,6 +127,8 @@ class OuterDecision(NamedTuple):
     way: Way
     text: str
     written: FrozenSet[str]
+    wait_s: float = 0.0  # waited before
+    restarts: bool = False
 
 
 class OuterLevel:
@@ -152,9 +160,10 @@ class OuterLevel:
         record = self._record
         rate, failure_class = record.rate, record.failure_class
         record.learn(True)
-        decider, facts = self._deciding.decide()
+        decider, facts = self._deciding.decide(self._foreseen)
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
-        if facts.action is Action.ASK:
+        place = self._deciding.place
+        if place is None:
             record.take_back_failure()
             self.tried.append('{}: {}: asks too'.format(self._node.path, cause_of(facts)))
             return None
@@ -168,10 +177,16 @@ class OuterLevel:
                    failure_class=int(record.failure_class), rate=record.rate,
                    continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
         record.recoveries += 1
-        way = way_to(self._below, Place(self._node, facts.target))
+        way = way_to(self._below, place)
         if way is None:  # it has been left meanwhile
             return None
-        return OuterDecision(way, sentence, frozenset(self._deciding.watch.written()))
+        return OuterDecision(way, sentence, frozenset(self._deciding.watch.written()),
+                             facts.wait_s, facts.action is Action.RESTART)
+
+    def _foreseen(self) -> str:
+        node = self._node
+        return foreseen_above(node, natural_ending(
+            self._failure, node.machine.get_registered_outcomes(), node.in_force.failing))
 
     def _emit(self, kind: EventKind, **fields: object) -> None:
         self._node.emit(kind, state=self._record.label, **fields)

@@ -9,7 +9,7 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext
-from ..decision.sentence import cause_of, decision_sentence
+from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..places.place import Place, place_named
@@ -76,15 +76,14 @@ class Recovery:
         """Decide, and ask where the policy says so; neither where the trial's time is over."""
         if self._budget.why_over():
             return self._end_unaided()
-        decided = self._deciding.decide()
+        decided = self._deciding.decide(self._why_nobody_is_asked)
         if self._stop.is_over():
             return self._ended_early()
         decider, facts = decided
         record, self._cause = self._record, cause_of(facts)
         if facts.action is not Action.ASK:
             self._tell_decision(decided)
-            record.recoveries += 1
-            return self._jump(self._way_to(facts.target), self._watch.written())
+            return self._follow_policy(facts)
         nobody = self._why_nobody_is_asked()
         levels = [] if nobody else self._levels_that_may_decide(decider)
         asked = ('the oracle above' if levels
@@ -95,8 +94,27 @@ class Recovery:
             return self._ended_early()
         if outer is not None:
             record.recoveries += 1
-            return self._jump(outer.way, outer.written, outer.text, is_failure_above=True)
+            return self._wait_and_jump(outer.wait_s, Verdict(
+                VerdictKind.JUMP, way=outer.way, text=outer.text, written=outer.written,
+                is_failure_above=True, restarts=outer.restarts))
         return self._give_way(nobody) if nobody else self._ask()
+
+    def _follow_policy(self, facts: DecisionFacts) -> Verdict:
+        """Carry out a decision that asks nobody."""
+        place = self._deciding.place
+        way = way_to(self._node, place) if place is not None else None
+        if way is None:
+            return self._give_way('the policy asks nobody')
+        self._record.recoveries += 1
+        restarts = facts.action is Action.RESTART
+        return self._wait_and_jump(facts.wait_s, Verdict(
+            VerdictKind.JUMP, way=way, restarts=restarts,
+            written=frozenset() if restarts else frozenset(self._watch.written())))
+
+    def _wait_and_jump(self, wait_s: float, verdict: Verdict) -> Verdict:
+        if wait_s and not self._stop.has_waited(wait_s):
+            return self._ended_early()
+        return self._when_well(verdict)
 
     def _tell_decision(self, decided: Decided) -> None:
         decider, facts = decided
@@ -175,7 +193,9 @@ class Recovery:
     # -- asking
 
     def _ask(self) -> Verdict:
-        expert = self._node.tree.expert
+        expert, policy = self._node.tree.expert, self._node.in_force.policy
+        if not policy.asks:
+            return self._give_up('{}: the policy asks nobody'.format(self._cause))
         if expert is None:
             return self._fall_back('no expert is there to ask')
         spent = self._budget.take_question()
@@ -230,12 +250,10 @@ class Recovery:
         return self._when_well(verdict_of(answer, self._node, self._record.label, self._watch,
                                           self._natural_ending))
 
-    def _jump(self, way: Way, written: Iterable[str], text: str = '',
-              is_failure_above: bool = False) -> Verdict:
+    def _jump(self, way: Way, written: Iterable[str], text: str = '') -> Verdict:
         """Go to a place, once the robot is well."""
         return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
-                                       written=frozenset(written),
-                                       is_failure_above=is_failure_above))
+                                       written=frozenset(written)))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""

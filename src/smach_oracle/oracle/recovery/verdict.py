@@ -28,6 +28,7 @@ class Verdict(NamedTuple):
     # JUMP: userdata keys of the container where the ways meet that survive a restore
     written: FrozenSet[str] = frozenset()
     is_failure_above: bool = False  # JUMP: the level decided on it, as if its own state had failed
+    restarts: bool = False  # JUMP: with the userdata of the start, in all containers
     level: Optional[TreeNode] = None  # GIVE_UP: the container that ends; None: that of the failure
 
     @property
