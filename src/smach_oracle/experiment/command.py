@@ -12,7 +12,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Sequence
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis import bag_statistics
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
@@ -24,7 +24,18 @@ from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
 
 from .job import ExperimentJob
-from .plan import CONFIGURED, TASKS, ExperimentError, ExperimentPlan, enter_folder, make_variants
+from .plan import (
+    BARE,
+    CONFIGURED,
+    DEFAULT,
+    TASKS,
+    ExperimentError,
+    ExperimentPlan,
+    Variant,
+    enter_folder,
+    make_variants,
+    named_variants,
+)
 from .progress import ProgressLine
 from .stop_signals import StopRequested, StopSignals
 
@@ -34,6 +45,7 @@ LONGEST_DELAY = 3600.0  # s, of the operator
 COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
 DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
 BOTH = ('both', 'with', 'without')  # the oracle
+NAMED = (BARE, DEFAULT, *sorted(POLICIES))
 # Settings of the oracle that override those of the task: option, type, what it is.
 OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
              ('high_from', float, 'failure rate from which a state is HIGH'),
@@ -139,8 +151,11 @@ def make_parser() -> argparse.ArgumentParser:
         help='complete repetitions on further seeds, each learning anew (default: 1)')
     parser.add_argument('--jobs', type=int, default=2,
                         help='replicates of variants at a time (default: %(default)s)')
-    parser.add_argument('--variants', choices=BOTH, default='both', help='(default: %(default)s)')
-    parser.add_argument('--arms', dest='variants', choices=BOTH, default=argparse.SUPPRESS,
+    parser.add_argument(
+        '--variants', nargs='+', choices=[*BOTH, *NAMED], default=['both'], metavar='NAME',
+        help='both, with or without the oracle (default: both), or one or more of: {}'.format(
+            ', '.join(NAMED)))
+    parser.add_argument('--arms', dest='variants', nargs=1, choices=BOTH, default=argparse.SUPPRESS,
                         action=_RenamedOption, help='the older name of --variants')
     parser.add_argument(
         '--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
@@ -184,8 +199,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
         for name in ['estimator'] + [name for name, _, _ in OVERRIDES]
         if getattr(args, name) is not None
     }
-    varied = varied_settings(args)
-    variants = make_variants(args.variants, settings, varied)
+    variants = _chosen_variants(parser, args, settings)
     for variant in variants:
         try:
             Settings.from_dict(dict(variant.settings))
@@ -194,6 +208,18 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     args.plan = ExperimentPlan(args.task, trials, args.seed, args.replicates, variants,
                                args.answer_delay, args.benign)
     return args
+
+
+def _chosen_variants(parser: argparse.ArgumentParser, args: argparse.Namespace,
+                     settings: Mapping[str, Any]) -> Tuple[Variant, ...]:
+    by_oracle = [name for name in args.variants if name in BOTH]
+    if not by_oracle:
+        if args.policy != [CONFIGURED]:
+            parser.error('--policy: name the policies by --variants')
+        return named_variants(args.variants, settings, list(dict.fromkeys(args.memory or ())))
+    if len(args.variants) > 1:
+        parser.error('--variants: {} stands alone'.format(by_oracle[0]))
+    return make_variants(by_oracle[0], settings, varied_settings(args))
 
 
 def varied_settings(args: argparse.Namespace) -> Dict[str, Sequence[Any]]:
