@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
-from smach_oracle.analysis import bag_statistics
+from smach_oracle.analysis import bag_statistics, comparison
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policy import POLICIES
 from smach_oracle.oracle.errors import SettingsError
@@ -37,6 +37,8 @@ from .plan import (
     named_variants,
 )
 from .progress import ProgressLine
+from .protocols import PROTOCOLS
+from .results import RESULTS_FILE
 from .stop_signals import StopRequested, StopSignals
 
 POLL_S = 0.5
@@ -138,6 +140,10 @@ def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        '--protocol', choices=sorted(PROTOCOLS),
+        help='all experiments of a protocol, each in a folder of its own below --output; only '
+        '--seed, --jobs, --answer-delay and --hung-after count beside')
     parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
                         help='(default: %(default)s)')
     parser.add_argument(
@@ -243,10 +249,9 @@ def main(argv: Optional[List[str]] = None) -> int:
     try:
         if shutil.which('roslaunch') is None:
             raise ExperimentError('roslaunch not found; source the workspace first')
-        with alone_in(output):
-            if enter_folder(output, args.plan):
-                print('Going on in {}'.format(output))
-            jobs = run(args.plan, output, args.jobs, args.hung_after)
+        if args.protocol:
+            return _run_protocol(args, output)
+        jobs = _run_in(output, args.plan, args)
     except ImportError as err:  # bags are read with a package that not every robot has
         print('run_trials: {}'.format(lacking(err) or err), file=sys.stderr)
         return LACKING
@@ -260,6 +265,27 @@ def main(argv: Optional[List[str]] = None) -> int:
             'there'.format(err, output), file=sys.stderr)
         return 128 + err.signum
     return report(jobs, output)
+
+
+def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> List[ExperimentJob]:
+    with alone_in(output):
+        if enter_folder(output, plan):
+            print('Going on in {}'.format(output))
+        return run(plan, output, args.jobs, args.hung_after)
+
+
+def _run_protocol(args: argparse.Namespace, output: Path) -> int:
+    """Run the parts of a protocol one after the other, and compare the variants of each.
+
+    :returns: 0, or LOST where trials of a part were lost.
+    """
+    code = 0
+    for part in PROTOCOLS[args.protocol](args.seed, args.answer_delay):
+        print('Part {}'.format(part.name), flush=True)
+        jobs = _run_in(output / part.name, part.plan, args)
+        comparison.main([str(output / part.name / RESULTS_FILE)])
+        code = LOST if any(job.lost for job in jobs) else code
+    return code
 
 
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:
