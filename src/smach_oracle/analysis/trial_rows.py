@@ -92,7 +92,9 @@ def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed:
            learned: Optional[Mapping[str, Any]] = None) -> TrialRow:
     """Return the row of a trial that has come to its end."""
     truth, cause = summary.truth, summary.cause
-    asked_s = None if details.passed_s is None else details.passed_s.get('expert', 0.0)
+    asked_s = None
+    if details.passed_s is not None:  # a world that was not told of the expert's time has no entry
+        asked_s = details.passed_s.get('expert', None if summary.questions else 0.0)
     return TrialRow(
         task, variant, replicate, seed, summary.ending.value,
         None if truth is None else truth.success, details.wrong_object, details.damage,

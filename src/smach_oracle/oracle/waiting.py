@@ -14,7 +14,7 @@ class Waiting(Protocol):
     def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
         """Return after so many seconds, or soon after `stopped()` is true.
 
-        :param what: is waited for, for people.
+        :param what: takes the time, as records of it add it up.
         """
 
 

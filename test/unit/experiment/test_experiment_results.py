@@ -66,6 +66,16 @@ def test_what_the_truth_tells_beyond_the_end_is_in_the_row(results, tmp_path):
     assert not row.succeeded
 
 
+@pytest.mark.parametrize('questions, expert_s', [(0, 0.0), (2, None)])
+def test_what_nobody_was_told_of_the_experts_time_is_not_known(results, tmp_path, questions,
+                                                               expert_s):
+    truth = tmp_path / 'truth.jsonl'
+    truth.write_text('{"seed": 100, "passed_s": {"planning": 3.0}}\n')
+    asked = trial(0)
+    results().add([asked._replace(summary=asked.summary._replace(questions=questions))], {}, truth)
+    assert read_rows(tmp_path / RESULTS_FILE)[0].expert_s == expert_s
+
+
 def test_a_job_goes_on_behind_its_rows_with_the_rates_of_the_last(results, tmp_path):
     results().add([trial(0), trial(2)], {1: 'it hung'}, tmp_path / 'none')
     records = ReplicateRecords(tmp_path / 'job', FIRST_SEED, 6)

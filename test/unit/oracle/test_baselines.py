@@ -204,7 +204,7 @@ def test_the_ladder_waits_through_the_clock_that_was_handed_in():
     machine = failing('ladder', fails=['aborted', 'aborted'])
     waiting = oracle_of(machine.machine).waiting = FakeWaiting()
     assert machine.run() == 'done'
-    assert waiting.waited == [(5.0, 'to try B again')]
+    assert waiting.waited == [(5.0, 'waiting')]
     assert machine.visits() == ['A', 'B', 'B', 'A', 'B', 'C']
     assert 'in 5 s trying it again' in machine.of(EventKind.DECISION)[0].text
 

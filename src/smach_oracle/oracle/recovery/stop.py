@@ -33,9 +33,7 @@ class RecoveryStop:
     def has_waited(self, seconds: float) -> bool:
         """Let time pass; False where something has ended the recovery meanwhile."""
         with standing_still(self._node.runs_around):
-            self._node.tree.waiting.wait(
-                seconds, 'to try {} again'.format(self._record.label), self.is_over,
-                self.cancelled.wait)
+            self._node.tree.waiting.wait(seconds, 'waiting', self.is_over, self.cancelled.wait)
         return not self.is_over()
 
     # -- health
