@@ -11,7 +11,7 @@ from smach_oracle.oracle.records.facts import TrialEnd, ended_by
 from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
 
 DEFAULT_FAILING = FailingNames()
-AUTONOMOUS_DECISIONS = ('revisit', 'step_back')
+AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
 
 class TrialEnding(Enum):
@@ -148,10 +148,10 @@ class TrialCounter:
             self._unwell_since_s = None
 
     def _count_recovery(self, event: Event) -> None:
-        """Count a decision to revisit or to step back, once it is carried out.
+        """Count a decision to revisit, step back or start over, once it is carried out.
 
-        The next JUMP of the same container carries it out. A failure or a question in between
-        replaces it.
+        The next JUMP of the same container carries it out, or one that comes from there. A failure
+        or a question in between replaces it.
         """
         if event.kind == EventKind.DECISION:
             self._oracle_seen = True
@@ -160,6 +160,8 @@ class TrialCounter:
             self._decided[event.path] = False
         elif event.kind == EventKind.JUMP:
             self.recoveries += self._decided.pop(event.path, False)
+            left = event.data.get('from', '') if isinstance(event.data, Mapping) else ''
+            self.recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
 
     def _was_stopped(self, end: Event) -> bool:
         """Whether a shutdown or Ctrl-C ended it.

@@ -20,6 +20,7 @@ from smach_oracle.oracle.decision.policy import (
     POLICIES,
     Action,
     FailureContext,
+    Past,
     Policy,
     Preconditions,
     Situation,
@@ -40,9 +41,11 @@ from .trials import summarise
 ENOUGH_VISITS = 50
 SAME, NOT_KNOWN = 'same', 'not known'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
+GIVES_UP = 'would give up'  # a column of its own, where some would
 NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 _ROUNDING = 1e-9
-_OUTSIDE_POLICIES = (Decider.MAX_RECOVERIES, Decider.BUDGET, Decider.ON_RETRY)
+_OUTSIDE_POLICIES = (Decider.MAX_RECOVERIES, Decider.BUDGET, Decider.ON_RETRY, Decider.AUTHOR)
+_STAYS = (Action.ASK.value, Action.GIVE_UP.value)
 
 Key = Tuple[str, str]  # path and state
 
@@ -64,6 +67,7 @@ class _LearnedState:
                                         settings['prior'])
         self.context: Optional[FailureContext] = None
         self.held_back = False  # the present question is about no failure
+        self.recoveries = 0  # of this trial, as recorded
         # whether each was met, of those run for the present failure
         self.preconditions: List[bool] = []
 
@@ -74,7 +78,8 @@ class Replay:
     def __init__(self, settings: Mapping[str, Any], conditioned: Mapping[Key, bool]) -> None:
         """`conditioned`: whether a state has preconditions, where that is known."""
         self._settings = settings
-        self._policy = policy_named(settings['policy'])
+        self._policy = _policy_of(settings)
+        self._restarts = 0  # of this trial, as recorded
         self._conditioned = conditioned
         self._states: Dict[Key, _LearnedState] = {}
         self._histories: Dict[Key, History] = {}
@@ -83,8 +88,7 @@ class Replay:
     def take(self, event: Event) -> Optional[str]:
         """Follow one event; returns the action at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
-            for history in self._histories.values():
-                history.begin_trial()
+            self._begin_trial()
         elif event.kind == EventKind.CONTAINER_START:
             self._begin_execution(event)
         elif event.kind == EventKind.FAILURE:
@@ -97,8 +101,22 @@ class Replay:
             self._superseded(event)
         elif event.kind == EventKind.DECISION:
             self._state(event).held_back = decided_by(event) is Decider.HELD_BACK
-            return None if self._state(event).held_back else self._decide(event)
+            return None if self._state(event).held_back else self._decided(event)
         return None
+
+    def _begin_trial(self) -> None:
+        for history in self._histories.values():
+            history.begin_trial()
+        for state in self._states.values():
+            state.recoveries = 0
+        self._restarts = 0
+
+    def _decided(self, event: Event) -> str:
+        """Decide, and note what was done instead."""
+        tried = self._decide(event)
+        self._state(event).recoveries += event.outcome not in _STAYS
+        self._restarts += event.outcome == Action.RESTART.value
+        return tried
 
     def rate(self, event: Event) -> float:
         """What it has learned of the event's state."""
@@ -158,14 +176,16 @@ class Replay:
     def _decide(self, event: Event) -> str:
         state = self._state(event)
         if decided_by(event) in _OUTSIDE_POLICIES:
-            return Action.ASK.value
+            return (Action.ASK if self._policy.asks else Action.GIVE_UP).value
         failure_class = classify(state.estimator.rate, self._settings['moderate_from'],
                                  self._settings['high_from'])
         preconditions = self._preconditions(event, state, failure_class)
         if preconditions is None or state.context is None:
             return NOT_KNOWN
-        return self._policy.decide(Situation(failure_class, preconditions,
-                                             self._policy.is_continuous(state.context))).value
+        actions = self._policy.may_do(Situation(
+            failure_class, preconditions, self._policy.is_continuous(state.context),
+            Past(state.recoveries, self._restarts)))
+        return actions[0].value if len(actions) == 1 else NOT_KNOWN  # it would be drawn
 
     def _preconditions(self, event: Event, state: _LearnedState,
                        failure_class: FailureClass) -> Optional[Preconditions]:
@@ -176,6 +196,20 @@ class Replay:
         if not state.preconditions:
             return None  # they were not run: nobody knows whether they would have been met
         return Preconditions.MET if all(state.preconditions) else Preconditions.NOT_MET
+
+
+def _policy_of(settings: Mapping[str, Any]) -> Policy:
+    prefix = 'policy.'
+    return policy_named(settings['policy'], {key[len(prefix):]: value
+                                             for key, value in settings.items()
+                                             if key.startswith(prefix)})
+
+
+def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return the recorded settings with others; another policy has the parameters it comes with."""
+    kept = {key: value for key, value in recorded.items()
+            if 'policy' not in settings or not key.startswith('policy.')}
+    return {**kept, **settings}
 
 
 def _conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
@@ -204,9 +238,10 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     if not set(NEEDED) <= set(recorded):
         raise BagError('its trials do not tell the settings of their oracle')
     conditioned = _conditioned((event for trial in trials for event in trial),
-                               policy_named(recorded['policy']))
-    own, other = Replay(recorded, conditioned), Replay({**recorded, **settings}, conditioned)
-    counts = dict.fromkeys(OUTCOMES, 0)
+                               _policy_of(recorded))
+    own = Replay(recorded, conditioned)
+    other = Replay(_changed(recorded, settings), conditioned)
+    counts = dict.fromkeys((*OUTCOMES, GIVES_UP), 0)
     other_trials = 0
     for trial in trials:
         another = False
@@ -243,9 +278,9 @@ def _check_decision(done: str, event: Event) -> None:
 def _outcome(recorded: str, tried: str) -> str:
     if tried in (recorded, NOT_KNOWN):
         return SAME if tried == recorded else tried
-    if tried == Action.ASK.value:
-        return 'would ask'
-    return 'would recover' if recorded == Action.ASK.value else 'recovers otherwise'
+    if tried in _STAYS:
+        return 'would ask' if tried == Action.ASK.value else GIVES_UP
+    return 'would recover' if recorded in _STAYS else 'recovers otherwise'
 
 
 def load_replicates(places: Sequence[str],
@@ -278,14 +313,15 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
         ', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded'
         for row in rows
     ]
+    columns = OUTCOMES + ((GIVES_UP,) if any(row.counts[GIVES_UP] for row in rows) else ())
     width = max(len(name) for name in names + ['settings'])
     lines = [
         '{:<{}}  decisions'.format('settings', width) +
-        ''.join('{:>20}'.format(name) for name in OUTCOMES) + '   trials with another'
+        ''.join('{:>20}'.format(name) for name in columns) + '   trials with another'
     ]
     for name, row in zip(names, rows):
         lines.append('{:<{}}  {:>9}'.format(name, width, sum(row.counts.values())) + ''.join(
-            '{:>20}'.format(row.counts[outcome]) for outcome in OUTCOMES)
+            '{:>20}'.format(row.counts[outcome]) for outcome in columns)
             + '   {} of {}'.format(row.other_trials, row.trials))
     return '\n'.join(lines) + '\n'
 

@@ -12,9 +12,9 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Sequence
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
-from smach_oracle.analysis import bag_statistics
+from smach_oracle.analysis import bag_statistics, comparison
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policy import POLICIES
 from smach_oracle.oracle.errors import SettingsError
@@ -24,8 +24,21 @@ from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
 
 from .job import ExperimentJob
-from .plan import CONFIGURED, TASKS, ExperimentError, ExperimentPlan, enter_folder, make_variants
+from .plan import (
+    BARE,
+    CONFIGURED,
+    DEFAULT,
+    TASKS,
+    ExperimentError,
+    ExperimentPlan,
+    Variant,
+    enter_folder,
+    make_variants,
+    named_variants,
+)
 from .progress import ProgressLine
+from .protocols import PROTOCOLS
+from .results import RESULTS_FILE
 from .stop_signals import StopRequested, StopSignals
 
 POLL_S = 0.5
@@ -34,6 +47,7 @@ LONGEST_DELAY = 3600.0  # s, of the operator
 COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
 DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
 BOTH = ('both', 'with', 'without')  # the oracle
+NAMED = (BARE, DEFAULT, *sorted(POLICIES))
 # Settings of the oracle that override those of the task: option, type, what it is.
 OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
              ('high_from', float, 'failure rate from which a state is HIGH'),
@@ -126,6 +140,10 @@ def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        '--protocol', choices=sorted(PROTOCOLS),
+        help='all experiments of a protocol, each in a folder of its own below --output; only '
+        '--seed, --jobs, --answer-delay and --hung-after count beside')
     parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
                         help='(default: %(default)s)')
     parser.add_argument(
@@ -139,8 +157,11 @@ def make_parser() -> argparse.ArgumentParser:
         help='complete repetitions on further seeds, each learning anew (default: 1)')
     parser.add_argument('--jobs', type=int, default=2,
                         help='replicates of variants at a time (default: %(default)s)')
-    parser.add_argument('--variants', choices=BOTH, default='both', help='(default: %(default)s)')
-    parser.add_argument('--arms', dest='variants', choices=BOTH, default=argparse.SUPPRESS,
+    parser.add_argument(
+        '--variants', nargs='+', choices=[*BOTH, *NAMED], default=['both'], metavar='NAME',
+        help='both, with or without the oracle (default: both), or one or more of: {}'.format(
+            ', '.join(NAMED)))
+    parser.add_argument('--arms', dest='variants', nargs=1, choices=BOTH, default=argparse.SUPPRESS,
                         action=_RenamedOption, help='the older name of --variants')
     parser.add_argument(
         '--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
@@ -184,8 +205,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
         for name in ['estimator'] + [name for name, _, _ in OVERRIDES]
         if getattr(args, name) is not None
     }
-    varied = varied_settings(args)
-    variants = make_variants(args.variants, settings, varied)
+    variants = _chosen_variants(parser, args, settings)
     for variant in variants:
         try:
             Settings.from_dict(dict(variant.settings))
@@ -194,6 +214,18 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     args.plan = ExperimentPlan(args.task, trials, args.seed, args.replicates, variants,
                                args.answer_delay, args.benign)
     return args
+
+
+def _chosen_variants(parser: argparse.ArgumentParser, args: argparse.Namespace,
+                     settings: Mapping[str, Any]) -> Tuple[Variant, ...]:
+    by_oracle = [name for name in args.variants if name in BOTH]
+    if not by_oracle:
+        if args.policy != [CONFIGURED]:
+            parser.error('--policy: name the policies by --variants')
+        return named_variants(args.variants, settings, list(dict.fromkeys(args.memory or ())))
+    if len(args.variants) > 1:
+        parser.error('--variants: {} stands alone'.format(by_oracle[0]))
+    return make_variants(by_oracle[0], settings, varied_settings(args))
 
 
 def varied_settings(args: argparse.Namespace) -> Dict[str, Sequence[Any]]:
@@ -217,10 +249,9 @@ def main(argv: Optional[List[str]] = None) -> int:
     try:
         if shutil.which('roslaunch') is None:
             raise ExperimentError('roslaunch not found; source the workspace first')
-        with alone_in(output):
-            if enter_folder(output, args.plan):
-                print('Going on in {}'.format(output))
-            jobs = run(args.plan, output, args.jobs, args.hung_after)
+        if args.protocol:
+            return _run_protocol(args, output)
+        jobs = _run_in(output, args.plan, args)
     except ImportError as err:  # bags are read with a package that not every robot has
         print('run_trials: {}'.format(lacking(err) or err), file=sys.stderr)
         return LACKING
@@ -234,6 +265,27 @@ def main(argv: Optional[List[str]] = None) -> int:
             'there'.format(err, output), file=sys.stderr)
         return 128 + err.signum
     return report(jobs, output)
+
+
+def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> List[ExperimentJob]:
+    with alone_in(output):
+        if enter_folder(output, plan):
+            print('Going on in {}'.format(output))
+        return run(plan, output, args.jobs, args.hung_after)
+
+
+def _run_protocol(args: argparse.Namespace, output: Path) -> int:
+    """Run the parts of a protocol one after the other, and compare the variants of each.
+
+    :returns: 0, or LOST where trials of a part were lost.
+    """
+    code = 0
+    for part in PROTOCOLS[args.protocol](args.seed, args.answer_delay):
+        print('Part {}'.format(part.name), flush=True)
+        jobs = _run_in(output / part.name, part.plan, args)
+        comparison.main([str(output / part.name / RESULTS_FILE)])
+        code = LOST if any(job.lost for job in jobs) else code
+    return code
 
 
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:

@@ -11,7 +11,8 @@ from smach_oracle.analysis.trials import TrialSummary
 
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
-from .records import ReplicateRecords
+from .records import RecordedTrial, ReplicateRecords
+from .results import JobResults
 
 LEFTOVER_GRACE_S = 15.0  # for processes that an earlier job left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
@@ -40,6 +41,9 @@ class ExperimentJob:
         self._hung_after_s = hung_after_s
         self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
                                          self._seed, plan.trials)
+        self._results = JobResults(output, plan.task, variant.name, replicate, self._seed)
+        # trials whose bags are whole, and of which the world has not told yet
+        self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
         self._attempts: Dict[int, int] = {}
         # the latest trial's end, the latest line that the log grew by
@@ -64,10 +68,14 @@ class ExperimentJob:
     @property
     def finished(self) -> int:
         """How many trials are over, lost ones among them."""
-        return min(self.trials, len(self.summaries) + len(self._lost))
+        return min(self.trials, self._kept + len(self.summaries) + len(self._lost))
 
     def _look_through(self) -> None:
-        progress = self._records.tidy_up()
+        progress = self._records.tidy_up(self._results.kept())
+        self._untold, self._kept = [], progress.kept
+        self._results.forget_from(progress.next_trial)
+        self._results.add([self._records.with_truth(trial) for trial in progress.done],
+                          progress.lost, self._records.truth)
         self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
         self._next, self._lost = progress.next_trial, progress.lost
         if progress.dropped:
@@ -84,6 +92,8 @@ class ExperimentJob:
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))
+        if settings.get('policy') == 'random':  # trial by trial, also after an interruption
+            settings['policy'] = {'name': 'random', 'seed': self._seed + self._next}
         return {
             'trials': self.trials - self._next, 'seed': self._seed + self._next,
             'record': self._records.folder, 'truth': self._records.truth,
@@ -127,7 +137,13 @@ class ExperimentJob:
                 recorded = self._records.read(path)
                 if recorded is not None:
                     self.summaries[path] = recorded.summary
+                    self._untold.append(recorded)
                     self._ended_at = self._sign_at = time.monotonic()
+        told = [trial for trial in self._untold if self._records.is_complete(trial)]
+        if told:  # the world tells of a trial when the next one begins
+            self._untold = [trial for trial in self._untold if trial not in told]
+            self._results.add([self._records.with_truth(trial) for trial in told], {},
+                              self._records.truth)
 
     def _again(self, why: str) -> None:
         self.stop()

@@ -14,6 +14,8 @@ VERSION = 1
 TASKS: Dict[str, Tuple[str, int]] = {'pick_and_place': ('pick_and_place.launch', 150),
                                      'drink_retrieval': ('drink_retrieval.launch', 100)}
 ARMS = 'arms'  # key of the variants in an experiment's file: the older name
+BARE = 'bare'  # name of the variant without the oracle
+DEFAULT = 'default'  # and of that with the oracle as the task has it
 CONFIGURED = 'configured'  # a setting's value that leaves it as the task has it
 PACKAGES = ('pybullet', 'ompl', 'numpy', 'scipy', 'opencv-python-headless', 'example-robot-data')
 
@@ -71,6 +73,25 @@ def make_variants(which: str, settings: Mapping[str, Any],
             variants.append(Variant('_'.join(['with_oracle'] + named), True, {**settings, **given}))
     if which in ('both', 'without'):
         variants.append(Variant('without_oracle', False, {}))
+    return tuple(variants)
+
+
+def named_variants(names: Sequence[str], settings: Mapping[str, Any],
+                   memories: Sequence[int] = ()) -> Tuple[Variant, ...]:
+    """Return variants by name: BARE, DEFAULT, or a policy, each with every memory.
+
+    :param settings: of every oracle.
+    """
+    variants: List[Variant] = []
+    for name in dict.fromkeys(names):
+        if name == BARE:
+            variants.append(Variant(name, False, {}))
+            continue
+        policy = {} if name == DEFAULT else {'policy': name}
+        for memory in memories or [0]:
+            given = {**settings, **policy, **({'memory': memory} if memory else {})}
+            variants.append(Variant(
+                '{}_memory_{}'.format(name, memory) if len(memories) > 1 else name, True, given))
     return tuple(variants)
 
 

@@ -9,7 +9,7 @@ their names, which is that of the trials.
 import json
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
 from smach_oracle.analysis.trial_counter import TrialEnding
@@ -39,6 +39,24 @@ class JobProgress(NamedTuple):
     lost: Dict[int, str]  # number of the trial, from 0: why
     dropped: Tuple[str, ...]  # names of the bags that were put aside
     next_trial: int  # number of the first trial that is neither done nor lost
+    kept: int = 0  # trials that are done and have no bag here
+
+
+class KeptTrials(NamedTuple):
+    """Trials from the first one on that a job keeps rows of; they may have no bags here."""
+
+    numbers: List[int]
+    lost: Dict[int, str]  # number of the trial, from 0: why
+    learned: List[Optional[Mapping[str, Any]]]  # at the end of each of `numbers`
+
+    def before(self, number: int) -> 'KeptTrials':
+        """Return those before a trial."""
+        count = sum(1 for each in self.numbers if each < number)
+        return KeptTrials(self.numbers[:count], {
+            each: why for each, why in self.lost.items() if each < number}, self.learned[:count])
+
+
+NONE_KEPT = KeptTrials([], {}, [])
 
 
 class ReplicateRecords:
@@ -57,18 +75,20 @@ class ReplicateRecords:
         self._reader = EventReader()
         folder.mkdir(parents=True, exist_ok=True)
 
-    def tidy_up(self) -> JobProgress:
+    def tidy_up(self, kept: KeptTrials = NONE_KEPT) -> JobProgress:
         """Put aside what is not complete, and prepare to go on; only while nothing runs.
 
         Afterwards there are the bags and the truth of complete trials, and the rates as the last
-        one left them.
+        one left them. Trials of `kept` count without a bag where all bags come behind them.
 
         :raises ExperimentError: where a bag is of another seed than its place says.
         :raises OSError: where a file cannot be moved or written.
         """
-        lost, truths = self._lost(), self._truths()
-        numbers = [number for number in range(self._trials) if number not in lost]
-        paths = self._bags()
+        paths, truths = self._bags(), self._truths()
+        kept = kept.before(self._first_number(paths))
+        lost = {**kept.lost, **self._lost()}
+        passed = {*lost, *kept.numbers}
+        numbers = [number for number in range(self._trials) if number not in passed]
         done: List[RecordedTrial] = []
         while len(done) < min(len(paths), len(numbers)):
             recorded = self.read(paths[len(done)])
@@ -85,9 +105,18 @@ class ReplicateRecords:
         next_trial = (numbers + [self._trials])[len(done)]
         self._keep_lost({number: why for number, why in lost.items() if number < next_trial})
         self._keep_truths({self._first_seed + number for number in numbers[:len(done)]})
-        self._restore_rates(done[-1].learned if done else None)
+        learned = [each.learned for each in done] or kept.learned
+        self._restore_rates(learned[-1] if learned else None)
         return JobProgress(done, self._lost(), tuple(os.path.basename(path) for path in dropped),
-                           next_trial)
+                           next_trial, len(kept.numbers))
+
+    def _first_number(self, paths: Sequence[str]) -> int:
+        """Return the number of the first trial that has a bag."""
+        if not paths:
+            return self._trials
+        recorded = self.read(paths[0])
+        cause = recorded.summary.cause if recorded is not None else None
+        return cause.seed - self._first_seed if cause is not None else 0
 
     def read(self, path: str) -> Optional[RecordedTrial]:
         """The trial of a bag; None where the bag cannot be read, or is not of one trial."""
@@ -102,6 +131,17 @@ class ReplicateRecords:
         learned = end.data.get('learned') if end is not None and isinstance(end.data,
                                                                             Mapping) else None
         return RecordedTrial(summary._replace(cause=content.causes.get(summary.trial_id)), learned)
+
+    def is_complete(self, recorded: RecordedTrial) -> bool:
+        """Whether a trial has come to its end, and the world has told how."""
+        cause = recorded.summary.cause
+        return cause is not None and self._is_complete(recorded, cause.seed, self._truths())
+
+    def with_truth(self, recorded: RecordedTrial) -> RecordedTrial:
+        """Return a trial with what the world has told of its end."""
+        cause = recorded.summary.cause
+        truth = self._truths().get(cause.seed) if cause is not None else None
+        return recorded._replace(summary=recorded.summary._replace(truth=truth))
 
     def _is_complete(self, recorded: RecordedTrial, seed: int, truths: Mapping[int, Any]) -> bool:
         summary = recorded.summary

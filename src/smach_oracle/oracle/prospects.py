@@ -4,7 +4,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, cast
 import smach
 
 from .decision.failure_rate import FailureClass
-from .decision.policy import Action, Policy, Preconditions, Situation
+from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .machine.nesting import nodes_of
 from .machine.tree_node import TreeNode, WrappedMachine
 from .records.events import FailureKind
@@ -142,9 +142,11 @@ def _actions(policy: Policy, settings: StateSettings, decides: bool
     for failure_class in (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH):
         possible: Dict[Action, None] = {}
         for situation in _situations(policy, failure_class, bool(settings.preconditions)):
-            possible[policy.decide(situation)] = None
+            for recoveries in range(settings.max_recoveries + 1):
+                past = Past(recoveries, recoveries)
+                possible.update(dict.fromkeys(policy.may_do(situation._replace(past=past))))
         if only_asks:
-            possible = {Action.ASK: None}
+            possible = {Action.ASK if policy.asks else Action.GIVE_UP: None}
         yield failure_class, tuple(action for action in Action if action in possible)
 
 

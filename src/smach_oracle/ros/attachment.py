@@ -44,6 +44,7 @@ from .parameters import private_flag, private_names, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
+from .waiting.service_waiting import ServiceWaiting
 
 # for trials to tell their end, before their bags are closed under them; roslaunch gives a node 15 s
 TRIAL_END_WAIT_S = 10.0
@@ -168,6 +169,9 @@ class Attachments:
         if oracle.recovers and oracle.expert is None:
             oracle.expert = self._shared_expert()
         oracle.listen_to_health(self._listen_to_health)
+        pass_time = private_text('pass_time')
+        if pass_time:
+            oracle.waiting = ServiceWaiting(rospy.resolve_name(pass_time))
         if self._events is not None:
             oracle.events.observers.append(self._events)
         if self._rates is not None:

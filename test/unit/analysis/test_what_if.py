@@ -66,6 +66,8 @@ def run(count, seed=1, states=None, back_to='', health=None, **settings):
 
 @pytest.mark.parametrize(
     'settings', [{}, {'memory': 2}, {'policy': 'algorithm1'}, {'estimator': 'exponential'},
+                 {'policy': 'restart'}, {'policy': {'name': 'retry', 'times': 1}},
+                 {'policy': {'name': 'ladder', 'wait_s': 0}}, {'policy': 'always_ask'},
                  {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
 def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
     tried = what_if.compare(run(60, **{**KEPT, **settings}), {})
@@ -204,3 +206,38 @@ def test_the_command(tmp_path, capsys):
     assert row.split()[4] == row.split()[5] and row.endswith('   0 of 40'), 'as recorded'
     assert what_if.main([str(tmp_path / 'nowhere')]) == 2
     assert 'no such folder' in capsys.readouterr().err
+
+
+def tried_under(recorded, settings):
+    """The counts, where what one policy recorded is put to another."""
+    return what_if.compare(run(60, **{**KEPT, 'policy': recorded}), settings).counts
+
+
+def test_what_is_drawn_is_not_known():
+    counts = tried_under('prose', {'policy': 'random'})
+    assert counts['not known'] == sum(counts.values()) > 20
+    counts = tried_under('random', {})
+    assert counts['not known'] > 20
+    # what the limits outside every policy have decided is known
+    assert counts['not known'] + counts['same'] == sum(counts.values())
+
+
+def test_a_policy_that_asks_nobody_would_give_up():
+    counts = tried_under('always_ask', {'policy': 'retry'})
+    assert counts['would recover'] == sum(counts.values()) > 20
+    counts = tried_under('prose', {'policy': 'retry', 'policy.times': 0})
+    assert counts[what_if.GIVES_UP] == sum(counts.values()) > 20
+
+
+def test_another_policy_has_the_parameters_it_comes_with():
+    recorded = run(60, **{**KEPT, 'policy': {'name': 'retry', 'times': 0}})
+    counts = what_if.compare(recorded, {'policy': 'ladder'}).counts
+    assert counts['would recover'] == sum(counts.values()) > 20
+
+
+def test_the_column_of_those_who_give_up_is_there_where_some_do():
+    recorded = run(60, **KEPT)
+    rows = [what_if.compare(recorded, settings) for settings in (
+        {'policy': 'always_ask'}, {'policy': 'retry', 'policy.times': 0})]
+    assert what_if.GIVES_UP in what_if.format_tried_settings(rows)
+    assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1])

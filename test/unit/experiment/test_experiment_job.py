@@ -15,6 +15,10 @@ from smach_oracle.experiment.records import JobProgress
 FIRST_SEED = 100
 
 
+def recorded(path):
+    return SimpleNamespace(summary=SimpleNamespace(bags=(path,), cause=None))
+
+
 class FakeRecords:
     """Trials that are done by number, without any files."""
 
@@ -24,13 +28,13 @@ class FakeRecords:
         self.done, self.lost = [], {}
         FakeLaunch.records = self
 
-    def tidy_up(self):
+    def tidy_up(self, kept):
         left = [
             number for number in range(self._trials)
             if number not in self.done and number not in self.lost
         ]
         done = [
-            SimpleNamespace(summary=SimpleNamespace(bags=(path,))) for path in self.closed_bags()
+            recorded(path) for path in self.closed_bags()
         ]
         return JobProgress(done, dict(self.lost), (), left[0] if left else self._trials)
 
@@ -38,7 +42,13 @@ class FakeRecords:
         return ['{}.bag'.format(number) for number in sorted(self.done)]
 
     def read(self, path):
-        return SimpleNamespace(summary=SimpleNamespace(bags=(path,)))
+        return recorded(path)
+
+    def is_complete(self, trial):
+        return False
+
+    def with_truth(self, trial):
+        return trial
 
     def mark_lost(self, number, why):
         self.lost[number] = why

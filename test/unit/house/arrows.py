@@ -12,7 +12,7 @@ ARROWS: Dict[str, Set[str]] = {
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
-            'oracle.oracle_of'},
+            'oracle.oracle_of', 'oracle.waiting'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -45,11 +45,11 @@ LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
         'prospects', 'operator_hand', 'container', 'question', 'execution', 'branches', 'recovery',
         'places', 'machine', 'control', 'asking', 'records', 'settings', 'decision',
-        'number_checks', 'background', 'errors'
+        'number_checks', 'background', 'waiting', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
-                                                 'hand'},
+                                                 'hand', 'waiting'},
         {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',

@@ -25,6 +25,7 @@ from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
+PAPER = ('algorithm1', 'prose')
 CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
 
 
@@ -48,7 +49,7 @@ TABLE = table_of_the_page()
 
 def test_the_page_covers_every_cell_of_every_policy():
     cells = set(
-        itertools.product(POLICIES, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'),
+        itertools.product(PAPER, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'),
                           ('no', 'yes')))
     assert set(TABLE) == cells
 
@@ -97,7 +98,7 @@ def test_a_machine_does_what_the_page_says(cell):
     assert [event.target for event in machine.of(EventKind.JUMP)][last] == (target or 'C')
 
 
-@pytest.mark.parametrize('name', sorted(POLICIES))
+@pytest.mark.parametrize('name', PAPER)
 def test_nothing_is_run_for_a_state_that_fails_mostly(name):
     machine = machine_in((name, 'HIGH', 'met', 'no'))
     assert machine.run() == 'done'
@@ -214,7 +215,7 @@ def continuous_failures(machine, label):
     return [event.continuous for event in machine.of(EventKind.FAILURE) if event.state == label]
 
 
-@pytest.mark.parametrize('policy', sorted(POLICIES))
+@pytest.mark.parametrize('policy', PAPER)
 def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
     """The first example of the page."""
     reached_twice, driven = threading.Event(), threading.Event()
@@ -244,7 +245,7 @@ def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
     assert continuous_failures(machine, 'DRIVE') == [False]
 
 
-@pytest.mark.parametrize('policy', sorted(POLICIES))
+@pytest.mark.parametrize('policy', PAPER)
 def test_a_failure_of_the_machine_around_breaks_no_continuity(policy):
     arm = machine_of(('REACH', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'}))
     machine = Watched(machine_of(('ARM', arm, {'done': 'done'})), settings={
@@ -316,7 +317,7 @@ def test_the_class_is_that_after_the_failure_and_the_failure_event_tells_that_be
 
 
 def test_an_unknown_policy_is_refused_by_name():
-    with pytest.raises(SettingsError, match='policy.*guess.*algorithm1, prose'):
+    with pytest.raises(SettingsError, match='policy.*guess.*algorithm1, .*prose'):
         policy_named('guess')
 
 

@@ -20,7 +20,8 @@ def test_the_defaults_are_those_of_the_design():
 
 @pytest.mark.parametrize('given, key, value, allowed', [
     ({'polisy': 'prose'}, 'polisy', 'prose', 'policy'),
-    ({'policy': 'guess'}, 'policy', 'guess', 'algorithm1, prose'),
+    ({'policy': 'guess'}, 'policy', 'guess',
+     'algorithm1, always_ask, ladder, prose, random, restart, retry, step_back'),
     ({'memory': 0}, 'memory', 0, 'whole number'), ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
     ({'memory': True}, 'memory', True, 'whole number'), ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
     ({'prior': float('nan')}, 'prior', None, '0 to 1'),

@@ -22,6 +22,7 @@ class DecisionFacts(NamedTuple):
     blocked: str = ''  # why the policy's own choice is not possible
     held_back: str = ''  # why the state was not executed, where it has not failed
     asked: str = ''  # who is asked, and how long: "an expert, 300 s"
+    wait_s: float = 0.0  # waited before
 
 
 def decision_sentence(facts: DecisionFacts) -> str:
@@ -103,4 +104,13 @@ def _helped(facts: DecisionFacts) -> str:
 def _does(facts: DecisionFacts) -> str:
     if facts.action is Action.ASK:
         return 'asking {}'.format(facts.asked or 'an expert')
+    if facts.action is Action.GIVE_UP:
+        return 'giving up, and asking nobody'
+    waiting = 'in {:g} s '.format(facts.wait_s) if facts.wait_s else ''
+    return waiting + _goes(facts)
+
+
+def _goes(facts: DecisionFacts) -> str:
+    if facts.action is Action.RESTART:
+        return 'starting over from ' + facts.target
     return 'trying it again' if facts.target == facts.state else 'going back to ' + facts.target

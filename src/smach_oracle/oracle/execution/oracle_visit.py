@@ -6,7 +6,7 @@ import smach
 from ..asking.question import Answer
 from ..decision.policy import FailureContext
 from ..machine.learned_rates import save_rates
-from ..machine.repeats import note_superseded
+from ..machine.repeats import leave_for, note_superseded
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..places.way import Way
@@ -20,7 +20,9 @@ from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
 from .departure import depart, leaving_outcome
 from .entering import prepare_entry
+from .going_on import ask_to_go_on
 from .oracle_state import OracleState
+from .starting_over import restore_start
 from .transitions import go_to, message_of, terminate
 
 
@@ -146,10 +148,22 @@ class OracleVisit:
         return self._terminate(self._leaving())
 
     def _jump(self, way: Way, verdict: Verdict) -> None:
+        if verdict.restarts:
+            self._start_over(way, verdict)
+            return
         entry = prepare_entry(way, verdict.written, 'jumping')
         self._note_entry(way.first)
         self._go_on(way.first, entry.userdata, entry.missing, verdict.by, verdict.text,
                     self._across(way))
+
+    def _start_over(self, way: Way, verdict: Verdict) -> None:
+        """Enter the initial state, with the userdata of the start in all containers."""
+        node, target = self._node, way.first
+        restore_start(node)
+        leave_for(node, target)
+        ask_to_go_on(node, target)
+        self._note_entry(target)
+        self._go_on(target, 'start', by=verdict.by, text=verdict.text, across=self._across(way))
 
     def _across(self, way: Way) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""

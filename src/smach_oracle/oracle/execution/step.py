@@ -32,6 +32,7 @@ from .boundary import Stop, pass_boundary
 from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
 from .passed_over import tell_passed_over
+from .starting_over import keep_start
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
@@ -50,6 +51,8 @@ def before_step(node: TreeNode) -> Optional[Stop]:
         node.tree.control.calm(node.engine)
     else:
         node.begin_stepping()
+        if node.tree.restarts.is_due:
+            keep_start(node)
     if node.is_left_behind():
         stop_left_behind(node)
         return Stop()

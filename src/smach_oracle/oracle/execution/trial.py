@@ -14,6 +14,7 @@ from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from .sending import tell_dropped
+from .starting_over import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
 
@@ -36,6 +37,7 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         if not each.machine.is_running():
             each.begin_trial(node.tree.trial_id)
     begin_watching(node)
+    node.tree.restarts.begin_trial(may_start_over(node))
     node.tree.budget.begin(node.settings.budget)
     return _run_trial(node, execute)
 
@@ -63,7 +65,10 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional
 def _settings(node: TreeNode) -> Dict[str, Any]:
     """What the oracle of the top machine decides by, but for what is set for single states."""
     settings, defaults = node.settings, node.settings.defaults
-    return {'policy': settings.policy, 'memory': defaults.memory, 'estimator': defaults.estimator,
+    parameters = sorted(settings.policy_parameters.items())
+    return {'policy': settings.policy,
+            **{'policy.' + name: value for name, value in parameters},
+            'memory': defaults.memory, 'estimator': defaults.estimator,
             'prior': defaults.prior, 'moderate_from': defaults.moderate_from,
             'high_from': defaults.high_from, 'max_recoveries': defaults.max_recoveries}
 

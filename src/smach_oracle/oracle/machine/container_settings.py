@@ -16,7 +16,7 @@ class ContainerSettings:
     def use(self, settings: Settings) -> None:
         """Put settings of the whole machine into force; those given with `add()` stay."""
         self.of_machine = settings
-        self.policy: Policy = policy_named(settings.policy)
+        self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
         self.failing = FailingNames(settings.failing_outcomes)
         self.deep_copy_keys = settings.deep_copy_keys
 

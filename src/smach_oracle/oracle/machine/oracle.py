@@ -9,6 +9,7 @@ from ..records.events import EventSource
 from ..records.rate_rows import StateRateRow, TransitionRow
 from ..settings.health import HealthFunction
 from ..settings.settings import Settings
+from ..waiting import Waiting
 from .health_watch import ListenToHealth
 from .nesting import nodes_of
 from .tree_node import TreeNode, WrappedMachine
@@ -88,6 +89,15 @@ class Oracle:
     @expert.setter
     def expert(self, expert: Optional[Expert]) -> None:
         self._node.tree.expert = expert
+
+    @property
+    def waiting(self) -> Waiting:
+        """Lets time pass where a policy waits: monotonic time, unless another clock is set."""
+        return self._node.tree.waiting
+
+    @waiting.setter
+    def waiting(self, waiting: Waiting) -> None:
+        self._node.tree.waiting = waiting
 
     @property
     def health(self) -> Optional[HealthFunction]:

@@ -12,7 +12,9 @@ import smach
 from ..asking.question import Expert
 from ..control.control import Control
 from ..records.events import EventSource
+from ..records.restarts import Restarts
 from ..settings.health import HealthFunction
+from ..waiting import MonotonicWaiting, Waiting
 from .alarm_clock import AlarmClock
 from .health_watch import HealthWatch
 from .trial_budget import TrialBudget
@@ -47,6 +49,9 @@ class Tree:
         self.events = EventSource(log_error)
         self.workers = Workers()
         self.budget = TrialBudget()
+        self.restarts = Restarts()
+        self.waiting: Waiting = MonotonicWaiting()
+        self.trials = 0  # begun
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
         self._visits = itertools.count(1)
@@ -65,6 +70,7 @@ class Tree:
     def begin_trial(self, trial_id: str) -> None:
         """Number events and questions anew."""
         self.trial_id = trial_id
+        self.trials += 1
         self._questions = 0
         self.events.begin_trial(trial_id)
 
@@ -84,11 +90,12 @@ class Tree:
     def __getstate__(self) -> Dict[str, Any]:
         """Leave out what cannot travel with a pickled or copied machine.
 
-        That is the expert, its connection, and locks.
+        That is the expert, its connection, a clock that was handed in, and locks.
         """
         state = dict(self.__dict__)
         del state['_lock'], state['rates_lock'], state['departures_lock']
         state['expert'] = None
+        state['waiting'] = MonotonicWaiting()
         state['describe_failure'] = no_description
         return state
 

@@ -31,6 +31,7 @@ class Decider(str, Enum):
 
     POLICY = 'policy'
     MAX_RECOVERIES = 'max_recoveries'  # the limit, outside every policy
+    AUTHOR = 'author'  # has drawn a way on above, so that the script is not started over
     BUDGET = 'budget'  # that of the whole trial
     ON_RETRY = 'on_retry'  # where the policy wants to go, a state would be repeated
     HELD_BACK = 'held_back'  # no failure: the machine came to a state that is not to be repeated

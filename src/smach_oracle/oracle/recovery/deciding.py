@@ -1,11 +1,12 @@
 """What the oracle of one level decides about a failure of its state (paper, Algorithm 1)."""
-from typing import Any, List, Optional, Tuple
+from typing import Any, Callable, List, Optional, Tuple
 
-from ..decision.policy import Action, FailureContext, Preconditions, Situation
+from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, going_would_repeat
 from ..machine.repeats import has_visited
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
+from ..places.levels import levels_above
 from ..places.place import Place, place_named
 from ..places.way import Way, closed_in_words, repeated_on, way_to
 from ..records.events import EventKind
@@ -20,8 +21,14 @@ from .stop import RecoveryStop
 Decided = Tuple[Decider, DecisionFacts]
 
 
+def _nothing_above() -> str:
+    return ''
+
+
 class Deciding:
     """One decision of one container's oracle; `tried` says what was done before it.
+
+    `place`: where it has decided to go, None where it goes nowhere.
 
     `decide` is called in the machine's thread, `cancel` from any thread.
     """
@@ -46,9 +53,15 @@ class Deciding:
         """Preempt the precondition that runs."""
         self._preconditions.cancel()
 
-    def decide(self) -> Decided:
-        """Run the preconditions that the policy wants, and say what it does."""
-        return self._ask_at_once() or self._follow_policy()
+    def decide(self, why_not_above: Callable[[], str] = _nothing_above) -> Decided:
+        """Run the preconditions that the policy wants, and say what it does.
+
+        :param why_not_above: says why no level above is to be disturbed by this failure.
+        """
+        decider, facts = self._ask_at_once() or self._follow_policy(why_not_above)
+        if facts.action is Action.ASK and not self._node.in_force.policy.asks:
+            return decider, facts._replace(action=Action.GIVE_UP)
+        return decider, facts
 
     def _ask_at_once(self) -> Optional[Decided]:
         """Return the decision where no policy has a say, and no precondition is run."""
@@ -64,28 +77,42 @@ class Deciding:
             return Decider.ON_RETRY, self.facts_of(ask, blocked=self._why_repeats(record.label))
         return None
 
-    def _follow_policy(self) -> Decided:
+    def _follow_policy(self, why_not_above: Callable[[], str]) -> Decided:
         record, policy = self._record, self._node.in_force.policy
         preconditions = self._run_preconditions()
-        action = policy.decide(Situation(record.failure_class, preconditions, self._continuous))
-        if action is Action.ASK:
-            return Decider.POLICY, self.facts_of(action)
-        name = (record.label if action is Action.REVISIT
-                else policy.step_back_target(self._context))
-        way = self._way_to(name)
+        situation = Situation(record.failure_class, preconditions, self._continuous, self._past())
+        action = policy.decide(situation)
+        if action in (Action.ASK, Action.GIVE_UP):
+            return Decider.POLICY, self.facts_of(action, blocked=policy.why(situation))
+        name, place = self._place_of(action)
+        way = way_to(self._node, place) if place is not None else None
         if way is None:
             return Decider.POLICY, self.facts_of(
                 Action.ASK, blocked='there is no state {!r} to go back to'.format(name))
-        decider, why_not = self._what_prevents(way)
+        why_not = why_not_above() if action is Action.RESTART else ''
+        decider, why_not = (Decider.AUTHOR, why_not) if why_not else self._what_prevents(way)
         if why_not:
             return decider, self.facts_of(Action.ASK, blocked=why_not)
         self.way = way
-        return decider, self.facts_of(action, target=self._named(way))
+        return decider, self.facts_of(action, target=self._named(way),
+                                      wait_s=policy.wait_s(situation))
 
-    def _way_to(self, name: str) -> Optional[Way]:
-        """Return the way to a state by its label, or its path below the top machine."""
-        place = place_named(self._node, name)
-        return way_to(self._node, place) if place is not None else None
+    def _past(self) -> Past:
+        record, tree = self._record, self._node.tree
+        return Past(record.recoveries, tree.restarts.count,
+                    '{}/{} {}'.format(self._node.path, record.label, record.visits),
+                    tree.trials - 1)
+
+    def _place_of(self, action: Action) -> Tuple[str, Optional[Place]]:
+        """Return where a decision leads, by name and as a place; None: there is no such state."""
+        node = self._node
+        if action is Action.RESTART:
+            top = [node, *levels_above(node)][-1]
+            label = top.machine._initial_state_label or ''
+            return label, Place(top, label)
+        name = (self._record.label if action is Action.REVISIT
+                else node.in_force.policy.step_back_target(self._context))
+        return name, place_named(node, name)
 
     def _named(self, way: Way) -> str:
         """Return the label of a place, or its path where it is in another container."""

@@ -3,6 +3,7 @@ from typing import Any, FrozenSet, List, NamedTuple, Optional, Tuple
 
 import smach
 
+from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
@@ -20,6 +21,7 @@ from .failure import (
     Route,
     author_recovers,
     failure_kind,
+    natural_ending,
     route_of,
 )
 from .stop import RecoveryStop
@@ -140,6 +142,8 @@ class OuterDecision(NamedTuple):
     way: Way
     text: str
     written: FrozenSet[str]
+    wait_s: float = 0.0  # waited before
+    restarts: bool = False
 
 
 class OuterLevel:
@@ -172,7 +176,7 @@ class OuterLevel:
             return None
         rate, failure_class = record.rate, record.failure_class
         record.learn(True)
-        decider, facts = self._deciding.decide()
+        decider, facts = self._deciding.decide(self._foreseen)
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
         decided = self._deciding.way
         way = way_to(self._below, decided.down[-1]) if decided is not None else None
@@ -191,7 +195,14 @@ class OuterLevel:
                    continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
         record.recoveries += 1
         written = () if decided.left else self._deciding.watch.written()
-        return OuterDecision(self._node, way, sentence, frozenset(written))
+        return OuterDecision(self._node, way, sentence, frozenset(written), facts.wait_s,
+                             facts.action is Action.RESTART)
+
+    def _foreseen(self) -> str:
+        node = self._node
+        foreseen = foreseen_above(node, natural_ending(
+            self._failure, node.machine.get_registered_outcomes(), node.in_force.failing))
+        return foreseen.text if foreseen is not None else ''
 
     def _emit(self, kind: EventKind, **fields: object) -> None:
         self._node.emit(kind, state=self._record.label, **fields)

@@ -9,10 +9,10 @@ from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, Expert, Question, names
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext
-from ..decision.sentence import cause_of, decision_sentence
+from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
-from ..places.place import Place, place_named
+from ..places.place import place_named
 from ..places.way import Way, way_to, why_closed_on
 from ..records.events import EventKind
 from ..records.facts import DECIDED_BY, Decider
@@ -76,15 +76,14 @@ class Recovery:
         """Decide, and ask where the policy says so; neither where the trial's time is over."""
         if self._budget.why_over():
             return self._end_unaided()
-        decided = self._deciding.decide()
+        decided = self._deciding.decide(self._why_left_to_others)
         if self._stop.is_over():
             return self._ended_early()
         decider, facts = decided
         record, self._cause = self._record, cause_of(facts)
         if facts.action is not Action.ASK:
             self._tell_decision(decided)
-            record.recoveries += 1
-            return self._jump(self._way_decided(), self._written_on(self._way_decided()))
+            return self._follow_policy(facts)
         nobody = self._why_nobody_is_asked()
         levels = [] if nobody else self._levels_that_may_decide(decider)
         asked = ('the oracle above' if levels
@@ -95,8 +94,28 @@ class Recovery:
             return self._ended_early()
         if outer is not None:
             record.recoveries += 1
-            return self._jump(outer.way, outer.written, outer.text, outer.decided_by)
+            return self._wait_and_jump(outer.wait_s, Verdict(
+                VerdictKind.JUMP, way=outer.way, text=outer.text,
+                written=frozenset(outer.written), decided_by=outer.decided_by,
+                restarts=outer.restarts))
         return self._give_way(nobody) if nobody else self._ask()
+
+    def _follow_policy(self, facts: DecisionFacts) -> Verdict:
+        """Carry out a decision that asks nobody."""
+        way = self._deciding.way
+        if way is None:
+            return self._give_way(self._why_nobody_is_asked()
+                                  or Foreseen('the policy asks nobody'))
+        self._record.recoveries += 1
+        restarts = facts.action is Action.RESTART
+        written = () if restarts else self._written_on(way)
+        return self._wait_and_jump(facts.wait_s, Verdict(
+            VerdictKind.JUMP, way=way, restarts=restarts, written=frozenset(written)))
+
+    def _wait_and_jump(self, wait_s: float, verdict: Verdict) -> Verdict:
+        if wait_s and not self._stop.has_waited(wait_s):
+            return self._ended_early()
+        return self._when_well(verdict)
 
     def _tell_decision(self, decided: Decided) -> None:
         decider, facts = decided
@@ -138,6 +157,10 @@ class Recovery:
         return foreseen and foreseen._replace(
             text='its author goes on from there ({})'.format(foreseen.text))
 
+    def _why_left_to_others(self) -> str:
+        nobody = self._why_nobody_is_asked()
+        return nobody.text if nobody is not None else ''
+
     def _give_way(self, why: Foreseen) -> Verdict:
         """End the container, and leave all else to who is above it."""
         if why.passed_over:
@@ -169,12 +192,6 @@ class Recovery:
                                     level.in_force.failing)
         return None
 
-    def _way_decided(self) -> Way:
-        return self._deciding.way or self._way_to(self._record.label)
-
-    def _way_to(self, label: str) -> Way:
-        return Way((), self._node, (Place(self._node, label),))
-
     def _written_on(self, way: Way) -> Iterable[str]:
         """Return the keys that survive a restore: none where the container is left."""
         return () if way.left else self._watch.written()
@@ -182,7 +199,9 @@ class Recovery:
     # -- asking
 
     def _ask(self) -> Verdict:
-        expert = self._node.tree.expert
+        expert, policy = self._node.tree.expert, self._node.in_force.policy
+        if not policy.asks:
+            return self._give_up('{}: the policy asks nobody'.format(self._cause))
         if expert is None:
             return self._fall_back('no expert is there to ask')
         spent = self._budget.take_question()
@@ -237,12 +256,10 @@ class Recovery:
         return self._when_well(verdict_of(answer, self._node, self._record.label, self._watch,
                                           self._natural_ending))
 
-    def _jump(self, way: Way, written: Iterable[str], text: str = '',
-              decided_by: Optional[TreeNode] = None) -> Verdict:
-        """Go to a place, once the robot is well; `decided_by`: the level above that decided it."""
+    def _jump(self, way: Way, written: Iterable[str], text: str = '') -> Verdict:
+        """Go to a place, once the robot is well."""
         return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
-                                       written=frozenset(written),
-                                       decided_by=decided_by))
+                                       written=frozenset(written)))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""

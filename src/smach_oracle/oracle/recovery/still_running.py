@@ -105,7 +105,7 @@ class WatchedVisit:
                              daemon=True).start()
 
     def _ask(self) -> None:
-        expert = self._node.tree.expert
+        expert = self._node.tree.expert if self._node.in_force.policy.asks else None
         if self.stopped():
             return
         spent = self._why_nobody_is_asked()
@@ -129,7 +129,7 @@ class WatchedVisit:
 
     def _why_nobody_is_asked(self) -> str:
         """Spend a question of the trial's; or say that time or questions are spent."""
-        if self._node.tree.expert is None:
+        if self._node.tree.expert is None or not self._node.in_force.policy.asks:
             return ''
         return self._budget.why_over() or self._budget.take_question()
 

@@ -35,6 +35,12 @@ class RecoveryStop:
         """Whether it is stopped, or the trial's time is over."""
         return self.stopped() or bool(self._node.tree.budget.why_over())
 
+    def has_waited(self, seconds: float) -> bool:
+        """Let time pass; False where something has ended the recovery meanwhile."""
+        with standing_still(self._node.runs_around):
+            self._node.tree.waiting.wait(seconds, 'waiting', self.is_over, self.cancelled.wait)
+        return not self.is_over()
+
     # -- health
 
     def has_waited_after(self, what: str) -> bool:

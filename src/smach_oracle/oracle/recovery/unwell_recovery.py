@@ -3,6 +3,8 @@ from ..decision.policy import FailureContext
 from ..machine.health_watch import FAILED
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
+from ..places.place import Place
+from ..places.way import Way
 from ..records.events import FailureKind
 from ..records.state_record import StateRecord
 from .failure import Failure
@@ -32,7 +34,8 @@ class UnwellRecovery(Recovery):
         label = self._record.label
         if not repeated_by_going_to(self._node, label):
             self._record.unwell_repeats += 1
-            return self._jump(self._way_to(label), self._watch.written())
+            return self._jump(Way((), self._node, (Place(self._node, label),)),
+                              self._watch.written())
         self._judge_anew(self._failure._replace(
             kind=FailureKind.HELD_BACK,
             text='failed while the robot was not well, and is not repeated by itself'))

@@ -29,6 +29,7 @@ class Verdict(NamedTuple):
     written: FrozenSet[str] = frozenset()
     # JUMP: the level above that decided on it, as if its own state had failed
     decided_by: Optional[TreeNode] = None
+    restarts: bool = False  # JUMP: with the userdata of the start, in all containers
     level: Optional[TreeNode] = None  # GIVE_UP: the container that ends; None: that of the failure
 
     @property

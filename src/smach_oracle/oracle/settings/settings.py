@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
-from ..decision.policy import POLICIES
 from ..errors import SettingsError
 from ..settings.interfaces import InterfaceOffer
 from . import checks as values
@@ -17,6 +16,7 @@ from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
 from .patterns import Nested, check_name, checked_nested, exactness, matches
+from .policy_choice import checked_policy
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
@@ -60,7 +60,7 @@ _STATE_CHECKS: Dict[str, values.Check] = {
     'grace_period_s': values.number(0, math.inf, 'seconds from 0'),
 }
 _MACHINE_CHECKS: Dict[str, values.Check] = {
-    'policy': values.choice(sorted(POLICIES)),
+    'policy': checked_policy,
     'budget': checked_budget,
     'failing_outcomes': values.words,
     'userdata': values.choice(('restore', 'keep')),
@@ -90,6 +90,8 @@ class Settings:
 
     defaults: StateSettings = StateSettings()
     policy: str = 'prose'
+    # those that are not the policy's defaults
+    policy_parameters: Mapping[str, float] = field(default_factory=dict)
     failing_outcomes: Tuple[str, ...] = DEFAULT_FAILING_OUTCOMES
     userdata: str = 'restore'
     deep_copy_keys: Tuple[str, ...] = ()
@@ -135,6 +137,8 @@ class Settings:
             key: check(key, given[key])
             for key, check in _MACHINE_CHECKS.items() if key in given
         }
+        if 'policy' in machine:
+            machine['policy'], machine['policy_parameters'] = machine['policy']
         states = {name: _checked_state(name, overrides, defaults, resolver)
                   for name, overrides in values.mapping('states', given.get('states')).items()}
         return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')),

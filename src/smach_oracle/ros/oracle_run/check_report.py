@@ -6,7 +6,7 @@ from typing import Any, Iterator, List, Sequence, Tuple
 
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import Action
+from smach_oracle.oracle.decision.policy import POLICIES, Action
 from smach_oracle.oracle.prospects import (
     ContainerProspect,
     OutcomeProspect,
@@ -17,10 +17,11 @@ from smach_oracle.oracle.settings.settings import Settings, StateSettings
 from .setting_words import in_words
 
 WIDTH = 100
-_IN_WORDS = {Action.REVISIT: 'retry', Action.STEP_BACK: 'step back', Action.ASK: 'ask'}
+_IN_WORDS = {Action.REVISIT: 'retry', Action.STEP_BACK: 'step back', Action.RESTART: 'start over',
+             Action.ASK: 'ask', Action.GIVE_UP: 'give up'}
 # told by lines of their own
 _TOLD = ('preconditions', 'time_limit_s')
-_PARTS = ('defaults', 'states', 'interfaces')
+_PARTS = ('defaults', 'states', 'interfaces', 'policy_parameters')
 
 
 def lines_of(container: ContainerProspect) -> List[str]:
@@ -57,7 +58,7 @@ def _heading(container: ContainerProspect) -> List[str]:
             else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
                 'what ran before it in the machine around it, or to ' + container.initial
                 if settings.step_back_across and not container.is_top else container.initial))
-    lines += _entry('policy', '{}; {}'.format(settings.policy, back), 2)
+    lines += _entry('policy', '{}; {}'.format(_policy(settings), back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
     lines += _entry('set', ', '.join(_changed(settings, Settings(), _PARTS) +
@@ -65,14 +66,23 @@ def _heading(container: ContainerProspect) -> List[str]:
     return lines
 
 
+def _policy(settings: Settings) -> str:
+    parameters = ', '.join('{} {:g}'.format(*each)
+                           for each in sorted(settings.policy_parameters.items()))
+    return '{} ({})'.format(settings.policy, parameters) if parameters else settings.policy
+
+
 def _not_repeated(container: ContainerProspect) -> str:
     if not container.guarded:
         return ''
-    return '{}: where a retry or a step back would do so, the oracle asks'.format(
-        ', '.join(container.guarded))
+    return '{}: where a retry or a step back would do so, the oracle {}'.format(
+        ', '.join(container.guarded),
+        'asks' if POLICIES[container.settings.policy].asks else 'gives up')
 
 
 def _asking(settings: Settings) -> str:
+    if not POLICIES[settings.policy].asks:
+        return 'nobody: the policy gives up where others ask'
     fallback = ' '.join(settings.on_no_answer).strip()
     if not settings.deadline_s:
         return 'an expert, without end'
@@ -85,7 +95,7 @@ def _state(container: ContainerProspect, state: StateProspect, usual: str) -> It
     yield from _outcome_lines(container, state)
     if not container.recovers:
         return
-    settings, actions = state.settings, _actions(state)
+    settings, actions = state.settings, _actions(container, state)
     yield from _entry('on a failure', actions if actions != usual else '', 4)
     yield from _entry('preconditions', ', '.join(spec.name for spec in settings.preconditions), 4)
     if settings.time_limit_s is not None:
@@ -140,22 +150,27 @@ def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:
 
 def _usual_actions(container: ContainerProspect) -> str:
     """What the policy may do on the failure of most of the states."""
-    counts = Counter(_actions(state) for state in container.states)
+    counts = Counter(_actions(container, state) for state in container.states)
     return counts.most_common(1)[0][0] if counts else ''
 
 
-def _actions(state: StateProspect) -> str:
+def _actions(container: ContainerProspect, state: StateProspect) -> str:
     """What the policy may do, by failure rate."""
     settings = state.settings
-    if all(actions == (Action.ASK,) for _, actions in state.actions):
-        return 'ask'
+    every = {actions for _, actions in state.actions}
+    if every in ({(Action.ASK,)}, {(Action.GIVE_UP,)}):
+        return _IN_WORDS[every.pop()[0]]
+    last = 'ask' if POLICIES[container.settings.policy].asks else 'give up'
+    if len(every) == 1:
+        return '{}; after {} recoveries: {}'.format(_either(every.pop()), settings.max_recoveries,
+                                                    last)
     limits = {FailureClass.LOW: 'rate below {:g}'.format(settings.moderate_from),
               FailureClass.MODERATE: '{:g} to {:g}'.format(settings.moderate_from,
                                                            settings.high_from),
               FailureClass.HIGH: 'from {:g}'.format(settings.high_from)}
     told = '; '.join('{}: {}'.format(limits[failure_class], _either(actions))
                      for failure_class, actions in state.actions)
-    return '{}; after {} recoveries: ask'.format(told, settings.max_recoveries)
+    return '{}; after {} recoveries: {}'.format(told, settings.max_recoveries, last)
 
 
 def _either(actions: Sequence[Action]) -> str:

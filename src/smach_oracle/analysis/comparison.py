@@ -1,0 +1,177 @@
+"""Compare variants that ran the same trials, from the rows that an experiment has kept.
+
+A row tells of one trial. Prints for each variant the shares of trials with their intervals, what it
+cost a trial and a robot hour, McNemar's exact test of the interventions for each two variants, and
+the best that any variant did in each trial (hindsight). Exit code: 0; 2, there was nothing to read.
+"""
+import argparse
+import itertools
+import statistics
+import sys
+from pathlib import Path
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+from smach_oracle.oracle.settings.paths import path_of
+
+from .bag_events import BagError
+from .intervals import Interval, replicate_interval, wilson_interval
+from .pairing import HINDSIGHT, Happened, hindsight, paired_counts
+from .reading import report_error
+from .trial_rows import LOST, TrialRow, read_rows
+
+SECONDS_PER_HOUR = 3600.0
+SHARES: Tuple[Tuple[str, Happened], ...] = (
+    ('true success', lambda row: row.succeeded),
+    ('interventions', lambda row: row.intervened),
+    ('a question asked', lambda row: row.questions > 0),
+    ('recovered', lambda row: row.recovered),
+    ('with attempts', lambda row: row.attempts > 0),
+    ('false success', lambda row: row.ending == 'success' and not row.succeeded),
+    ('lost or hung', lambda row: row.ending == LOST),
+)
+
+
+class Share(NamedTuple):
+    """A share of the trials of a variant."""
+
+    name: str
+    trials: int
+    of: int
+    interval: Interval  # 95% Wilson score interval
+    over_replicates: Optional[Interval]  # 95% t interval; None for fewer than two
+
+    @property
+    def share(self) -> float:
+        """0 to 1."""
+        return self.trials / self.of
+
+
+class Costs(NamedTuple):
+    """What the trials of a variant cost; None: it is not known of some trial."""
+
+    attempts: float  # a trial
+    questions: float  # a trial
+    questions_per_hour: Optional[float]  # of the robot's time
+    expert_s: Optional[float]  # a trial
+    expert_s_per_hour: Optional[float]
+    wrong_objects: Optional[int]
+    damage: Optional[float]  # things that came to harm, a completed task
+    completion_s: Optional[float]  # median time of a true success
+    trials_between: Optional[float]  # trials an intervention; None: there was none
+    hours_between: Optional[float]
+
+
+def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
+    """Return the shares of the trials of one variant."""
+    parts: Dict[int, List[TrialRow]] = {}
+    for row in rows:
+        parts.setdefault(row.replicate, []).append(row)
+    return [_share(name, happened, rows, list(parts.values())) for name, happened in SHARES]
+
+
+def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
+           parts: Sequence[Sequence[TrialRow]]) -> Share:
+    number = sum(map(happened, rows))
+    return Share(name, number, len(rows), wilson_interval(number, len(rows)), replicate_interval(
+        [sum(map(happened, part)) / len(part) for part in parts]))
+
+
+def costs_of(rows: Sequence[TrialRow]) -> Costs:
+    """Return what the trials of one variant cost.
+
+    Lost trials count as trials; nothing else is known of them, and they are left out of what is
+    known of all others.
+    """
+    ended = [row for row in rows if row.ending != LOST]
+    asked, interventions = sum(row.questions for row in rows), sum(row.intervened for row in rows)
+    hours = _total(ended, lambda row: row.sim_s, SECONDS_PER_HOUR)
+    expert_s = _total(ended, lambda row: row.expert_s)
+    done = [row for row in ended if row.succeeded]
+    harm = _total(done, lambda row: row.damage)
+    times = [row.sim_s for row in done if row.sim_s is not None]
+    wrong = [row.wrong_object for row in ended]
+    return Costs(
+        sum(row.attempts for row in rows) / len(rows), asked / len(rows), _ratio(asked, hours),
+        _ratio(expert_s, len(ended)), _ratio(expert_s, hours),
+        None if None in wrong else sum(map(bool, wrong)), _ratio(harm, len(done)),
+        statistics.median(times) if times else None, _ratio(len(rows), interventions),
+        _ratio(hours, interventions))
+
+
+def _total(rows: Sequence[TrialRow], value: Callable[[TrialRow], Optional[float]],
+           unit: float = 1.0) -> Optional[float]:
+    values = [value(row) for row in rows]
+    known = [each for each in values if each is not None]
+    return sum(known) / unit if len(known) == len(values) and values else None
+
+
+def _ratio(above: Optional[float], below: Optional[float]) -> Optional[float]:
+    return above / below if above is not None and below else None
+
+
+def format_comparison(rows: Sequence[TrialRow]) -> str:
+    """Return the tables, one task after the other."""
+    texts = []
+    for task in sorted({row.task for row in rows}):
+        mine = [row for row in rows if row.task == task]
+        names = list(dict.fromkeys(row.variant for row in mine))
+        variants = {name: [row for row in mine if row.variant == name] for name in names}
+        best = hindsight(mine) if len(names) > 1 else []
+        if best:
+            variants[HINDSIGHT] = best
+        texts += ['{}\n'.format(task)] + [_variant(*each) for each in variants.items()]
+        texts += _tests({name: variants[name] for name in names})
+    return '\n'.join(texts)
+
+
+def _variant(name: str, rows: Sequence[TrialRow]) -> str:
+    lines = ['  {} ({} trials, {} replicates)'.format(
+        name, len(rows), len({row.replicate for row in rows}))]
+    for share in shares_of(rows):
+        over = share.over_replicates
+        lines.append('    {:<18}{:>5} {:>7.1%} ({:.1%} to {:.1%}){}'.format(
+            share.name, share.trials, share.share, share.interval[0], share.interval[1],
+            '' if over is None else '; over replicates {:.1%} to {:.1%}'.format(*over)))
+    lines += ['    {:<42}{}'.format(told.replace('_', ' '), _number(value))
+              for told, value in zip(_COSTS, costs_of(rows))]
+    return '\n'.join(lines) + '\n'
+
+
+_COSTS = ('attempts a trial', 'questions a trial', 'questions a robot hour', 'expert s a trial',
+          'expert s a robot hour', 'trials with a wrong object', 'damage a completed task',
+          's to completion, median', 'trials between interventions',
+          'robot hours between interventions')
+
+
+def _number(value: Optional[float]) -> str:
+    return '-' if value is None else '{:.3g}'.format(value)
+
+
+def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
+    lines = []
+    for (first, ours), (second, theirs) in itertools.combinations(variants.items(), 2):
+        counts = paired_counts(ours, theirs, lambda row: row.intervened)
+        if sum(counts):
+            lines.append(
+                '  interventions, {} against {}: {} trials under {} alone, {} under {} alone, '
+                'of {} that both ran; McNemar p = {:.3g}'.format(
+                    first, second, counts.first_alone, first, counts.second_alone, second,
+                    sum(counts), counts.p_value))
+    return ['\n'.join(lines) + '\n'] if lines else []
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog='compare_variants', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('files', nargs='+', metavar='FILE', type=path_of,
+                        help='results.csv of an experiment')
+    args = parser.parse_args(argv)
+    try:
+        rows = [row for name in args.files for row in read_rows(Path(name))]
+        if not rows:
+            raise BagError('{}: no trials in it'.format(', '.join(args.files)))
+    except (BagError, OSError) as err:
+        return report_error('compare_variants', err)
+    sys.stdout.write(format_comparison(rows))
+    return 0

@@ -1,0 +1,68 @@
+"""Variants that ran the same trials, compared trial by trial."""
+import math
+from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple
+
+from .trial_rows import Pair, TrialRow
+
+HINDSIGHT = 'hindsight'  # name of the variant that is made of all others
+Happened = Callable[[TrialRow], bool]
+
+
+class PairedCounts(NamedTuple):
+    """In how many trials something happened under both of two variants, under one, under none."""
+
+    both: int
+    first_alone: int
+    second_alone: int
+    none: int
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided p-value of McNemar's exact test."""
+        return mcnemar_exact(self.first_alone, self.second_alone)
+
+
+def mcnemar_exact(first_alone: int, second_alone: int) -> float:
+    """Return the two-sided p-value of McNemar's exact test.
+
+    Under the null hypothesis each trial in which two variants differ is as likely to differ in one
+    way as in the other (Q. McNemar, Psychometrika 12, 1947). 1.0 where none differs.
+
+    :raises ValueError: for a number below 0.
+    """
+    if min(first_alone, second_alone) < 0:
+        raise ValueError('numbers of trials: {} is not allowed; allowed: 0 and more'.format(
+            (first_alone, second_alone)))
+    differing = first_alone + second_alone
+    tail = sum(math.comb(differing, count)
+               for count in range(min(first_alone, second_alone) + 1))
+    return float(min(1.0, 2 * tail / 2 ** differing))
+
+
+def paired_counts(first: Sequence[TrialRow], second: Sequence[TrialRow],
+                  happened: Happened) -> PairedCounts:
+    """Compare two variants over the trials that both ran."""
+    others = {row.pair: happened(row) for row in second}
+    pairs = [(happened(row), others[row.pair]) for row in first if row.pair in others]
+    return PairedCounts(*(pairs.count(each) for each in (
+        (True, True), (True, False), (False, True), (False, False))))
+
+
+def hindsight(rows: Sequence[TrialRow]) -> List[TrialRow]:
+    """Return the best that any variant did in each trial that all of them ran.
+
+    Best is the row without an intervention, then the one that truly succeeded, then that with the
+    fewest questions, then that with the least harm, then the shortest. It is a bound: nobody could
+    have known which variant it would be.
+    """
+    by_pair: Dict[Pair, List[TrialRow]] = {}
+    for row in rows:
+        by_pair.setdefault(row.pair, []).append(row)
+    names = {row.variant for row in rows}
+    return [min(each, key=_badness)._replace(variant=HINDSIGHT, learned='')
+            for each in by_pair.values() if {row.variant for row in each} == names]
+
+
+def _badness(row: TrialRow) -> Tuple[bool, bool, int, int, float, str]:
+    return (row.intervened, not row.succeeded, row.questions, row.damage or 0,
+            math.inf if row.sim_s is None else row.sim_s, row.variant)

@@ -1,0 +1,244 @@
+"""One row a trial, whatever variant it was run under: what comparisons are made from.
+
+Rows are kept in a CSV file that is appended to as trials end, so that figures can be made without
+the bags. An empty cell is what is not known. Definitions: doc/statistics.md.
+"""
+import csv
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
+
+from .bag_events import BagError
+from .trial_counter import TrialEnding
+from .trials import TrialSummary
+
+LOST = 'lost'  # an ending: the trial hung, or its processes died
+
+
+class TrialRow(NamedTuple):
+    """One trial of one variant; None: it is not known."""
+
+    task: str
+    variant: str
+    replicate: int
+    seed: int
+    ending: str  # a value of TrialEnding, or LOST
+    true_success: Optional[bool] = None  # by the judge of the world
+    wrong_object: Optional[str] = None  # what was brought to the goal in place of the target
+    damage: Optional[int] = None  # things that came to harm
+    failures: int = 0  # of states
+    attempts: int = 0  # recoveries of the oracle by itself, whether they helped or not
+    questions: int = 0
+    answered: int = 0
+    expert_s: Optional[float] = None  # world's time that the expert took
+    sim_s: Optional[float] = None  # world's time that the trial took
+    causes: str = ''  # kinds, one word each
+    lasting: Optional[int] = None  # causes that last
+    why: str = ''  # by the judge, or why it was lost
+    version: str = ''  # of the code that ran it
+    learned: str = ''  # rates at its end, as JSON
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether it truly ended in success: by machine and judge; by the machine if none judged.
+
+        Another object than the one that was meant is no success.
+        """
+        return (self.ending == TrialEnding.SUCCESS.value and self.true_success is not False
+                and not self.wrong_object)
+
+    @property
+    def intervened(self) -> bool:
+        """Whether a person had to act: asked, or to set right how the trial ended."""
+        return self.questions > 0 or not self.succeeded
+
+    @property
+    def recovered(self) -> bool:
+        """Whether a state failed, nobody was asked, and it truly ended in success."""
+        return self.failures > 0 and not self.intervened
+
+    @property
+    def pair(self) -> 'Pair':
+        """What the same trial has in common under every variant."""
+        return Pair(self.task, self.seed)
+
+
+class Pair(NamedTuple):
+    """The same trial under several variants."""
+
+    task: str
+    seed: int
+
+
+class TruthDetails(NamedTuple):
+    """What the truth on a trial tells beyond its end.
+
+    Lines of older worlds lack some of it; what they lack is not known, and None.
+    """
+
+    wrong_object: Optional[str] = None  # brought to the goal in place of the target; '': none
+    damage: Optional[int] = None  # things knocked over, dropped, pushed off
+    passed_s: Optional[Mapping[str, float]] = None  # s of the world's time, by what took them
+    lasting: Optional[int] = None  # causes that last
+
+
+NO_DETAILS = TruthDetails()
+
+
+def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed: int,
+           details: TruthDetails = NO_DETAILS, version: str = '',
+           learned: Optional[Mapping[str, Any]] = None) -> TrialRow:
+    """Return the row of a trial that has come to its end."""
+    truth, cause = summary.truth, summary.cause
+    asked_s = None
+    if details.passed_s is not None:  # a world that was not told of the expert's time has no entry
+        asked_s = details.passed_s.get('expert', None if summary.questions else 0.0)
+    return TrialRow(
+        task, variant, replicate, seed, summary.ending.value,
+        None if truth is None else truth.success, details.wrong_object, details.damage,
+        summary.failures, summary.recoveries, summary.questions, summary.answered,
+        asked_s, None if truth is None else truth.sim_s,
+        ' '.join(cause.kinds) if cause is not None else '', details.lasting,
+        '' if truth is None else truth.why, version,
+        json.dumps(learned, sort_keys=True) if learned is not None else '')
+
+
+def append_rows(path: Path, rows: Sequence[TrialRow]) -> None:
+    """Append rows; they are on the disk when this returns.
+
+    :raises OSError: where they cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    if not path.exists() or not path.stat().st_size:
+        writer.writerow(TrialRow._fields)
+    for row in rows:
+        writer.writerow([_written(value) for value in row])
+    with path.open('a', encoding='utf-8', newline='') as target:
+        target.write(text.getvalue())
+        target.flush()
+        os.fsync(target.fileno())
+
+
+def _written(value: object) -> object:
+    if isinstance(value, bool):
+        return 'yes' if value else 'no'
+    return '' if value is None else value
+
+
+def read_rows(path: Path) -> List[TrialRow]:
+    """Return the rows of a file; of the same trial of a variant the later one counts.
+
+    A last line that was cut off in its writing is skipped.
+
+    :raises BagError: where another line is wrong.
+    :raises OSError: where the file cannot be read.
+    """
+    text = path.read_text(encoding='utf-8')
+    whole = text[:text.rfind('\n') + 1]
+    lines = list(csv.reader(io.StringIO(whole)))
+    if not lines:
+        return []
+    if tuple(lines[0]) != TrialRow._fields:
+        raise BagError('{}: its columns are not those of this version'.format(path))
+    found: Dict[Any, TrialRow] = {}
+    for number, line in enumerate(lines[1:], 2):
+        row = _parsed(line, '{} row {}'.format(path, number))
+        found[row.variant, row.replicate, row.pair] = row
+    return list(found.values())
+
+
+def cut_torn_line(path: Path) -> None:
+    """Take away a last line that was cut off in its writing, so that rows can be appended.
+
+    :raises OSError: where the file cannot be changed.
+    """
+    content = path.read_bytes()
+    whole = content[:content.rfind(b'\n') + 1]
+    if whole != content:
+        with path.open('r+b') as target:
+            target.truncate(len(whole))
+
+
+def _flag(text: str) -> bool:
+    return {'yes': True, 'no': False}[text]
+
+
+_PARSERS: Mapping[str, Callable[[str], Any]] = {
+    'replicate': int, 'seed': int, 'true_success': _flag, 'damage': int, 'failures': int,
+    'attempts': int, 'questions': int, 'answered': int, 'expert_s': float, 'sim_s': float,
+    'lasting': int,
+}
+_MAY_BE_EMPTY = ('true_success', 'damage', 'expert_s', 'sim_s', 'lasting')
+_ENDINGS = {ending.value for ending in TrialEnding} | {LOST}
+
+
+def _parsed(line: Sequence[str], where: str) -> TrialRow:
+    if len(line) != len(TrialRow._fields):
+        raise BagError('{}: {} cells, not {}'.format(where, len(line), len(TrialRow._fields)))
+    cells: Dict[str, Any] = dict(zip(TrialRow._fields, line))
+    # '' is no object; whether that is known is told beside, by the damage
+    cells['wrong_object'] = (None if cells['damage'] == '' and not cells['wrong_object']
+                             else cells['wrong_object'])
+    for name, parse in _PARSERS.items():
+        try:
+            cells[name] = (None if not cells[name] and name in _MAY_BE_EMPTY
+                           else parse(cells[name]))
+        except (ValueError, KeyError) as err:
+            raise BagError('{}: {}: {!r} is not allowed'.format(where, name, cells[name])) from err
+    if cells['ending'] not in _ENDINGS:
+        raise BagError('{}: ending: {!r} is not allowed; allowed: {}'.format(
+            where, cells['ending'], ', '.join(sorted(_ENDINGS))))
+    return TrialRow(**cells)
+
+
+# -- truth beyond the end
+
+def read_details(path: str) -> Dict[int, TruthDetails]:
+    """Return the details by seed; if a seed appears twice, the later line is used.
+
+    What is no line of truth is passed over: `truth.read_truth` complains of it.
+
+    :raises OSError: where the file cannot be read.
+    """
+    found: Dict[int, TruthDetails] = {}
+    with open(path, encoding='utf-8') as source:
+        for line in source:
+            data = _data_of(line)
+            seed = data.get('seed')
+            if isinstance(seed, int):
+                found[seed] = details_of(data)
+    return found
+
+
+def _data_of(line: str) -> Mapping[str, Any]:
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def details_of(data: Mapping[str, Any]) -> TruthDetails:
+    """Return the details of a line."""
+    wrong, passed = data.get('wrong_object'), data.get('passed_s')
+    return TruthDetails(wrong if isinstance(wrong, str) else None, _damage(data.get('damage')),
+                        passed if isinstance(passed, dict) else None,
+                        _lasting(data.get('causes')))
+
+
+def _damage(by_kind: object) -> Optional[int]:
+    """Count the things; each kind lists them, or tells their number."""
+    if not isinstance(by_kind, dict):
+        return None
+    return sum(len(each) if isinstance(each, list) else int(each) for each in by_kind.values())
+
+
+def _lasting(causes: object) -> Optional[int]:
+    """Count the causes that last; None where they do not tell."""
+    if not isinstance(causes, list):
+        return None
+    told = [cause.get('lasting') for cause in causes if isinstance(cause, dict)]
+    return sum(map(bool, told)) if all(isinstance(each, bool) for each in told) else None

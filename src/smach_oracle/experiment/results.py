@@ -1,0 +1,121 @@
+"""The rows of one job in `results.csv`: written as its trials end, read where it goes on.
+
+They hold all that is needed to go on on another machine, without the bags.
+"""
+import json
+import subprocess
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence
+
+from smach_oracle.analysis.bag_events import BagError
+from smach_oracle.analysis.trial_rows import (
+    LOST,
+    NO_DETAILS,
+    TrialRow,
+    append_rows,
+    cut_torn_line,
+    read_details,
+    read_rows,
+    row_of,
+)
+
+from .plan import ExperimentError
+from .records import KeptTrials, RecordedTrial
+
+RESULTS_FILE = 'results.csv'
+
+
+def code_version() -> str:
+    """Return the commit of the code that runs, '-dirty' behind it; '' where there is none."""
+    try:
+        return subprocess.run(
+            ['git', 'describe', '--always', '--dirty', '--abbrev=12'], check=True,
+            cwd=str(Path(__file__).parent), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            universal_newlines=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ''
+
+
+class JobResults:
+    """The rows of one job."""
+
+    def __init__(self, output: Path, task: str, variant: str, replicate: int,
+                 first_seed: int) -> None:
+        """Read them.
+
+        :raises ExperimentError: where the file cannot be used.
+        :raises OSError: where it cannot be read.
+        """
+        self._path = output / RESULTS_FILE
+        self._task = task
+        self._variant = variant
+        self._replicate = replicate
+        self._first_seed = first_seed
+        self._version = code_version()
+        self._rows: Dict[int, TrialRow] = {}  # by seed
+        if self._path.exists():
+            cut_torn_line(self._path)
+            try:
+                self._rows = {row.seed: row for row in read_rows(self._path)
+                              if (row.task, row.variant, row.replicate) == (
+                                  task, variant, replicate)}
+            except BagError as err:
+                raise ExperimentError(str(err)) from err
+
+    def kept(self) -> KeptTrials:
+        """Return the trials from the first one on that have rows, without a gap.
+
+        :raises ExperimentError: where a row does not tell what was learned.
+        """
+        kept = KeptTrials([], {}, [])
+        seed = self._first_seed
+        while seed in self._rows:
+            row, number = self._rows[seed], seed - self._first_seed
+            if row.ending == LOST:
+                kept.lost[number] = row.why
+            else:
+                kept.learned.append(_learned_in(row))
+                kept.numbers.append(number)
+            seed += 1
+        return kept
+
+    def forget_from(self, number: int) -> None:
+        """Write anew what is told of this trial and of those behind it: they are run anew."""
+        self._rows = {seed: row for seed, row in self._rows.items()
+                      if seed < self._first_seed + number}
+
+    def add(self, trials: Sequence[RecordedTrial], lost: Mapping[int, str], truth: Path) -> None:
+        """Append the rows of trials that have none; `lost`: why, by number of the trial.
+
+        A trial that tells no seed has no row.
+
+        :raises OSError: where they cannot be written.
+        """
+        new: List[TrialRow] = []
+        details = None
+        for trial in trials:
+            cause = trial.summary.cause
+            if cause is None or cause.seed in self._rows:
+                continue
+            if details is None:
+                details = read_details(str(truth)) if truth.exists() else {}
+            new.append(row_of(trial.summary, self._task, self._variant, self._replicate,
+                              cause.seed, details.get(cause.seed, NO_DETAILS), self._version,
+                              trial.learned))
+        for number, why in lost.items():
+            if self._first_seed + number not in self._rows:
+                new.append(TrialRow(self._task, self._variant, self._replicate,
+                                    self._first_seed + number, LOST, why=why,
+                                    version=self._version))
+        if new:
+            append_rows(self._path, new)
+            self._rows.update((row.seed, row) for row in new)
+
+
+def _learned_in(row: TrialRow) -> Optional[Mapping[str, Any]]:
+    try:
+        learned = json.loads(row.learned)
+    except ValueError as err:
+        raise ExperimentError('results of {}, seed {}: it does not tell what was learned'.format(
+            row.variant, row.seed)) from err
+    return learned if isinstance(learned, dict) else None

@@ -1,0 +1,107 @@
+"""What a policy is asked, and what it may answer (paper, IV-C). Pure.
+
+A policy is asked three things, in this order: is this a continuous failure; shall the preconditions
+be run; and, once they have run, what now. Where a step back leads is the policy's business too.
+"""
+from enum import Enum
+from typing import Mapping, NamedTuple, Optional, Tuple
+
+from .failure_rate import FailureClass
+
+
+class Action(str, Enum):
+    """What the oracle does; the values are those of DECISION events."""
+
+    REVISIT = 'revisit'  # enter the failed state again
+    STEP_BACK = 'step_back'  # enter the state that the policy steps back to
+    RESTART = 'restart'  # enter the top machine's initial state, with the userdata of the start
+    ASK = 'ask'  # ask the expert
+    GIVE_UP = 'give_up'  # end the container as without an oracle
+
+
+class Preconditions(str, Enum):
+    """How the failed state's preconditions stand when the policy decides."""
+
+    NONE = 'none'
+    MET = 'met'
+    NOT_MET = 'not met'
+
+
+class FailureContext(NamedTuple):
+    """What the visits before say about a failure of `state`."""
+
+    state: str
+    # where a step back leads if nothing was before: the container's initial state, or with
+    # `step_back_across` the path of the state that ran before in a container above
+    initial: str
+    failed_last: bool  # the container's most recent failure of this trial was of `state`
+    failing_since: bool  # and `state` has not succeeded since
+    unconditioned: Optional[str]  # state of the latest earlier visit that has no preconditions
+    succeeded_before: Optional[str]  # other state that succeeded last before `state` began to fail
+
+
+class Past(NamedTuple):
+    """What has been done in this trial before a decision."""
+
+    recoveries: int = 0  # by the oracle itself, from failures of this state
+    restarts: int = 0  # of the top machine
+    place: str = ''  # path of the state, and how often it was visited in this trial
+    trial: int = 0  # how many trials the machine has begun before this one
+
+
+class Situation(NamedTuple):
+    """One cell of a policy's table, and what has been done before."""
+
+    failure_class: FailureClass
+    preconditions: Preconditions
+    continuous: bool
+    past: Past = Past()
+
+
+class Policy:
+    """Base of the policies; they hold no state.
+
+    `asks`: whether it may ask. Where it may not, the container ends wherever else an expert would
+    be asked. `parameters`: what may be set, with the defaults.
+    """
+
+    name = ''
+    asks = True
+    restarts = False  # whether it may start the script over
+    parameters: Mapping[str, float] = {}
+
+    def with_parameters(self, given: Mapping[str, float]) -> 'Policy':
+        """Return the policy with other parameters, all of which are among its own."""
+        return type(self)(**given) if given else self
+
+    def is_continuous(self, context: FailureContext) -> bool:
+        """Whether this is a continuous failure in the policy's sense."""
+        raise NotImplementedError
+
+    def runs_preconditions(self, failure_class: FailureClass) -> bool:
+        """Whether the preconditions of a failed state of this class are run."""
+        return failure_class in (FailureClass.LOW, FailureClass.MODERATE)
+
+    def decide(self, situation: Situation) -> Action:
+        """Return what to do."""
+        raise NotImplementedError
+
+    def may_do(self, situation: Situation) -> Tuple[Action, ...]:
+        """Return all that `decide` may return; more than one action where that is drawn."""
+        return (self.decide(situation),)
+
+    def why(self, situation: Situation) -> str:
+        """Say why it gives up or asks, as a clause; '' where its cell says it all."""
+        return ''
+
+    def wait_s(self, situation: Situation) -> float:
+        """Return how many seconds are waited before the decision is carried out."""
+        return 0.0
+
+    def step_back_target(self, context: FailureContext) -> str:
+        """Return the state that a step back leads to.
+
+        It is a label of the container, or a path below the top machine, such as KITCHEN/LOOK or
+        /HOME.
+        """
+        raise NotImplementedError

@@ -1,0 +1,32 @@
+"""How often a trial was started over, and the userdata with which it has begun."""
+from typing import Any, Dict, Mapping, Optional, Tuple
+
+
+class Restarts:
+    """Of one trial of a tree.
+
+    `count`: how often its top machine was started over. `is_due`: whether the userdata of the start
+    is wanted, and not kept yet.
+    """
+
+    def __init__(self) -> None:
+        self.begin_trial(False)
+
+    def begin_trial(self, is_wanted: bool) -> None:
+        """Forget the trial before. `is_wanted`: whether a policy may start this one over."""
+        self.count = 0
+        self.is_due = is_wanted
+        self._userdata: Mapping[int, Dict[str, Any]] = {}
+
+    def keep(self, userdata: Mapping[int, Dict[str, Any]]) -> None:
+        """Keep snapshots of the userdata of the start, by the id of the node."""
+        self.is_due = False
+        self._userdata = userdata
+
+    def userdata_of(self, node: object) -> Optional[Dict[str, Any]]:
+        """Return the userdata with which a container has begun, None where it is not known."""
+        return self._userdata.get(id(node))
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """A copied or pickled machine has begun no trial."""
+        return Restarts, ()

@@ -1,0 +1,1 @@
+"""Waits of the oracle in a world that must be told of them."""

@@ -1,0 +1,55 @@
+"""Waits of the oracle that are passed through a service: `~pass_time`, a PassTime.
+
+A simulated world that stands still while nobody moves would otherwise be the same after a wait. A
+real robot has no such service, and simply waits.
+"""
+import time
+from typing import Optional
+
+import rospy
+
+from smach_oracle.oracle.waiting import MonotonicWaiting, Pause, Stopped
+from smach_oracle.srv import PassTime, PassTimeRequest
+
+from ..service_calls import ServerGoneError, ServiceCall
+
+_PIECE_S = 1.0  # a preempt is heeded between pieces
+_LOOK_S = 0.05
+_LIMIT_S = 60.0  # of one call; physics may have to be computed
+_ENOUGH = 0.99  # share of the time, for what the clock's messages are late
+
+
+class ServiceWaiting:
+    """Lets time pass by a service, and by waiting where that has let none pass."""
+
+    def __init__(self, service: str) -> None:
+        """`service`: resolved name of a PassTime service."""
+        self._service = service
+        self._by_itself = MonotonicWaiting()
+
+    def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
+        """Return after so many seconds, or soon after `stopped()` is true."""
+        left_s = seconds
+        while left_s > 0 and not stopped():
+            piece_s = min(left_s, _PIECE_S)
+            passed_s = self._pass(piece_s, what, stopped)
+            if passed_s is None:
+                self._by_itself.wait(left_s, what, stopped, pause)
+                return
+            if passed_s < _ENOUGH * piece_s:  # a world with a pace of its own
+                self._by_itself.wait(piece_s - passed_s, what, stopped, pause)
+            left_s -= piece_s
+
+    def _pass(self, seconds: float, what: str, stopped: Stopped) -> Optional[float]:
+        """Let time pass; return how many s it was, None where the service does not do so."""
+        begun_s, until_s = rospy.get_time(), time.monotonic() + _LIMIT_S
+        call = ServiceCall(self._service, PassTime, PassTimeRequest(seconds, what))
+        while call.is_alive() and time.monotonic() < until_s:
+            if stopped():
+                return seconds
+            call.join(_LOOK_S)
+        try:
+            return max(0.0, float(call.result(0.0).stamp.to_sec()) - begun_s)
+        except ServerGoneError as err:
+            rospy.logwarn('%s; the oracle waits without it', err)
+            return None
