@@ -87,8 +87,9 @@ class WorldNode:
         self._controllers = Controllers(self._world, self._loop, self._motions,
                                         lambda: self._clock.now_ns / 1e9, self._publish_state)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
-                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
+                          # before snapshots: who has these finds it, and charges it from the start
                           rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
+                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
                           rospy.Service('world/judge', Judge, self._answer_judge)]
 
