@@ -23,6 +23,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
 
+from .freeze import ABANDONED, FROZEN, checkout, run_freeze
 from .job import ExperimentJob
 from .plan import CONFIGURED, TASKS, ExperimentError, ExperimentPlan, enter_folder, make_variants
 from .progress import ProgressLine
@@ -158,6 +159,12 @@ def make_parser() -> argparse.ArgumentParser:
         '--hung-after', type=float, default=300.0, metavar='S',
         help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
         'before it is run anew (default: 300)')
+    freezing = parser.add_mutually_exclusive_group()
+    freezing.add_argument('--freeze', metavar='NOTE',
+                          help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
+                          'that in doc/freezes.csv, with the note')
+    freezing.add_argument('--abandon-freeze', metavar='NOTE',
+                          help='run nothing: log that the last freeze is abandoned, and why')
     parser.add_argument(
         '--output', type=lambda text: Path(path_of(text)),
         help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
@@ -213,6 +220,8 @@ def main(argv: Optional[List[str]] = None) -> int:
         where one stopped it: 130 on Ctrl-C.
     """
     args = parse(argv)
+    if args.freeze is not None or args.abandon_freeze is not None:
+        return freeze_seeds(args)
     output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
     try:
         if shutil.which('roslaunch') is None:
@@ -234,6 +243,17 @@ def main(argv: Optional[List[str]] = None) -> int:
             'there'.format(err, output), file=sys.stderr)
         return 128 + err.signum
     return report(jobs, output)
+
+
+def freeze_seeds(args: argparse.Namespace) -> int:
+    """Freeze the protocol, or abandon the last freeze; returns the exit code."""
+    what = ABANDONED if args.freeze is None else FROZEN
+    try:
+        run_freeze(checkout(), what, args.abandon_freeze if args.freeze is None else args.freeze)
+    except (ExperimentError, OSError) as err:
+        print('run_trials: {}'.format(err), file=sys.stderr)
+        return FAILED
+    return 0
 
 
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:
