@@ -43,7 +43,7 @@ STATES = [
 ]
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'
 SETTINGS = TASKS / 'drink_retrieval.yaml'
-PEACEFUL = 3  # a seed without causes to fail
+PEACEFUL = 2  # a seed without causes to fail
 LIMIT = rospy.Duration(900.0)  # of ROS time, which runs fast while nothing moves
 NOWHERE = PoseStamped(Header(frame_id='odom_combined'),
                       Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
@@ -116,13 +116,13 @@ class DrinkRetrievalTest(unittest.TestCase):
         self.assertEqual(machine.execute(), 'succeeded')
         self.assert_true_success()
 
-    def test_5_with_the_oracle_a_dazzled_camera_looks_again(self):
+    def test_5_with_the_oracle_a_door_that_fell_half_shut_is_opened_again(self):
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([
                 find_node('smach_oracle', 'oracle_run')[0], '--config',
                 str(SETTINGS), '--record', folder,
                 str(TASKS / 'drink_retrieval.py'), '--seed',
-                str(seed_with('glare'))
+                str(seed_with('door_swings_back'))
             ], check=True, timeout=140)
             trial, = load_trials([folder]).trials
         self.assertEqual((trial.outcome, trial.questions), ('succeeded', 0))

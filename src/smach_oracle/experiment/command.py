@@ -23,6 +23,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
 
+from .freeze import ABANDONED, FROZEN, checkout, run_freeze
 from .job import ExperimentJob
 from .plan import (
     BARE,
@@ -179,6 +180,12 @@ def make_parser() -> argparse.ArgumentParser:
         '--hung-after', type=float, default=300.0, metavar='S',
         help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
         'before it is run anew (default: 300)')
+    freezing = parser.add_mutually_exclusive_group()
+    freezing.add_argument('--freeze', metavar='NOTE',
+                          help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
+                          'that in doc/freezes.csv, with the note')
+    freezing.add_argument('--abandon-freeze', metavar='NOTE',
+                          help='run nothing: log that the last freeze is abandoned, and why')
     parser.add_argument(
         '--output', type=lambda text: Path(path_of(text)),
         help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
@@ -245,6 +252,8 @@ def main(argv: Optional[List[str]] = None) -> int:
         where one stopped it: 130 on Ctrl-C.
     """
     args = parse(argv)
+    if args.freeze is not None or args.abandon_freeze is not None:
+        return freeze_seeds(args)
     output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
     try:
         if shutil.which('roslaunch') is None:
@@ -286,6 +295,18 @@ def _run_protocol(args: argparse.Namespace, output: Path) -> int:
         comparison.main([str(output / part.name / RESULTS_FILE)])
         code = LOST if any(job.lost for job in jobs) else code
     return code
+
+
+def freeze_seeds(args: argparse.Namespace) -> int:
+    """Freeze the protocol, or abandon the last freeze; returns the exit code."""
+    what = ABANDONED if args.freeze is None else FROZEN
+    note = args.abandon_freeze if args.freeze is None else args.freeze
+    try:
+        print(run_freeze(checkout(), what, note))
+    except (ExperimentError, OSError) as err:
+        print('run_trials: {}'.format(err), file=sys.stderr)
+        return FAILED
+    return 0
 
 
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:

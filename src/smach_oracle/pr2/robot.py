@@ -11,6 +11,8 @@ import numpy as np
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike
 
+from .work_costs import Work
+
 ARMS = ('left', 'right')
 ARM_JOINTS: Dict[str, List[str]] = {
     arm: [
@@ -95,4 +97,12 @@ class Robot(Protocol):
         """A fresh image of the head camera.
 
         :raises RobotError: where none comes.
+        """
+
+    def spend(self, what: str, work: Work) -> None:
+        """Let the time pass that work takes, where a robot's world waits for that.
+
+        Never raises; processing an image is spent by see().
+
+        :param what: 'planning' or 'perception'.
         """

@@ -30,8 +30,11 @@ from smach_oracle.ros.goal_link import GoalEvent, GoalLink, SentGoal, lost
 
 from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, GripperState, RobotError
 from .ros_senses import RosSenses
+from .ros_time import WorldTime
+from .work_costs import Work
 
 NO_SNAPSHOT = 'none'
+NO_PASS_TIME = 'none'
 CONNECTED_S = 60.0  # wall s that a simulated robot may take to be there
 
 
@@ -42,13 +45,17 @@ class RosRobot:
 
     :param snapshot: service smach_oracle/Snapshot of a simulated world, which gives joint states,
         transforms and images with one stamp; NO_SNAPSHOT: whatever comes next, as on a real robot.
+    :param pass_time: service smach_oracle/PassTime of a simulated world, to which the time is
+        charged that planning and perception take; NO_PASS_TIME, or no such service: nothing is.
     :param timeout_s: wall s that the robot may be silent, or not there, before a call fails.
     """
 
-    def __init__(self, snapshot: str = 'world/snapshot', timeout_s: float = 30.0) -> None:
+    def __init__(self, snapshot: str = 'world/snapshot', timeout_s: float = 30.0,
+                 pass_time: str = 'world/pass_time') -> None:
         self._timeout_s = timeout_s
         self._simulated = snapshot != NO_SNAPSHOT
         self._senses = RosSenses('' if snapshot == NO_SNAPSHOT else snapshot, timeout_s)
+        self._time = WorldTime('' if pass_time == NO_PASS_TIME else pass_time)
         self._links: Dict[str, GoalLink] = {}
         for side in (arm[0] for arm in ARMS):
             self._link(side + '_arm_controller/follow_joint_trajectory',
@@ -114,7 +121,14 @@ class RosRobot:
     def see(self) -> CameraImage:
         """See Robot."""
         self._check_allowed()
-        return self._senses.see(BASE_FRAME, CAMERA_FRAME)
+        image = self._senses.see(BASE_FRAME, CAMERA_FRAME)
+        self.spend('perception', Work(images=1))
+        return image
+
+    def spend(self, what: str, work: Work) -> None:
+        """See Robot; nothing is charged to a robot that was told to stop."""
+        if not self._aborted.is_set():
+            self._time.spend(work.seconds, what)
 
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
         """See Robot; all of the joints belong to one arm.

@@ -67,8 +67,8 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'pr2': [
-        'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
-        {'model', 'robot', 'kitchen'}
+        'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses', 'ros_time'},
+        'perception', {'model', 'robot', 'kitchen'}, 'work_costs'
     ],
     'testing': [
         {'script_run', 'soak'}, {'bench', 'recorded', 'soak_report'}, 'observed_trial',

@@ -25,7 +25,7 @@ from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal import drink_retrieval as drink_rehearsal
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
-from smach_oracle.simulation.scenes.kitchen_causes import CHANCE
+from smach_oracle.simulation.scenes.kitchen_causes import KINDS
 from smach_oracle.simulation.scenes.kitchen_scene import PALM, draw
 from smach_oracle.tasks import drink_retrieval
 
@@ -81,7 +81,7 @@ def test_the_same_seed_gives_the_same_kitchen_and_a_benign_one_has_no_cause():
 def test_all_causes_come_up_and_each_kitchen_can_be_built():
     scenes = [draw(seed) for seed in range(300)]
     counts = collections.Counter(cause.kind for scene in scenes for cause in scene.causes)
-    assert set(counts) == set(CHANCE)
+    assert set(counts) == set(KINDS)
     assert all(cause.text for scene in scenes for cause in scene.causes)
     world = World()
     for kind in counts:

@@ -19,7 +19,7 @@ from ..planning.collision import CollisionModel, installed_model, model_from
 from ..ros_robot import RosRobot
 from .collision_map_publisher import CollisionMapPublisher
 from .kitchen_skills import KitchenSkills
-from .perception_node import await_robot, kitchen_at, snapshot_service
+from .perception_node import await_robot, kitchen_at, pass_time_service, snapshot_service
 from .skill_server import SkillServer
 
 
@@ -48,11 +48,11 @@ def main() -> None:
     parameters_only(
         'Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, '
         'close_door and '
-        'hand_over as actions. Parameters: ~snapshot, ~kitchen; see doc/simulation.md.')
+        'hand_over as actions. Parameters: ~snapshot, ~pass_time, ~kitchen; see doc/simulation.md.')
     rospy.init_node('pr2_manipulation')
     try:
-        snapshot, kitchen = snapshot_service(), kitchen_at('~kitchen')
-        robot = RosRobot(snapshot=snapshot)
+        kitchen = kitchen_at('~kitchen')
+        robot = RosRobot(snapshot=snapshot_service(), pass_time=pass_time_service())
         model = robot_model()
     except (ValueError, ModelError) as err:
         rospy.logfatal('pr2_manipulation: %s', err)

@@ -27,12 +27,14 @@ from ..perception.drink import find_drink
 from ..perception.own_limbs import limbs_of
 from ..perception.tabletop import find_tabletop
 from ..robot import Robot
-from ..ros_robot import RosRobot
+from ..ros_robot import NO_PASS_TIME, NO_SNAPSHOT, RosRobot
+from ..work_costs import Work
 from .frames import box_messages
 from .skill_server import ReportStatus, SkillServer
 
 HIGHEST_LEAST = 0.3  # m: what is asked for as `min_height`
 MODEL_WAIT_S = 60.0
+DETECTION = Work(detections=1)
 
 
 class Perception:
@@ -57,7 +59,9 @@ class Perception:
         lowest = _height(goal.min_height)
         report('looking')
         image = self._robot.see()
-        found = find_tabletop(image, lowest, self._limbs())
+        limbs = self._limbs()
+        self._robot.spend('perception', DETECTION)
+        found = find_tabletop(image, lowest, limbs)
         report('{} objects'.format(len(found.objects)))
         objects = [box_messages(box, _stamp(image)) for box in found.objects]
         return DetectTabletopResult(table=box_messages(found.table, _stamp(image))[0],
@@ -75,7 +79,9 @@ class Perception:
         report('looking into the refrigerator')
         self._robot.look_at(look_point(self._kitchen, fridge))
         image = self._robot.see()
-        pose, size = box_messages(find_drink(image, self._kitchen, fridge, lowest, self._limbs()),
+        limbs = self._limbs()
+        self._robot.spend('perception', DETECTION)
+        pose, size = box_messages(find_drink(image, self._kitchen, fridge, lowest, limbs),
                                   _stamp(image))
         return DetectDrinkResult(drink=pose, size=size)
 
@@ -102,9 +108,22 @@ def snapshot_service() -> str:
 
     :raises SettingsError: for what cannot be a service's name.
     """
-    name = name_of('~snapshot', 'world/snapshot')
+    return _service('~snapshot', 'world/snapshot')
+
+
+def pass_time_service() -> str:
+    """The service that the parameter ~pass_time names, or `none`, as where ~snapshot is.
+
+    :raises SettingsError: for what cannot be a service's name.
+    """
+    simulated = snapshot_service() != NO_SNAPSHOT
+    return _service('~pass_time', 'world/pass_time' if simulated else NO_PASS_TIME)
+
+
+def _service(parameter: str, default: str) -> str:
+    name = name_of(parameter, default)
     if not is_legal_name(name):
-        raise SettingsError(rospy.resolve_name('~snapshot'), name, 'the name of a service, or none')
+        raise SettingsError(rospy.resolve_name(parameter), name, 'the name of a service, or none')
     return name
 
 
@@ -157,15 +176,16 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: detects the table and the objects on it, and drinks in the refrigerator. '
-        'Parameters: ~snapshot, ~kitchen; see doc/perception.md.')
+        'Parameters: ~snapshot, ~pass_time, ~kitchen; see doc/perception.md.')
     rospy.init_node('pr2_perception')
     try:
-        snapshot, kitchen = snapshot_service(), kitchen_at('~kitchen')
+        snapshot, pass_time = snapshot_service(), pass_time_service()
+        kitchen = kitchen_at('~kitchen')
         links = robot_links()
     except ValueError as err:
         rospy.logfatal('pr2_perception: %s', err)
         raise SystemExit(2) from err
-    robot = RosRobot(snapshot=snapshot)
+    robot = RosRobot(snapshot=snapshot, pass_time=pass_time)
     await_robot(robot)
     perception, server = Perception(robot, links, kitchen), SkillServer(robot.abort, robot.resume)
     server.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,))

@@ -8,6 +8,7 @@ from smach_oracle.geometry.transforms import apply, from_rpy
 
 from ..kitchen import MapBox
 from ..robot import ARM_JOINTS, ARMS, FINGER_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
+from ..work_costs import Work
 from .collision import CollisionModel, CollisionWorld
 from .planner import BUDGET, PlanningError, plan, straight, timed
 
@@ -76,12 +77,20 @@ class Arm:
             raise
         self.chain = self.space.chain
         self.generator = np.random.default_rng(seed)
+        self._spent, self._samples = self.space.checks, 0
 
     def __enter__(self) -> 'Arm':
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._spend()
         self.space.close()
+
+    def _spend(self) -> None:
+        """Let the time pass that planning has taken since the last motion."""
+        checks, self._spent = self.space.checks - self._spent, self.space.checks
+        samples, self._samples = self._samples, 0
+        self._robot.spend('planning', Work(checks=checks, samples=samples))
 
     def now(self) -> np.ndarray:
         """Joint positions (7,), by the encoders."""
@@ -100,6 +109,7 @@ class Arm:
         :raises Unreachable: where no joint positions at all take it there.
         """
         seed = READY[self.name] if near is None else near
+        self._samples += 1 + restarts
         found = self.chain.solutions(pose, seed, self.generator, restarts=restarts)
         if not len(found):
             raise Unreachable('out of reach')
@@ -135,6 +145,7 @@ class Arm:
         :raises SkillError: where the arm does not get there.
         """
         positions, times = timed(self.chain, path, speed)
+        self._spend()
         try:
             self._robot.follow(ARM_JOINTS[self.name], positions, times)
         except RobotError as err:
@@ -177,6 +188,7 @@ class Arm:
         return state.position if state.stalled and state.position > LEAST_GAP else 0.0
 
     def _gripper(self, gap: float, effort: float = 50.0) -> GripperState:
+        self._spend()
         try:
             return self._robot.gripper(self.name, gap, effort)
         except RobotError as err:

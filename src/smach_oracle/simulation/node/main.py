@@ -36,6 +36,7 @@ from smach_oracle.srv import (
 from ..physics.camera import IMAGE_PERIODS, take_image
 from ..physics.judge import TrialVerdict, judge
 from ..physics.world import World
+from ..scenes.scene import Scene
 from ..scenes.tasks import draw
 from .camera_publisher import CameraPublisher
 from .controllers import Controllers
@@ -70,8 +71,7 @@ class WorldNode:
         """
         self._settings = settings
         self.exit_code = 0  # of the process; 1 where the world failed
-        self._world = World(draw(settings.task, settings.seed, settings.benign),
-                            settings.camera_binning)
+        self._world = World(self._drawn(settings.seed), settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
@@ -87,8 +87,9 @@ class WorldNode:
         self._controllers = Controllers(self._world, self._loop, self._motions,
                                         lambda: self._clock.now_ns / 1e9, self._publish_state)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
-                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
+                          # before snapshots: who has these finds it, and charges it from the start
                           rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
+                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
                           rospy.Service('world/judge', Judge, self._answer_judge)]
 
@@ -151,12 +152,15 @@ class WorldNode:
             self._truth.passed(seconds, what)
         return self._publish_state()
 
+    def _drawn(self, seed: int) -> Scene:
+        return draw(self._settings.task, seed, self._settings.benign, self._settings.lasting)
+
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
         self._finish_trial()
         self._loop.watch.restart()
         began_s = time.monotonic()
-        self._world.reset(draw(self._settings.task, seed, self._settings.benign))
+        self._world.reset(self._drawn(seed))
         self._loop.watch.add_time('reset')
         self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
         causes = self._world.scene.causes
@@ -174,6 +178,7 @@ class WorldNode:
         if truth is None or self._settings.truth_file == 'none':
             return
         sim_s = self._world.time
+        truth.happened(self._world.cause_spans())
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
         record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent,
@@ -234,6 +239,7 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
+        '~lasting, '
         '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate, '
         '~camera_binning; see '
         'doc/simulation.md.')

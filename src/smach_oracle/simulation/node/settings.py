@@ -5,6 +5,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.paths import check_writable, path_of
 
+from ..scenes.cause_draws import LASTING_SHARE
 from ..scenes.tasks import TASKS
 
 NONE = 'none'
@@ -17,6 +18,8 @@ class WorldSettings(NamedTuple):
     task: str = TASKS[0]  # whose scenes are drawn
     seed: int = 0  # of the scene that is there before the first reset
     benign: bool = False  # scenes without causes to fail
+    # the share of the causes that last, 0 to 1
+    lasting: float = LASTING_SHARE
     # simulated s per wall s; 0: as fast as possible, frozen while nothing is commanded
     real_time_factor: float = 0.0
     # at factor 0: s that the clock goes on per wall s while nothing is commanded
@@ -56,6 +59,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         task=taken('task', TASKS[0], checks.choice(TASKS)), real_time_factor=factor,
         seed=taken('seed', 0, checks.whole(0, 'a whole number from 0')),
         benign=taken('benign', False, checks.flag),
+        lasting=number('lasting', LASTING_SHARE, 0.0, 1.0),
         idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),

@@ -2,8 +2,9 @@
 import json
 import os
 import time
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
+from ..physics.cause_log import CauseSpan
 from ..scenes.scene import Scene
 
 
@@ -18,11 +19,18 @@ class TrialTruth:
         self._scene = scene
         self._sim_s = sim_s
         self._began = time.monotonic() if began_s is None else began_s
+        self._causes: List[Dict[str, Any]] = []
+        self.happened([CauseSpan(each.kind, each.text, each.lasting, None, None)
+                       for each in scene.causes])
         self._passed: Dict[str, float] = {}  # s of the world's time, by what took it
 
     def passed(self, seconds: float, what: str) -> None:
         """Add up the world's time (s) that passed for some work."""
         self._passed[what] = self._passed.get(what, 0.0) + seconds
+
+    def happened(self, spans: Sequence[CauseSpan]) -> None:
+        """Take the world's log of the causes, as it is at the trial's end."""
+        self._causes = [each._asdict() for each in spans]
 
     def record(self, success: bool, why: str, sim_s: float, spent: Mapping[str, float],
                used: Mapping[str, float]) -> Dict[str, Any]:
@@ -34,7 +42,7 @@ class TrialTruth:
         wall = time.monotonic() - self._began
         return {
             'seed': self._scene.seed, 'task': self._scene.task, 'success': success, 'why': why,
-            'causes': [{'kind': cause.kind, 'text': cause.text} for cause in self._scene.causes],
+            'causes': self._causes,
             'sim_s': round(sim_s - self._sim_s, 3), 'passed_s': {
                 what: round(seconds, 3)
                 for what, seconds in sorted(self._passed.items())

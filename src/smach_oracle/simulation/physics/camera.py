@@ -1,6 +1,6 @@
 """The head camera: PyBullet's software renderer, with the errors of a depth camera."""
 import math
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 import pybullet
@@ -33,6 +33,7 @@ BASELINE = 0.075  # m, between projector and sensor: gives the steps in which de
 EDGE = 0.03  # m: a jump of depth between neighbours from which the edge is lost, mostly
 LOST_EDGE = 0.7  # share of the sensor's pixels beside a jump that are lost
 DIMMED = 0.6  # brightness below which depth suffers, too
+LOST_IN_THE_DARK = 0.04  # share of the depth that is lost without any light but the camera's own
 
 
 def size_of(world: World) -> Tuple[int, int]:
@@ -101,45 +102,58 @@ def see(world: World) -> CameraImage:
 def take_image(world: World, counted: bool = True) -> CameraImage:
     """An image of what the head camera sees just now.
 
-    :param counted: False: sets off nothing, and uses up no disturbance.
+    :param counted: False: sets off nothing.
     """
-    quality = world.disturbances.camera_quality(world.scene.camera)
+    lights = world.disturbances.lights
+    quality = lights.quality(world.scene.camera, world.periods)
     pose = world.link_pose(CAMERA_FRAME)
     rendered = RenderedView(world, pose, size_of(world))
+    dazzled = lights.dazzled(world.periods, pose, intrinsics_of(world), size_of(world))
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
-    image = CameraImage(world.time, noisy_colour(rendered.colour, quality, generator),
-                        noisy_depth(rendered.depth, quality, generator, world.binning),
+    image = CameraImage(world.time,
+                        noisy_colour(rendered.colour, quality, generator, dazzled),
+                        noisy_depth(rendered.depth, quality, generator, world.binning, dazzled),
                         intrinsics_of(world),
                         inverse(world.true_base()) @ pose)
     if counted:
-        world.disturbances.image_taken()
         world.happened('see')
     return image
 
 
-def noisy_colour(colour: np.ndarray, quality: CameraQuality,
-                 generator: np.random.Generator) -> np.ndarray:
-    """(h, w, 3) uint8, as dark as the light is and with noise in every channel."""
+def noisy_colour(colour: np.ndarray, quality: CameraQuality, generator: np.random.Generator,
+                 dazzled: Optional[np.ndarray] = None) -> np.ndarray:
+    """(h, w, 3) uint8, as dark as the light is and with noise in every channel.
+
+    :param dazzled: (h, w), the share of each pixel that is lost to glare: white where it is 1.
+    """
     noise = generator.standard_normal(colour.shape, np.float32) * np.float32(quality.colour_noise)
-    return np.clip(colour * np.float32(quality.brightness) + noise, 0, 255).astype(np.uint8)
+    seen = colour * np.float32(quality.brightness) + noise
+    if dazzled is not None:
+        seen += (255 - seen) * dazzled[..., None]
+    return np.clip(seen, 0, 255).astype(np.uint8)
 
 
 def noisy_depth(depth: np.ndarray, quality: CameraQuality, generator: np.random.Generator,
-                binning: int = 1) -> np.ndarray:
+                binning: int = 1, dazzled: Optional[np.ndarray] = None) -> np.ndarray:
     """(h, w) float32 m, with a Kinect's noise, steps, lost edges and lost pixels.
 
-    NaN beyond FAR. Dim light adds to all of these. Of an edge as much is lost, in m, whatever the
-    size of the pixels.
+    NaN beyond FAR. The camera brings its own light: in the dark it sees a little less, and no
+    worse. Of an edge as much is lost, in m, whatever the size of the pixels.
+
+    :param dazzled: (h, w), the chance of each pixel to be lost to glare.
     """
     known = np.asarray(depth, np.float32)
     dark = max(0.0, 1.0 - quality.brightness / DIMMED)
-    spread = (quality.noise + 3.0 * dark) * (0.0012 + 0.0019 * (known - 0.4) ** 2)
+    spread = quality.noise * (0.0012 + 0.0019 * (known - 0.4) ** 2)
     found = known + spread * generator.standard_normal(depth.shape, np.float32)
     steps = BASELINE * FOCAL * 8
     found = steps / np.round(steps / np.maximum(found, NEAR))
     chance = generator.random(depth.shape, np.float32)
     jumps = ndimage.maximum_filter(known, 3) - ndimage.minimum_filter(known, 3) > EDGE
     at_edge = jumps & (chance < LOST_EDGE / binning)
-    lost = at_edge | (chance > 1.0 - min(1.0, quality.dropout + 0.9 * dark ** 2))
+    missing = np.full(depth.shape, quality.dropout + LOST_IN_THE_DARK * dark ** 2)
+    if dazzled is not None:
+        missing += dazzled
+    lost = at_edge | (chance > 1.0 - np.minimum(1.0, missing))
     found[lost | (known > 0.999 * FAR)] = np.nan
     return found.astype(np.float32)

@@ -2,12 +2,16 @@
 
 Kinds, with their values (a scene's Disturbance.values) and the defaults of these:
 * ``arm``: joints by name, rad: somebody moves an arm there, in ``duration`` s (1.5).
-* ``dim``: the light falls to ``brightness`` (0.15) for the next ``frames`` (2) of the camera.
-* ``glare``: the share ``dropout`` (0.9) of the depth is lost in the next ``frames`` (2).
+* ``dim``: the light falls to ``brightness`` (0.15) for ``duration`` s (60).
+* ``glare``: a place (``x``, ``y``, ``z``, m in the world) reflects light towards ``eye_x``,
+  ``eye_y``, ``eye_z`` for ``duration`` s (60), within ``lobe`` rad (0.2) about that direction; it
+  dazzles a patch of ``radius`` rad (0.2) of the image. See light.py.
 * ``swing:BODY``: the joints of a body that is a URDF, a door, swing to ``angle`` rad (0) in
   ``duration`` s (1.5).
 * ``nudge:BODY``: a body is pushed over what it stands on by ``dx``, ``dy`` m (0) in ``duration`` s
   (0.4).
+
+Each also takes ``delay`` s (0): how long after its event it begins. All times are the world's.
 
 Events are counted since the reset: ``see`` or ``see:1`` is the first image, ``drive:2`` the end of
 the second drive. They are start, follow, follow_left, follow_right, open_left, close_left (and
@@ -22,18 +26,21 @@ import numpy as np
 
 from smach_oracle.pr2.robot import ARMS
 
-from ..scenes.scene import CameraQuality, Disturbance, Scene
+from ..scenes.scene import Disturbance, Scene
+from . import light
 from .bodies import SceneBuildError
+from .cause_log import CauseLog
 from .easing import eased
 from .pr2_body import PERIOD, Pr2Body
 
 EVENTS = ('start', 'follow', 'torso', 'look_at', 'drive', 'see') + tuple(
     '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
 FASTEST = 0.5  # m/s, of a nudge
+LOOK_PERIODS = 30  # control periods from one look at what has become of the causes to the next
+SIGNED = ('dx', 'dy') + light.PLACES  # values that may be negative
 OPTIONS: Dict[str, Dict[str, float]] = {
     'arm': {'duration': 1.5},
-    'dim': {'brightness': 0.15, 'frames': 2},
-    'glare': {'dropout': 0.9, 'frames': 2},
+    **light.OPTIONS,
     'swing': {'angle': 0.0, 'duration': 1.5},
     'nudge': {'dx': 0.0, 'dy': 0.0, 'duration': 0.4},
 }
@@ -54,6 +61,9 @@ class DisturbedWorld(Protocol):
     def body_pose(self, name: str) -> np.ndarray:
         """See World."""
 
+    def joints(self) -> Dict[str, float]:
+        """See World."""
+
     def body_joint(self, name: str, joint: str) -> float:
         """See World."""
 
@@ -67,11 +77,11 @@ class DisturbedWorld(Protocol):
         """See World."""
 
 
-class _Blinding(NamedTuple):
-    """A disturbance of the camera, and the images that it still spoils."""
+class _Due(NamedTuple):
+    """A disturbance whose event has come."""
 
     cause: Disturbance
-    images: int
+    period: int  # at which it begins
 
 
 class _ActiveDisturbance(NamedTuple):
@@ -96,69 +106,68 @@ class Disturbances:
             _check(disturbance, scene, robot)
         self._waiting = list(scene.disturbances)
         self._counts: CounterOf[str] = Counter()
-        self._due: List[Disturbance] = []
+        self._due: List[_Due] = []
         self._moving: List[_ActiveDisturbance] = []
-        self._blinding: List[_Blinding] = []
+        self.lights = light.Lights()
+        self.log = CauseLog(scene.causes, [each.cause for each in scene.disturbances])
 
-    def happened(self, event: str) -> None:
-        """Count an event, and set off what waited for it."""
+    def happened(self, event: str, period: int) -> None:
+        """Count an event, and set off what waited for it.
+
+        :param period: the control period, since the reset.
+        """
         self._counts[event] += 1
         now = '{}:{}'.format(event, self._counts[event])
         for disturbance in list(self._waiting):
             if _numbered(disturbance.after) == now:
                 self._waiting.remove(disturbance)
-                if disturbance.kind in ('dim', 'glare'):
-                    self._blinding.append(
-                        _Blinding(disturbance, int(_values(disturbance)['frames'])))
+                begins = period + round(_values(disturbance)['delay'] / PERIOD)
+                if disturbance.kind in light.OPTIONS:
+                    self._light(disturbance, begins)
                 else:
-                    self._due.append(disturbance)
+                    self._due.append(_Due(disturbance, begins))
+
+    def _light(self, disturbance: Disturbance, begins: int) -> None:
+        values = _values(disturbance)
+        ends = begins + max(1, round(values['duration'] / PERIOD))
+        self.lights.add(light.Light(disturbance.kind, values, begins, ends))
+        self.log.began(disturbance.cause, begins)
+        self.log.ended(disturbance.cause, ends)
 
     @property
     def moving(self) -> bool:
-        """Something is being moved."""
-        return bool(self._due or self._moving)
+        """Something is being moved, or is about to be."""
+        return bool(self._moving or any(not _values(each.cause)['delay'] for each in self._due))
 
     def next_period(self, period: int, end: int) -> int:
         """The control period, from `period` to `end`, up to which no disturbance is due."""
-        return period if self.moving else end
+        if self._moving:
+            return period
+        return max(period, min([end] + [each.period for each in self._due]))
 
     def tick(self, world: DisturbedWorld) -> None:
         """Move what is disturbed; called before each control period."""
-        for disturbance in self._due:
+        if world.periods % LOOK_PERIODS == 0:
+            self.log.look(world, self.moving)
+        now = [each for each in self._due if each.period <= world.periods]
+        for disturbance, _ in now:
             values = _values(disturbance)
+            self.log.began(disturbance.cause, world.periods)
             self._moving.append(
                 _ActiveDisturbance(disturbance, values, max(1, round(values['duration'] / PERIOD)),
                                    world.periods, _start(world, disturbance)))
-        self._due = []
+        self._due = [each for each in self._due if each not in now]
         for active in list(self._moving):
             done = world.periods - active.begun
             if done >= active.periods:
                 self._moving.remove(active)
+                self.log.ended(active.cause.cause, world.periods)
             if active.cause.kind == 'arm' and done < active.periods:
                 _move_arm(world, active, done)
             elif active.cause.kind.startswith('swing'):
                 _swing_body(world, active, done)
             elif active.cause.kind != 'arm':
                 _move_body(world, active, done)
-
-    def camera_quality(self, quality: CameraQuality) -> CameraQuality:
-        """How well the camera sees just now.
-
-        :param quality: of the camera undisturbed.
-        """
-        for cause, _ in self._blinding:
-            values = _values(cause)
-            if cause.kind == 'dim':
-                quality = quality._replace(brightness=min(quality.brightness, values['brightness']))
-            else:
-                quality = quality._replace(dropout=max(quality.dropout, values['dropout']))
-        return quality
-
-    def image_taken(self) -> None:
-        """Count an image of the camera."""
-        self._blinding = [
-            _Blinding(cause, images - 1) for cause, images in self._blinding if images > 1
-        ]
 
 
 def _move_arm(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
@@ -187,14 +196,15 @@ def _swing_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) ->
 
 
 def _values(disturbance: Disturbance) -> Dict[str, float]:
-    return dict(OPTIONS[disturbance.kind.partition(':')[0]], **dict(disturbance.values))
+    return dict({'delay': 0.0, **OPTIONS[disturbance.kind.partition(':')[0]]},
+                **dict(disturbance.values))
 
 
 def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
     if disturbance.kind == 'arm':
         return {
             name: world.robot.position(name)
-            for name, _ in disturbance.values if name not in OPTIONS['arm']
+            for name, _ in disturbance.values if name not in OPTIONS['arm'] and name != 'delay'
         }
     kind, _, body = disturbance.kind.partition(':')
     if kind == 'swing':
@@ -231,8 +241,8 @@ def _wrong_value(kind: str, disturbance: Disturbance, robot: Pr2Body) -> str:
     for name, value in disturbance.values:
         if not math.isfinite(value):
             return '{} is {}; allowed: finite numbers'.format(name, value)
-        if name in OPTIONS[kind]:
-            if name not in ('dx', 'dy') and value < 0:
+        if name in OPTIONS[kind] or name == 'delay':
+            if name not in SIGNED and value < 0:
                 return '{} is {}; allowed: 0 or more'.format(name, value)
         elif kind != 'arm':
             return 'unknown value {!r}; allowed: {}'.format(name, ', '.join(OPTIONS[kind]))

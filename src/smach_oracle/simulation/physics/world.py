@@ -14,6 +14,7 @@ from smach_oracle.pr2.robot import ARMS, TOOL_FRAME
 
 from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
+from .cause_log import CauseSpan
 from .disturbances import Disturbances
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 
@@ -112,7 +113,7 @@ class World:
     def happened(self, *events: str) -> None:
         """Count events, such as 'look_at'; they may set off a disturbance of the scene."""
         for event in events:
-            self._disturbances.happened(event)
+            self._disturbances.happened(event, self.periods)
 
     @property
     def disturbed(self) -> bool:
@@ -123,6 +124,11 @@ class World:
     def disturbances(self) -> Disturbances:
         """What happens to this trial's world."""
         return self._disturbances
+
+    def cause_spans(self) -> List[CauseSpan]:
+        """When the scene's causes were there, as of now, s since the scene was at rest."""
+        self._disturbances.log.look(self, self.disturbed)
+        return self._disturbances.log.spans(REST_PERIODS, self.periods)
 
     # the robot
 

@@ -6,9 +6,12 @@ import numpy as np
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike
 from smach_oracle.pr2.robot import GripperState, RobotError
+from smach_oracle.pr2.work_costs import Work
 
 from ..physics.camera import see
 from ..physics.motions import BaseMotion, GripperMotion, HeadMotion, TorsoMotion
+from ..physics.passing import pass_time
+from ..physics.pr2_body import PERIOD
 from ..physics.trajectory import Motion, MotionResult, Trajectory, run
 from ..physics.world import World
 
@@ -62,7 +65,13 @@ class DirectRobot:
 
     def see(self) -> CameraImage:
         """See Robot."""
-        return see(self._world)
+        image = see(self._world)
+        self.spend('perception', Work(images=1))
+        return image
+
+    def spend(self, what: str, work: Work) -> None:
+        """See Robot."""
+        pass_time(self._world, round(work.seconds / PERIOD))
 
     def _do(self, make: Callable[[], Motion]) -> MotionResult:
         try:

@@ -18,6 +18,7 @@ from smach_oracle.msg import (
 )
 from smach_oracle.pr2.nodes.frames import box_messages
 from smach_oracle.pr2.nodes.manipulation import Manipulation
+from smach_oracle.pr2.nodes.perception_node import DETECTION
 from smach_oracle.pr2.perception.clusters import NotSeen
 from smach_oracle.pr2.perception.own_limbs import limbs_of
 from smach_oracle.pr2.perception.tabletop import find_tabletop
@@ -77,7 +78,9 @@ class PickAndPlaceRehearsal:
 
     def _detect(self) -> None:
         limbs = limbs_of(self._links, self.robot.joints())
-        found = find_tabletop(self.robot.see(), limbs=limbs)
+        image = self.robot.see()
+        self.robot.spend('perception', DETECTION)
+        found = find_tabletop(image, limbs=limbs)
         messages = [box_messages(box) for box in found.objects]
         self.data.update(table=box_messages(found.table)[0], objects=[pose for pose, _ in messages],
                          sizes=[size for _, size in messages])

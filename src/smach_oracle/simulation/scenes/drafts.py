@@ -1,5 +1,5 @@
 """Scenes to which causes are being added."""
-from typing import Any, Callable, Protocol, Tuple, TypeVar
+from typing import Any, Callable, Collection, Protocol, Tuple, TypeVar
 
 from .scene import Disturbance, SceneCause
 
@@ -23,12 +23,25 @@ class SceneDraft(Protocol):
 Draft = TypeVar('Draft', bound=SceneDraft)
 
 
-def caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance) -> Draft:
+def caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance,
+           until: Tuple[str, ...] = ()) -> Draft:
     """The draft with one more cause, and with what that makes happen.
 
     :param kind: as in SceneCause.
     :param text: likewise.
+    :param until: likewise.
     """
-    changed: Draft = draft._replace(disturbances=draft.disturbances + disturbances,
-                                    causes=draft.causes + (SceneCause(kind, text),))
+    belonging = tuple(each._replace(cause=kind) for each in disturbances)
+    changed: Draft = draft._replace(disturbances=draft.disturbances + belonging,
+                                    causes=draft.causes + (SceneCause(kind, text, until),))
+    return changed
+
+
+def declared(draft: Draft, lasting: Collection[str]) -> Draft:
+    """The draft whose causes say whether they last.
+
+    :param lasting: the kinds that do.
+    """
+    changed: Draft = draft._replace(
+        causes=tuple(each._replace(lasting=each.kind in lasting) for each in draft.causes))
     return changed

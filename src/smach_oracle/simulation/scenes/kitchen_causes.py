@@ -6,15 +6,29 @@ from typing import Callable, Dict, List, NamedTuple, Tuple
 
 import numpy as np
 
-from .drafts import caused
+from .cause_draws import (
+    LASTING,
+    LASTING_SHARE,
+    PASSING,
+    cloud_minutes,
+    dazzling,
+    drawn_kinds,
+    passing_seconds,
+)
+from .drafts import caused, declared
 from .scene import Body, Disturbance, SceneCause, Vector
 
-CHANCE = {
-    'base_misplaced': 0.14, 'door_swings_back': 0.16, 'crowded': 0.02, 'glare': 0.16,
-    'slippery_drink': 0.04, 'drink_moved': 0.10
+# why, and why so often: doc/protocol.md
+AMOUNT = 0.55  # chance that a trial has a cause
+KINDS_OF = {
+    LASTING: {'base_misplaced': 0.30, 'glare': 0.25, 'crowded': 0.15, 'slippery_drink': 0.15,
+              'dim_light': 0.15},
+    PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
 }
+EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
+IN_FRIDGE = 'look_at:3'  # the first two are at the door
+LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
 TARGET = 0  # the drink that stands nearest to the front
-LONG_GLARE = 0.1  # share of glares that last for two images
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 STEADY: Vector = (0.008, 0.008, 0.006)
@@ -31,13 +45,14 @@ class KitchenDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: KitchenDraft, seed: int) -> KitchenDraft:
-    """A kitchen with the causes that its seed has for it."""
-    for number, kind in enumerate(sorted(CHANCE)):
-        generator = np.random.default_rng([seed, 72, number])
-        if generator.random() < CHANCE[kind]:
-            draft = MAKERS[kind](draft, generator)
-    return draft
+def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE) -> KitchenDraft:
+    """A kitchen with the causes that its seed has for it: mostly one, seldom two.
+
+    :param lasting: the share of the causes that last, 0 to 1.
+    """
+    for kind, generator in drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting):
+        draft = MAKERS[kind](draft, generator)
+    return declared(draft, KINDS_OF[LASTING])
 
 
 def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -66,18 +81,48 @@ def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraf
                                      target.position[1] + far * float(np.sin(heading)),
                                      other.position[2]))
     return caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
-                  'two drinks stand {:.1f} cm beside each other'.format(100 * gap))
+                  'two drinks stand {:.1f} cm beside each other'.format(100 * gap),
+                  until=(target.name, other.name))
 
 
 def _glare(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """The camera is dazzled when it turns to the drinks, after it has looked at the door twice."""
-    dropout = float(generator.uniform(0.93, 0.99))
-    frames = 2 if generator.random() < LONG_GLARE else 1
-    return caused(
-        draft, 'glare',
-        'the sun shines into the camera for {} frames: {:.0f}% of the depth is lost'.format(
-            frames, 100 * dropout),
-        Disturbance('glare', 'look_at:3', (('dropout', dropout), ('frames', frames))))
+    """The low sun falls through a window, and a glass shelf throws it into the lens."""
+    minutes = float(generator.uniform(30.0, 90.0))
+    return _dazzled(draft, generator, 'glare', 60 * minutes,
+                    'the low sun dazzles the camera for {:.0f} minutes'.format(minutes))
+
+
+def _reflex(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """Something shiny that moves throws light into the lens."""
+    seconds = passing_seconds(generator)
+    return _dazzled(draft, generator, 'reflex', seconds,
+                    'a reflection dazzles the camera for {:.1f} s'.format(seconds))
+
+
+def _dazzled(draft: KitchenDraft, generator: np.random.Generator, kind: str, seconds: float,
+             text: str) -> KitchenDraft:
+    """From when the camera turns to the drinks, after it has looked at the door twice."""
+    values = dazzling(EYE, LOOKS_AT, np.array(draft.drinks[TARGET].position), generator)
+    return caused(draft, kind, text, Disturbance('glare', IN_FRIDGE,
+                                                 values + (('duration', seconds),)))
+
+
+def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """A cloud, in a kitchen without lamps."""
+    brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
+    values = (('brightness', brightness), ('duration', 60 * minutes))
+    text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
+        100 * brightness, minutes)
+    return caused(draft, 'dim_light', text, Disturbance('dim', IN_FRIDGE, values))
+
+
+def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """Somebody stands in the light."""
+    brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
+    values = (('brightness', brightness), ('duration', seconds))
+    text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
+        seconds, 100 * brightness)
+    return caused(draft, 'shadow', text, Disturbance('dim', IN_FRIDGE, values))
 
 
 def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -113,6 +158,7 @@ def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
 Maker = Callable[[KitchenDraft, np.random.Generator], KitchenDraft]
 MAKERS: Dict[str, Maker] = {
     'base_misplaced': _base_misplaced, 'door_swings_back': _door_swings_back, 'crowded': _crowded,
-    'glare': _glare, 'slippery_drink': _slippery_drink, 'drink_moved': _drink_moved
+    'glare': _glare, 'reflex': _reflex, 'dim_light': _dim_light, 'shadow': _shadow,
+    'slippery_drink': _slippery_drink, 'drink_moved': _drink_moved
 }
-KINDS: List[str] = sorted(CHANCE)
+KINDS: List[str] = sorted(MAKERS)

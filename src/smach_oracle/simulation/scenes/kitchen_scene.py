@@ -7,6 +7,7 @@ from smach_oracle.pr2.kitchen import Kitchen
 from smach_oracle.pr2.planning.travel import TRAVEL
 from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
 
+from .cause_draws import LASTING_SHARE
 from .fridge import DOOR_JOINT, fridge_urdf
 from .kitchen_causes import KitchenDraft, with_causes
 from .person import PALM, PALM_SIZE, person
@@ -22,10 +23,11 @@ DOOR_FRICTION = 3.0  # N m, dry
 START_TORSO = 0.15  # m
 
 
-def draw(seed: int, benign: bool = False) -> Scene:
+def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Scene:
     """The scene of a trial.
 
     :param benign: without any reason to fail that could be left out.
+    :param lasting: the share of the causes that last, 0 to 1.
     :raises ValueError: for a negative seed.
     """
     if seed < 0:
@@ -35,7 +37,7 @@ def draw(seed: int, benign: bool = False) -> Scene:
     draft = KitchenDraft(tuple(_drinks(generator, kitchen)), kitchen.place[:2],
                          kitchen.width / 2 - kitchen.wall)
     if not benign:
-        draft = with_causes(draft, seed)
+        draft = with_causes(draft, seed, lasting)
     goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
     return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error),

@@ -42,6 +42,7 @@ class Disturbance(NamedTuple):
     # 'drive:1'
     after: str
     values: Tuple[Tuple[str, float], ...] = ()
+    cause: str = ''  # kind of the cause that it belongs to
 
 
 class SceneCause(NamedTuple):
@@ -49,6 +50,11 @@ class SceneCause(NamedTuple):
 
     kind: str  # short and stable, e.g. 'crowded', 'arm_in_view', 'sensor_noise', 'slippery_object'
     text: str  # in words, with figures
+    # names of bodies, or 'arm:' and a joint's name: the cause lasts until one of them is moved;
+    # (): it ends with what its disturbance does, and without a disturbance never
+    until: Tuple[str, ...] = ()
+    # whether it is meant to be there still at a second try, and after the script was started over
+    lasting: bool = False
 
 
 class RobotStart(NamedTuple):

@@ -12,7 +12,16 @@ from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.pr2.model.pr2_model import pr2_urdf
 from smach_oracle.pr2.robot import ARM_JOINTS, BASE_FRAME, TOOL_FRAME
 
-from .drafts import caused
+from .cause_draws import (
+    LASTING,
+    LASTING_SHARE,
+    PASSING,
+    cloud_minutes,
+    dazzling,
+    drawn_kinds,
+    passing_seconds,
+)
+from .drafts import caused, declared
 from .scene import Body, Disturbance, SceneCause
 
 TABLE_TOP = 0.72  # m
@@ -22,9 +31,15 @@ EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
 ROOM = 0.12  # m, around where the nearest thing is moved to
 TARGET = 0  # the thing that stands nearest
 
-CHANCE = {
-    'arm_in_view': 0.085, 'glare': 0.075, 'dim_light': 0.05, 'crowded': 0.03,
-    'slippery_object': 0.02, 'object_moved': 0.075, 'goal_occupied': 0.012, 'edge_of_reach': 0.01
+EYE_LOOKING = np.array([0.09, 0.02, 1.44])  # m, where it is when it looks at the table
+LOOKS_AT = np.array([0.65, 0.0, 0.80])  # m, the middle of its image then
+
+# why, and why so often: doc/protocol.md
+AMOUNT = 0.40  # chance that a trial has a cause
+KINDS_OF = {
+    LASTING: {'crowded': 0.25, 'glare': 0.25, 'goal_occupied': 0.20, 'dim_light': 0.10,
+              'slippery_object': 0.10, 'edge_of_reach': 0.10},
+    PASSING: {'arm_in_view': 0.45, 'object_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
 }
 
 
@@ -36,13 +51,14 @@ class TabletopDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: TabletopDraft, seed: int) -> TabletopDraft:
-    """A scene with the causes that its seed has for it: mostly none, seldom two."""
-    for number, kind in enumerate(sorted(CHANCE)):
-        generator = np.random.default_rng([seed, 62, number])
-        if generator.random() < CHANCE[kind]:
-            draft = MAKERS[kind](draft, generator) or draft
-    return draft
+def with_causes(draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE) -> TabletopDraft:
+    """A scene with the causes that its seed has for it: mostly none, seldom two.
+
+    :param lasting: the share of the causes that last, 0 to 1.
+    """
+    for kind, generator in drawn_kinds(seed, 62, AMOUNT, KINDS_OF, lasting):
+        draft = MAKERS[kind](draft, generator) or draft
+    return declared(draft, KINDS_OF[LASTING])
 
 
 def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
@@ -66,7 +82,8 @@ def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Option
             return caused(
                 draft, 'arm_in_view',
                 'the left arm is pushed over the table, its hand {:.0f} cm above it'.format(
-                    100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values))
+                    100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values),
+                until=tuple('arm:' + name for name in ARM_JOINTS['left'][:4]))
     return None
 
 
@@ -77,20 +94,42 @@ def _left_arm() -> JointChain:
 
 
 def _glare(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    frames = 2 if generator.random() < 0.15 else 1
-    dropout = float(generator.uniform(0.92, 0.99))
-    return caused(
-        draft, 'glare',
-        'light falls into the camera for {} frame(s): {:.0f}% of the depth is lost'.format(
-            frames, 100 * dropout),
-        Disturbance('glare', 'look_at', (('dropout', dropout), ('frames', frames))))
+    """The low sun falls through a window, and something shiny throws it into the lens."""
+    minutes = float(generator.uniform(30.0, 90.0))
+    return _dazzled(draft, generator, 'glare', 60 * minutes,
+                    'the low sun dazzles the camera for {:.0f} minutes'.format(minutes))
+
+
+def _reflex(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+    """Something shiny that moves throws light into the lens."""
+    seconds = passing_seconds(generator)
+    return _dazzled(draft, generator, 'reflex', seconds,
+                    'a reflection dazzles the camera for {:.1f} s'.format(seconds))
+
+
+def _dazzled(draft: TabletopDraft, generator: np.random.Generator, kind: str, seconds: float,
+             text: str) -> TabletopDraft:
+    values = dazzling(EYE_LOOKING, LOOKS_AT, np.array(draft.things[TARGET].position), generator)
+    return caused(draft, kind, text, Disturbance('glare', 'look_at',
+                                                 values + (('duration', seconds),)))
 
 
 def _dim_light(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    brightness = float(generator.uniform(0.02, 0.12))
-    return caused(draft, 'dim_light',
-                  'the light fails for one frame, down to {:.0f}%'.format(100 * brightness),
-                  Disturbance('dim', 'look_at', (('brightness', brightness), ('frames', 1))))
+    """A cloud, in a room without lamps."""
+    brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
+    values = (('brightness', brightness), ('duration', 60 * minutes))
+    text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
+        100 * brightness, minutes)
+    return caused(draft, 'dim_light', text, Disturbance('dim', 'look_at', values))
+
+
+def _shadow(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+    """Somebody stands in the light."""
+    brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
+    values = (('brightness', brightness), ('duration', seconds))
+    text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
+        seconds, 100 * brightness)
+    return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values))
 
 
 def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -102,7 +141,8 @@ def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDr
     spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
     moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
     return caused(draft._replace(things=draft.things[:-1] + (moved,)), 'crowded',
-                  'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap))
+                  'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap),
+                  until=(thing.name, other.name))
 
 
 def _slippery_object(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -147,7 +187,8 @@ def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
         moved.append(other._replace(position=spot))
     return caused(draft._replace(things=draft.things[:-2] + tuple(moved)), 'goal_occupied',
                   'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
-                      *(100 * away for away in distances)))
+                      *(100 * away for away in distances)),
+                  until=tuple(each.name for each in moved))
 
 
 def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -159,7 +200,8 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
                    if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
                    and np.hypot(*other.position[:2]) > np.hypot(*spot) + 0.04)
     return caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
-                  'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]))
+                  'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]),
+                  until=(thing.name,))
 
 
 def _radius(thing: Body) -> float:
@@ -168,8 +210,9 @@ def _radius(thing: Body) -> float:
 
 Maker = Callable[[TabletopDraft, np.random.Generator], Optional[TabletopDraft]]
 MAKERS: Dict[str, Maker] = {
-    'arm_in_view': _arm_in_view, 'glare': _glare, 'dim_light': _dim_light, 'crowded': _crowded,
-    'slippery_object': _slippery_object, 'object_moved': _object_moved,
-    'goal_occupied': _goal_occupied, 'edge_of_reach': _edge_of_reach
+    'arm_in_view': _arm_in_view, 'glare': _glare, 'reflex': _reflex, 'dim_light': _dim_light,
+    'shadow': _shadow, 'crowded': _crowded, 'slippery_object': _slippery_object,
+    'object_moved': _object_moved, 'goal_occupied': _goal_occupied,
+    'edge_of_reach': _edge_of_reach
 }
-KINDS: List[str] = sorted(CHANCE)
+KINDS: List[str] = sorted(MAKERS)

@@ -3,6 +3,7 @@ from typing import List, Tuple
 
 import numpy as np
 
+from .cause_draws import LASTING_SHARE
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
 from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
 
@@ -20,15 +21,16 @@ COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.
 WOOD = (0.58, 0.42, 0.27)
 
 
-def draw(seed: int, benign: bool = False) -> Scene:
+def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Scene:
     """The trial's world.
 
     :param seed: 0 or more.
     :param benign: without any reason to fail.
+    :param lasting: the share of the causes that last, 0 to 1.
     """
     draft = TabletopDraft(_things(np.random.default_rng([seed, 61])))
     if not benign:
-        draft = with_causes(draft, seed)
+        draft = with_causes(draft, seed, lasting)
     height = TABLE_TOP + draft.things[0].size[2] / 2
     goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
     return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal,

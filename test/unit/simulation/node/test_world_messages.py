@@ -19,6 +19,7 @@ from smach_oracle.simulation.node.state_publisher import odometry, transforms
 from smach_oracle.simulation.node.streamed_target import StreamedTarget
 from smach_oracle.simulation.node.truth import TrialTruth, append_line
 from smach_oracle.simulation.physics.camera import INTRINSICS
+from smach_oracle.simulation.physics.cause_log import CauseSpan
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
 from smach_oracle.simulation.scenes.scene import Body, Goal, RobotStart, Scene, SceneCause
@@ -155,7 +156,8 @@ def test_the_truth_is_a_line_for_each_trial(tmp_path):
                                                      {'physics': 0.25}))
     lines = [json.loads(line) for line in path.read_text(encoding='utf-8').splitlines()]
     assert [line['sim_s'] for line in lines] == [2.0, 4.0]
-    assert lines[0]['causes'] == [{'kind': 'crowded', 'text': 'by much'}]
+    assert lines[0]['causes'] == [{
+        'kind': 'crowded', 'text': 'by much', 'lasting': False, 'began_s': None, 'ended_s': None}]
     assert {key: lines[0][key] for key in ('seed', 'task', 'success', 'why')} == {
         'seed': 7, 'task': 'test', 'success': True, 'why': 'stands'}
     assert lines[0]['share']['physics'] > 0 and lines[0]['cpu_s'] == {'physics': 0.25}
@@ -166,3 +168,10 @@ def test_the_truth_adds_up_the_time_that_was_let_pass():
     for seconds, what in ((2.0, 'planning'), (5.0, 'expert'), (0.5, 'planning')):
         truth.passed(seconds, what)
     assert truth.record(True, '', 9.0, {}, {})['passed_s'] == {'planning': 2.5, 'expert': 5.0}
+
+
+def test_the_truth_tells_when_a_cause_was_there():
+    truth = TrialTruth(scene(), 0.0)
+    truth.happened([CauseSpan('crowded', 'by much', True, 0.0, 7.5)])
+    assert truth.record(True, '', 9.0, {}, {})['causes'] == [{
+        'kind': 'crowded', 'text': 'by much', 'lasting': True, 'began_s': 0.0, 'ended_s': 7.5}]

@@ -18,7 +18,7 @@ from smach_oracle.simulation.physics.camera import (
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.rehearsal.portrait import portrait
-from smach_oracle.simulation.scenes.scene import Body, CameraQuality, Disturbance, RobotStart
+from smach_oracle.simulation.scenes.scene import Body, CameraQuality, RobotStart
 
 BOWED = RobotStart((('head_tilt_joint', 0.9),))
 
@@ -69,7 +69,8 @@ def test_a_noise_free_view_puts_things_where_they_are():
 def test_a_frame_is_in_the_frame_of_the_base(world, robot):
     before = world.time
     image = robot.see()
-    assert image.stamp == pytest.approx(before + 1 / 30, abs=1e-6) and image.stamp == world.time
+    assert image.stamp == pytest.approx(before + 1 / 30, abs=1e-6)
+    assert world.time > image.stamp  # it takes time to process it
     assert image.colour.shape == (HEIGHT, WIDTH, 3) and image.colour.dtype == np.uint8
     assert image.depth.shape == (HEIGHT, WIDTH) and image.depth.dtype == np.float32
     points = points_of(image.depth, image.intrinsics, image.base_from_camera)
@@ -116,28 +117,18 @@ def test_edges_and_what_is_too_far_are_lost():
     assert np.isnan(found[20:, 49:51]).mean() > 0.5 > 0.1 > np.isnan(found[20:, 60:]).mean()
 
 
-def test_dim_light_darkens_the_picture_and_costs_depth(world):
-    shares, brightness = [], []
+def test_dim_light_costs_colour_more_than_depth(world):
+    """The depth camera brings its own light."""
+    shares, noise = [], []
     for level in (1.0, 0.15):
         world.reset(scene(camera=CameraQuality(brightness=level), robot=BOWED))
         image = DirectRobot(world).see()
         shares.append(np.isnan(image.depth).mean())
-        brightness.append(image.colour.mean())
-    assert brightness[1] < 0.3 * brightness[0] and shares[1] > shares[0] + 0.3
-
-
-def test_glare_and_dim_light_last_as_many_frames_as_they_should(world):
-    world.reset(
-        scene(
-            disturbances=(Disturbance('glare', 'see', (('frames', 1), ('dropout', 0.8))),
-                          Disturbance('dim', 'see:3', (('frames', 2), ('brightness', 0.2)))),
-            robot=BOWED))
-    robot = DirectRobot(world)
-    images = [robot.see() for _ in range(6)]
-    lost = [np.isnan(image.depth).mean() for image in images]
-    light = [image.colour.mean() for image in images]
-    assert lost[1] > 0.75 and max(lost[0], lost[2], lost[5]) < 0.2
-    assert max(light[3:5]) < 0.4 * min(light[:3] + light[5:])
+        grey = noisy_colour(np.full((200, 200, 3), 128, np.uint8), CameraQuality(brightness=level),
+                            np.random.default_rng(0))
+        noise.append(grey.std() / grey.mean())
+    assert noise[1] > 5 * noise[0]
+    assert shares[0] < shares[1] < shares[0] + 0.05
 
 
 def test_what_is_hidden_is_not_seen(world):

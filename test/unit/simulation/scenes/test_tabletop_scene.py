@@ -7,7 +7,7 @@ import pybullet
 from smach_oracle.simulation.physics.judge import judge
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.pick_and_place import rehearse
-from smach_oracle.simulation.scenes.tabletop_causes import CHANCE
+from smach_oracle.simulation.scenes.tabletop_causes import KINDS
 from smach_oracle.simulation.scenes.tabletop_scene import GOAL, draw
 
 
@@ -30,7 +30,7 @@ def test_all_causes_come_up_and_their_share_is_as_it_should():
     for scene in scenes:
         counts.update(cause.kind for cause in scene.causes)
         assert all(cause.text for cause in scene.causes)
-    assert set(counts) == set(CHANCE)
+    assert set(counts) == set(KINDS)
     assert 0.2 < np.mean([bool(scene.causes) for scene in scenes]) < 0.6
 
 
