@@ -1,7 +1,7 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
 import math
 import xml.etree.ElementTree as ElementTree
-from typing import Collection, Dict, List, Optional
+from typing import Callable, Collection, Dict, List, Optional
 
 import numpy as np
 import pybullet
@@ -18,8 +18,9 @@ SUBSTEPS = 4  # steps of physics in a control period
 STEP = 1.0 / 240.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
-FORCE = 300.0  # N m; the effort limits of the URDF presume springs that carry the arms
-STRONG = dict({name: 5000.0 for name in BASE_JOINTS}, torso_lift_joint=10000.0)  # N
+# N, N, N m: what four casters of two driven wheels bring to the floor; the other joints have the
+# efforts of the URDF
+BASE_EFFORT = {'base_x': 600.0, 'base_y': 600.0, 'base_theta': 300.0}
 GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
 # together
@@ -65,7 +66,10 @@ class Pr2Body:
         self._frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
         self._targets = np.zeros(len(infos))
         self._rates = np.zeros(len(infos))
-        self._forces = np.array([STRONG.get(name, FORCE) for name in self.numbers])
+        # N m or N, that each motor gives at most
+        self.efforts = {info[1].decode(): info[10] for info in infos}
+        self.efforts.update(BASE_EFFORT)
+        self._forces = np.array([self.efforts[name] for name in self.numbers])
         self._moving: List[int] = []
         self._changed = set(range(len(infos)))
         self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
@@ -188,15 +192,20 @@ class Pr2Body:
         states = pybullet.getJointStates(self.index, self._jaws[arm], physicsClientId=self._client)
         return float(min(abs(state[3]) for state in states))
 
-    def advance(self) -> None:
-        """One control period of physics."""
+    def advance(self, pull: Callable[[], None]) -> None:
+        """One control period of physics.
+
+        :param pull: applies the forces from outside that hold for one step; called before each.
+        """
         for arm in ARMS:
             self._drive_jaws(arm)
         moving = [number for number in self._changed if self._rates[number]]
         self._send(self._changed, SUBSTEPS)
+        pull()
         pybullet.stepSimulation(physicsClientId=self._client)
         for left in range(SUBSTEPS - 1, 0, -1):
             self._send(moving, left)
+            pull()
             pybullet.stepSimulation(physicsClientId=self._client)
         self._rates[moving] = 0.0
         self._changed = set(moving)

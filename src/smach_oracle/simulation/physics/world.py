@@ -16,6 +16,7 @@ from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
+from .weights import Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
 TURNING_FORCE = 30.0  # N m, of what swings a door
@@ -67,6 +68,7 @@ class World:
             raise
         self.close()
         self._client, self._robot, self._placed = client, robot, placed
+        self._weights = Weights(client, placed.values())
         self.scene, self._disturbances = scene, disturbances
         self._names = {robot.index: 'robot', floor: 'floor'}
         self._names.update({each.number: name for name, each in placed.items()})
@@ -77,7 +79,6 @@ class World:
         self.happened('start')
 
     def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, PlacedBody]]:
-        pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=ITERATIONS,
                                            deterministicOverlappingPairs=1, physicsClientId=client)
         floor = add_floor(client)
@@ -102,7 +103,7 @@ class World:
         """Let `count` control periods of 1/60 s pass."""
         for _ in range(count):
             self._disturbances.tick(self)
-            self._robot.advance()
+            self._robot.advance(self._weights.pull)
             self.periods += 1
 
     def happened(self, *events: str) -> None:
