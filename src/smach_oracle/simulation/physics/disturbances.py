@@ -1,7 +1,9 @@
 """Things that happen to a trial's world while it goes on, each once, at its event.
 
 Kinds, with their values (a scene's Disturbance.values) and the defaults of these:
-* ``arm``: joints by name, rad: somebody moves an arm there, in ``duration`` s (1.5).
+* ``arm``: joints of an arm by name, rad: somebody pushes it there, in ``duration`` s (1.5). Its
+  controllers are stopped meanwhile, and hold it then where it was let go; with ``motors`` 1 (0)
+  they run on, and take it back. See pushed_arm.py.
 * ``dim``: the light falls to ``brightness`` (0.15) for the next ``frames`` (2) of the camera.
 * ``glare``: the share ``dropout`` (0.9) of the depth is lost in the next ``frames`` (2).
 * ``swing:BODY``: the joints of a body that is a URDF, a door, swing to ``angle`` rad (0) in
@@ -25,13 +27,14 @@ from smach_oracle.pr2.robot import ARMS
 from ..scenes.scene import CameraQuality, Disturbance, Scene
 from .bodies import SceneBuildError
 from .easing import eased
-from .pr2_body import PERIOD, Pr2Body
+from .pr2_body import PERIOD, Pr2Body, arm_of
+from .pushed_arm import SETTLING_S
 
 EVENTS = ('start', 'follow', 'torso', 'look_at', 'drive', 'see') + tuple(
     '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
 FASTEST = 0.5  # m/s, of a nudge
 OPTIONS: Dict[str, Dict[str, float]] = {
-    'arm': {'duration': 1.5},
+    'arm': {'duration': 1.5, 'motors': 0},
     'dim': {'brightness': 0.15, 'frames': 2},
     'glare': {'dropout': 0.9, 'frames': 2},
     'swing': {'angle': 0.0, 'duration': 1.5},
@@ -48,7 +51,7 @@ class DisturbedWorld(Protocol):
     def robot(self) -> Pr2Body:
         """See World."""
 
-    def set_target(self, joint: str, position: float, velocity: float) -> None:
+    def push_arm(self, joints: Dict[str, float], seconds: float, motors: bool) -> None:
         """See World."""
 
     def body_pose(self, name: str) -> np.ndarray:
@@ -123,15 +126,16 @@ class Disturbances:
         for disturbance in self._due:
             values = _values(disturbance)
             self._moving.append(
-                _ActiveDisturbance(disturbance, values, max(1, round(values['duration'] / PERIOD)),
+                _ActiveDisturbance(disturbance, values, _periods(disturbance, values),
                                    world.periods, _start(world, disturbance)))
         self._due = []
         for active in list(self._moving):
             done = world.periods - active.begun
             if done >= active.periods:
                 self._moving.remove(active)
-            if active.cause.kind == 'arm' and done < active.periods:
-                _move_arm(world, active, done)
+            if active.cause.kind == 'arm' and not done:
+                world.push_arm({name: active.values[name] for name in active.start},
+                               active.values['duration'], bool(active.values['motors']))
             elif active.cause.kind.startswith('swing'):
                 _swing_body(world, active, done)
             elif active.cause.kind != 'arm':
@@ -157,13 +161,6 @@ class Disturbances:
         ]
 
 
-def _move_arm(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
-    for name, start in active.start.items():
-        way = active.values[name] - start
-        here, there = (eased(step / active.periods) for step in (done, done + 1))
-        world.set_target(name, start + way * there, way * (there - here) / PERIOD)
-
-
 def _move_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
     name, share = active.cause.kind.partition(':')[2], min(1.0, (done + 1) / active.periods)
     x, y = world.body_pose(name)[:2, 3]
@@ -184,6 +181,12 @@ def _swing_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) ->
 
 def _values(disturbance: Disturbance) -> Dict[str, float]:
     return dict(OPTIONS[disturbance.kind.partition(':')[0]], **dict(disturbance.values))
+
+
+def _periods(disturbance: Disturbance, values: Dict[str, float]) -> int:
+    """How many control periods it takes until the world is left to itself."""
+    seconds = values['duration'] + (SETTLING_S if disturbance.kind == 'arm' else 0.0)
+    return max(1, round(seconds / PERIOD))
 
 
 def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
@@ -234,4 +237,7 @@ def _wrong_value(kind: str, disturbance: Disturbance, robot: Pr2Body) -> str:
             return 'unknown value {!r}; allowed: {}'.format(name, ', '.join(OPTIONS[kind]))
         elif robot.refusal(name, value):
             return robot.refusal(name, value)
+    arms = {arm_of(name) for name, _ in disturbance.values if name not in OPTIONS[kind]}
+    if kind == 'arm' and (len(arms) != 1 or '' in arms):
+        return 'joints of arms {}; allowed: those of one'.format(sorted(arms))
     return ''

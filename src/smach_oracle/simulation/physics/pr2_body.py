@@ -1,7 +1,7 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
 import math
 import xml.etree.ElementTree as ElementTree
-from typing import Callable, Collection, Dict, List, Optional
+from typing import Callable, Collection, Dict, List, Optional, Set
 
 import numpy as np
 import pybullet
@@ -25,6 +25,8 @@ GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
 # together
 LEAD = 0.003
+# N m, of an arm whose motors are off; shoulder and elbow have most of it
+DRY_FRICTION = (1.0, 1.0, 0.5, 0.5, 0.2, 0.2, 0.1)
 STIFFNESS = 0.3  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
 STAND = {  # how a PR2 stands unless the scene says otherwise
@@ -72,6 +74,7 @@ class Pr2Body:
         self._forces = np.array([self.efforts[name] for name in self.numbers])
         self._moving: List[int] = []
         self._changed = set(range(len(infos)))
+        self._limp: Set[int] = set()  # joints whose motors are off
         self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
         self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
         self._stand(start)
@@ -171,6 +174,30 @@ class Pr2Body:
             self._forces[number] = force
         self._changed.add(number)
 
+    def go_limp(self, arm: str) -> None:
+        """Switch an arm's motors off: it stays where it is, and what pushes it takes it along."""
+        numbers = [self.numbers[name] for name in ARM_JOINTS[arm]]
+        self._limp.update(numbers)
+        pybullet.setJointMotorControlArray(self.index, numbers, pybullet.VELOCITY_CONTROL,
+                                           targetVelocities=[0.0] * len(numbers),
+                                           forces=DRY_FRICTION, physicsClientId=self._client)
+
+    def hold(self, arm: str) -> None:
+        """Switch an arm's motors on again: they hold it where it is."""
+        for name in ARM_JOINTS[arm]:
+            self._limp.discard(self.numbers[name])
+            self.set_target(name, self.position(name), 0.0, None)
+
+    def push(self, link: str, point: np.ndarray, force: np.ndarray) -> None:
+        """Push a link of the URDF in the coming step of physics.
+
+        :param point: (3,) m, where, in the world.
+        :param force: (3,) N, in the world's axes.
+        """
+        pybullet.applyExternalForce(self.index, self.links[self._frames[link][0]], force.tolist(),
+                                    point.tolist(), pybullet.WORLD_FRAME,
+                                    physicsClientId=self._client)
+
     def target(self, name: str) -> float:
         """rad or m, where a joint was sent last."""
         return float(self._targets[self.numbers[name]])
@@ -212,9 +239,9 @@ class Pr2Body:
 
     def _send(self, numbers: Collection[int], left: int) -> None:
         """Give the motors their targets, with `left` steps of the period to go."""
-        if not numbers:
+        chosen = sorted(set(numbers) - self._limp)
+        if not chosen:
             return
-        chosen = sorted(numbers)
         rates = self._rates[chosen]
         pybullet.setJointMotorControlArray(
             self.index, chosen, pybullet.POSITION_CONTROL,

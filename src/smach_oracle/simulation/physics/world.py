@@ -16,6 +16,7 @@ from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
+from .pushed_arm import PushedArm
 from .weights import Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
@@ -69,6 +70,7 @@ class World:
         self.close()
         self._client, self._robot, self._placed = client, robot, placed
         self._weights = Weights(client, placed.values())
+        self._pushed: List[PushedArm] = []
         self.scene, self._disturbances = scene, disturbances
         self._names = {robot.index: 'robot', floor: 'floor'}
         self._names.update({each.number: name for name, each in placed.items()})
@@ -103,8 +105,19 @@ class World:
         """Let `count` control periods of 1/60 s pass."""
         for _ in range(count):
             self._disturbances.tick(self)
-            self._robot.advance(self._weights.pull)
+            self._robot.advance(self._push)
             self.periods += 1
+
+    def _push(self) -> None:
+        """What comes from outside, in the coming step of physics."""
+        self._weights.pull()
+        for each in self._pushed:
+            each.push()
+        self._pushed = [each for each in self._pushed if not each.over]
+
+    def push_arm(self, joints: Dict[str, float], seconds: float, motors: bool) -> None:
+        """Begin to push an arm as a person would; see PushedArm."""
+        self._pushed.append(PushedArm(self._robot, joints, seconds, motors))
 
     def happened(self, *events: str) -> None:
         """Count events, such as 'look_at'; they may set off a disturbance of the scene."""

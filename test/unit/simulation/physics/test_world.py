@@ -159,6 +159,8 @@ def test_clients_are_given_back(world):
     (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
     (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
      "no joint 'l_elbow_joint'"),
+    (scene(disturbances=(Disturbance('arm', 'see', (('torso_lift_joint', 0.1),)),)),
+     'joints of arms .*allowed: those of one'),
     (scene(disturbances=(Disturbance('glare', 'see', (('dropout', -1.0),)),)), 'dropout is -1'),
 ])
 def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wrong, text):
