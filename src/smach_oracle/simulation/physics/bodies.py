@@ -76,6 +76,10 @@ def _check_body(body: Body) -> None:
             raise SceneBuildError(
                 'body {!r}: joint {!r} is given {}; allowed: finite numbers'.format(
                     body.name, joint, value))
+    for joint, hinge in body.joint_closing:
+        if not _finite(hinge) or min(hinge) <= 0:
+            raise SceneBuildError('body {!r}: joint {!r} closes with {}; allowed: above 0'.format(
+                body.name, joint, hinge))
     if body.shape != 'urdf' and not (len(body.size) == 3 and _finite(body.size)
                                      and min(body.size) > 0):
         raise SceneBuildError('body {!r}: size is {}; allowed: three lengths above 0 m'.format(
@@ -160,7 +164,7 @@ def _set_joints(client: int, placed: PlacedBody) -> None:
     """Where its joints start, and their dry friction; nothing else drives them."""
     friction = dict(placed.body.joint_friction)
     start = dict(placed.body.joints)
-    for name in list(friction) + list(start):
+    for name in list(friction) + list(start) + [each[0] for each in placed.body.joint_closing]:
         if name not in placed.joints:
             raise SceneBuildError('body {!r}: no joint {!r}; there: {}'.format(
                 placed.body.name, name, ', '.join(placed.joints) or 'none'))

@@ -18,9 +18,8 @@ SUBSTEPS = 4  # steps of physics in a control period
 STEP = 1.0 / 240.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
-# N, N, N m: what four casters of two driven wheels bring to the floor; the other joints have the
-# efforts of the URDF
-BASE_EFFORT = {'base_x': 600.0, 'base_y': 600.0, 'base_theta': 300.0}
+# N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the efforts of the URDF
+BASE_EFFORT = {'base_x': 1000.0, 'base_y': 1000.0, 'base_theta': 300.0}
 GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
 # together

@@ -15,12 +15,12 @@ from smach_oracle.pr2.robot import ARMS, TOOL_FRAME
 from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
+from .door_hinges import DoorHinges
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 from .pushed_arm import PushedArm
 from .weights import Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
-TURNING_FORCE = 30.0  # N m, of what swings a door
 REST_PERIODS = 30  # control periods after a reset, in which things come to rest
 # of a step of physics; with 10 things are put down less exactly, with 30 a hand that is driven
 # closes on nothing at the can in the fridge
@@ -70,6 +70,7 @@ class World:
         self.close()
         self._client, self._robot, self._placed = client, robot, placed
         self._weights = Weights(client, placed.values())
+        self._hinges = DoorHinges(client, placed)
         self._pushed: List[PushedArm] = []
         self.scene, self._disturbances = scene, disturbances
         self._names = {robot.index: 'robot', floor: 'floor'}
@@ -105,6 +106,7 @@ class World:
         """Let `count` control periods of 1/60 s pass."""
         for _ in range(count):
             self._disturbances.tick(self)
+            self._hinges.tick()
             self._robot.advance(self._push)
             self.periods += 1
 
@@ -297,14 +299,13 @@ class World:
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
         """Drive a joint of a body at rad/s with a person's strength; what is in its way stops it.
 
-        :param let_go: leave it to its own dry friction again.
+        :param let_go: leave it to its own hinge again.
         """
-        placed = self._find(name)
-        strength = dict(placed.body.joint_friction).get(joint, 0.0) if let_go else TURNING_FORCE
-        pybullet.setJointMotorControl2(placed.number, placed.joints[joint],
-                                       pybullet.VELOCITY_CONTROL, force=strength,
-                                       targetVelocity=0.0 if let_go else speed,
-                                       physicsClientId=self._client)
+        self._find(name)
+        if let_go:
+            self._hinges.let_go(name, joint)
+        else:
+            self._hinges.turn(name, joint, speed)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""

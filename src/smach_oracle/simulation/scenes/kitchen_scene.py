@@ -1,5 +1,5 @@
 """The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person."""
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 
@@ -7,10 +7,12 @@ from smach_oracle.pr2.kitchen import Kitchen
 from smach_oracle.pr2.planning.travel import TRAVEL
 from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
 
-from .fridge import DOOR_JOINT, fridge_urdf
+from .chance import generator_for
+from .drafts import caused
+from .fridge import closing_hinge, fridge
 from .kitchen_causes import KitchenDraft, with_causes
 from .person import PALM, PALM_SIZE, person
-from .scene import Body, Goal, RobotStart, Scene
+from .scene import Body, ClosingHinge, Goal, RobotStart, Scene
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
@@ -18,7 +20,7 @@ COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.
            (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
-DOOR_FRICTION = 3.0  # N m, dry
+FALLS_SHUT = 0.08  # chance that the door does so
 START_TORSO = 0.15  # m
 
 
@@ -34,18 +36,25 @@ def draw(seed: int, benign: bool = False) -> Scene:
     kitchen = Kitchen()
     draft = KitchenDraft(tuple(_drinks(generator, kitchen)), kitchen.place[:2],
                          kitchen.width / 2 - kitchen.wall)
+    closing = None
     if not benign:
-        draft = with_causes(draft, seed)
+        draft, closing = _with_closing_door(with_causes(draft, seed), seed)
     goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
-    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
+    return Scene(TASK, seed, (fridge(kitchen, closing),) + draft.drinks + person(), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error),
                  disturbances=draft.disturbances, causes=draft.causes)
 
 
-def _fridge(kitchen: Kitchen) -> Body:
-    x, y, yaw = kitchen.place
-    return Body('fridge', 'urdf', (0.0, 0.0, 0.0), (x, y, 0.0), yaw, urdf=fridge_urdf(kitchen),
-                joints=((DOOR_JOINT, 0.0),), joint_friction=((DOOR_JOINT, DOOR_FRICTION),))
+def _with_closing_door(draft: KitchenDraft,
+                       seed: int) -> Tuple[KitchenDraft, Optional[ClosingHinge]]:
+    """Perhaps a door that falls shut unless it is pushed past its stop."""
+    generator = generator_for(seed, 'door_falls_shut')
+    if generator.random() >= FALLS_SHUT:
+        return draft, None
+    hinge = closing_hinge(generator)
+    return caused(draft, 'door_falls_shut',
+                  'the door falls shut where it is open by less than {:.0f} degrees'.format(
+                      np.degrees(hinge.stop))), hinge
 
 
 def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:

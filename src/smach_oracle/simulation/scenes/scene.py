@@ -4,6 +4,14 @@ from typing import NamedTuple, Tuple
 Vector = Tuple[float, float, float]
 
 
+class ClosingHinge(NamedTuple):
+    """What pulls a door towards 0, unless it stands open past its stop."""
+
+    torque: float  # N m
+    stop: float  # rad; from there on the door stays where it is left
+    pace: float = 0.4  # rad/s: it is damped, and does not slam
+
+
 class Body(NamedTuple):
     """A thing in the world, in whose frame its pose is.
 
@@ -23,6 +31,7 @@ class Body(NamedTuple):
     urdf: str = ''  # text of the model, for shape 'urdf'
     joints: Tuple[Tuple[str, float], ...] = ()  # urdf: where its joints start
     joint_friction: Tuple[Tuple[str, float], ...] = ()  # urdf: N or N m
+    joint_closing: Tuple[Tuple[str, ClosingHinge], ...] = ()  # urdf: those that close by themselves
 
 
 class CameraQuality(NamedTuple):
