@@ -48,8 +48,12 @@ def check_scene(scene: Scene) -> None:
         raise SceneBuildError(
             'the goal is about a body {!r} that is not in the scene; there: {}'.format(
                 scene.goal.body, ', '.join(seen) or 'none'))
-    for name, values in (('goal.position', scene.goal.position), ('robot.base', scene.robot.base),
-                         ('robot.drive_error', scene.robot.drive_error), ('camera', scene.camera)):
+    robot = scene.robot
+    for name, values in (('goal.position', scene.goal.position), ('robot.base', robot.base),
+                         ('robot.drive_error', robot.drive_error),
+                         ('robot.localisation_error', robot.localisation_error),
+                         ('robot.encoder_errors', [error for _, error in robot.encoder_errors]),
+                         ('robot.camera_error', robot.camera_error), ('camera', scene.camera)):
         if not _finite(values):
             raise SceneBuildError('{} is {}; allowed: finite numbers'.format(name, tuple(values)))
     camera = scene.camera

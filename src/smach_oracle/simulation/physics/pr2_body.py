@@ -18,7 +18,7 @@ SUBSTEPS = 4  # steps of physics in a control period
 STEP = 1.0 / 240.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
-# N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the efforts of the URDF
+# N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the URDF's efforts
 BASE_EFFORT = {'base_x': 1000.0, 'base_y': 1000.0, 'base_theta': 300.0}
 GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
@@ -73,6 +73,7 @@ class Pr2Body:
         self._forces = np.array([self.efforts[name] for name in self.numbers])
         self._moving: List[int] = []
         self._changed = set(range(len(infos)))
+        self._read_more = np.zeros(len(infos))  # what encoders read too much
         self._limp: Set[int] = set()  # joints whose motors are off
         self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
         self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
@@ -84,6 +85,11 @@ class Pr2Body:
                                         rollingFriction=0.0005, physicsClientId=client)
 
     def _stand(self, start: RobotStart) -> None:
+        for name, error in start.encoder_errors:
+            if name not in self.encoders:
+                raise SceneBuildError('robot: no joint {!r}; there: {}'.format(
+                    name, ', '.join(self.encoders)))
+            self._read_more[self.numbers[name]] = error
         wanted = dict(STAND)
         for name, position in start.joints:
             if name not in self.encoders:
@@ -95,7 +101,8 @@ class Pr2Body:
             wrong = self.refusal(name, position)
             if wrong:
                 raise SceneBuildError('robot: ' + wrong)
-            pybullet.resetJointState(self.index, self.numbers[name], position,
+            number = self.numbers[name]
+            pybullet.resetJointState(self.index, number, position - self._read_more[number],
                                      physicsClientId=self._client)
             self._targets[self.numbers[name]] = position
         for arm in ARMS:
@@ -123,15 +130,20 @@ class Pr2Body:
 
         :param field: 0: positions (rad or m), 1: velocities (rad/s or m/s), 3: efforts (N m or N).
         """
-        states = pybullet.getJointStates(self.index, [self.numbers[name] for name in self.encoders],
-                                         physicsClientId=self._client)
-        return {name: state[field] for name, state in zip(self.encoders, states)}
+        numbers = [self.numbers[name] for name in self.encoders]
+        states = pybullet.getJointStates(self.index, numbers, physicsClientId=self._client)
+        more = self._read_more[numbers] if field == 0 else np.zeros(len(numbers))
+        return {
+            name: state[field] + float(extra)
+            for name, state, extra in zip(self.encoders, states, more)
+        }
 
     def position(self, name: str) -> float:
-        """rad or m of one joint, also of the base's."""
-        position: float = pybullet.getJointState(self.index, self.numbers[name],
+        """rad or m of one joint, as its encoder reads it, also of the base's."""
+        number = self.numbers[name]
+        position: float = pybullet.getJointState(self.index, number,
                                                  physicsClientId=self._client)[0]
-        return position
+        return position + float(self._read_more[number])
 
     def base(self) -> np.ndarray:
         """4x4, the world from base_footprint."""
@@ -162,7 +174,7 @@ class Pr2Body:
 
     def set_target(self, name: str, position: float, velocity: float,
                    force: Optional[float]) -> None:
-        """Send a joint to a position (rad or m) at the end of the coming control period.
+        """Send a joint to a position (rad or m, by its encoder) at the end of the coming period.
 
         :param velocity: rad/s or m/s until then.
         :param force: N m or N, at most; None: as before.
@@ -244,7 +256,8 @@ class Pr2Body:
         rates = self._rates[chosen]
         pybullet.setJointMotorControlArray(
             self.index, chosen, pybullet.POSITION_CONTROL,
-            targetPositions=self._targets[chosen] - left * STEP * rates, targetVelocities=rates,
+            targetPositions=self._targets[chosen] - self._read_more[chosen] - left * STEP * rates,
+            targetVelocities=rates,
             forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
             velocityGains=[1.0] * len(chosen), physicsClientId=self._client)
 

@@ -78,6 +78,8 @@ class World:
         self._periods_before += self.periods
         self.periods = self.drives = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
+        x, y, yaw = scene.robot.localisation_error
+        self.map_error = from_rpy((x, y, 0.0), yaw=yaw)  # 4x4, odom_combined from the world
         self.step(REST_PERIODS)
         self.happened('start')
 
@@ -198,8 +200,12 @@ class World:
         return self._robot.base()
 
     def odom_from_base(self) -> np.ndarray:
-        """4x4, where the robot believes to stand: odom_combined, the world's frame, from base."""
-        return self._robot.base() @ inverse(self.belief_error)
+        """4x4, where the robot believes to stand: odom_combined from base."""
+        return self.map_error @ self._robot.base() @ inverse(self.belief_error)
+
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """Tell the robot where it stands (4x4), as somebody or something has found out."""
+        self.map_error = odom_from_base @ self.belief_error @ inverse(self._robot.base())
 
     def drive_error(self, share: float = 1.0) -> np.ndarray:
         """4x4, by how much the next drive will miss its goal unknown to the robot.

@@ -18,6 +18,10 @@ LONG_GLARE = 0.1  # share of glares that last for two images
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 STEADY: Vector = (0.008, 0.008, 0.006)
+# m, m, rad, least and most, by which a localisation is wrong after somebody has pushed the robot,
+# or that has mistaken one thing for another
+LOST_FROM: Vector = (0.06, 0.0, 0.0)
+LOST_TO: Vector = (0.12, 0.05, 0.03)
 
 
 class KitchenDraft(NamedTuple):
@@ -27,6 +31,7 @@ class KitchenDraft(NamedTuple):
     front: Tuple[float, float]  # x, y of the middle of the fridge's opening, m
     half_width: float  # m from there to the inner side of a wall
     drive_error: Vector = STEADY
+    localisation_error: Vector = (0.0, 0.0, 0.0)  # see RobotStart
     disturbances: Tuple[Disturbance, ...] = ()
     causes: Tuple[SceneCause, ...] = ()
 
@@ -41,10 +46,15 @@ def with_causes(draft: KitchenDraft, seed: int) -> KitchenDraft:
 
 
 def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """Every drive ends centimetres off: the base is in the door's way, or too far for the arm."""
-    sigma = float(generator.uniform(0.05, 0.075))
-    return caused(draft._replace(drive_error=(sigma, 0.3 * sigma, 0.25 * sigma)), 'base_misplaced',
-                  'drives end {:.1f} cm too near or too far (sigma)'.format(100 * sigma))
+    """The localisation is wrong: the base is in the door's way, or too far for the arm.
+
+    It stays wrong until the robot has looked at something that it knows.
+    """
+    x, y, yaw = (side * float(generator.uniform(least, most)) for side, least, most in zip(
+        generator.choice([-1.0, 1.0], 3), LOST_FROM, LOST_TO))
+    return caused(draft._replace(localisation_error=(x, y, yaw)), 'base_misplaced',
+                  'the robot believes to be {:+.1f} cm further on, {:+.1f} cm further left and '
+                  '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)))
 
 
 def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:

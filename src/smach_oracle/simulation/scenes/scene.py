@@ -67,6 +67,12 @@ class RobotStart(NamedTuple):
     base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
     # sigma of x, y, yaw that each drive adds between truth and odometry
     drive_error: Vector = (0.0, 0.0, 0.0)
+    # x, y, yaw of the world in odom_combined: by so much the robot's localisation is wrong, until
+    # it is told better
+    localisation_error: Vector = (0.0, 0.0, 0.0)
+    encoder_errors: Tuple[Tuple[str, float], ...] = ()  # rad that joints read too much
+    # m and rad (roll, pitch, yaw) of the head camera, from where the URDF has it, in its own frame
+    camera_error: Tuple[float, float, float, float, float, float] = (0.0,) * 6
 
 
 class Goal(NamedTuple):
