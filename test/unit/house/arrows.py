@@ -67,7 +67,7 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'pr2': [
-        'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',
+        'nodes', {'skills', 'ros_robot'}, {'planning', 'pose_teller', 'ros_senses'}, 'perception',
         {'model', 'robot', 'kitchen'}
     ],
     'testing': [
