@@ -9,10 +9,16 @@ import numpy as np
 import pybullet
 
 from ..scenes.scene import Body, Scene
-from .meshes import drum, egg
+from .meshes import drum, egg, turned
 
 RESERVED = ('robot', 'floor')  # names that no body of a scene may have
-SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH}
+SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH,
+          'cup': pybullet.GEOM_MESH, 'bottle': pybullet.GEOM_MESH}
+# radius and height of rings, as shares of the thing's extents
+PROFILES = {
+    'cup': ((0.34, -0.5), (0.5, 0.5)),
+    'bottle': ((0.47, -0.5), (0.5, -0.45), (0.5, 0.0), (0.42, 0.22), (0.15, 0.5))
+}
 FLOOR_COLOUR = (0.62, 0.60, 0.57, 1.0)
 FLOOR_SIZE = 12.0  # m, of what is seen of it
 TURNING_FRICTION = 0.002  # m, against spinning and rolling
@@ -129,8 +135,9 @@ def _create(client: int, body: Body, turn: Sequence[float]) -> int:
     if body.shape == 'box':
         half = [extent / 2 for extent in body.size]
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
-    elif body.shape == 'round':
-        solid = seen = {'fileName': egg(), 'meshScale': list(body.size)}
+    elif body.shape in ('round', *PROFILES):
+        file = egg() if body.shape == 'round' else turned(body.shape, PROFILES[body.shape])
+        solid = seen = {'fileName': file, 'meshScale': list(body.size)}
     else:
         solid = {'radius': body.size[0], 'height': body.size[2]}
         seen = {'fileName': drum(), 'meshScale': list(body.size[:1] * 2 + body.size[2:])}

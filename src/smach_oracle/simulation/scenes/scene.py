@@ -19,8 +19,9 @@ class Body(NamedTuple):
     """
 
     name: str
-    shape: str  # 'box', 'cylinder', 'round' (between a ball and a cylinder) or 'urdf'
-    size: Vector  # m; box, round: full extents; cylinder: radius, radius, height; urdf: unused
+    # 'box', 'cylinder', 'round' (between a ball and a cylinder), 'cup', 'bottle' or 'urdf'
+    shape: str
+    size: Vector  # m; cylinder: radius, radius, height; urdf: unused; others: full extents
     position: Vector  # m, of its centre (urdf: of its root)
     yaw: float = 0.0  # rad, as roll and pitch: about the fixed axes z, x and y, roll first
     roll: float = 0.0

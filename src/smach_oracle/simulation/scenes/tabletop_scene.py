@@ -4,6 +4,8 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from .calibration import camera_error, encoder_errors
+from .chance import generator_for
+from .clutter import another
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
 from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
 from .unlike_the_map import TrueTable, true_table
@@ -28,7 +30,9 @@ def draw(seed: int, benign: bool = False) -> Scene:
     :param seed: 0 or more.
     :param benign: without any reason to fail.
     """
-    draft = TabletopDraft(_things(np.random.default_rng([seed, 61])))
+    target, *others = _things(np.random.default_rng([seed, 61]))
+    draft = TabletopDraft((target, *(another(generator_for(seed, 'clutter:' + each.name), each,
+                                             TABLE_TOP) for each in others)))
     if not benign:
         draft = with_causes(draft, seed)
     table = true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE)
