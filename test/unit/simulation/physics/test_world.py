@@ -137,7 +137,7 @@ def test_clients_are_given_back(world):
     (scene(TABLE, TABLE), "'table'.*taken"),
     (scene(TABLE._replace(name='robot')), "'robot'"),
     (scene(CAN._replace(shape='sphere')),
-     "'can': shape is 'sphere'; allowed: box, cylinder, round, urdf"),
+     "'can': shape is 'sphere'; allowed: bottle, box, cup, cylinder, round, urdf"),
     (scene(CAN._replace(size=(0.03, 0.03, 0.0))), "'can': size"),
     (scene(CAN._replace(mass=math.nan)), "'can': mass nan"),
     (scene(CAN._replace(position=(0.0, math.inf, 0.0))), "'can': position"),
