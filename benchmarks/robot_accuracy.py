@@ -31,7 +31,8 @@ TASKS = {'pick_and_place': PickAndPlaceRehearsal, 'drink_retrieval': DrinkRetrie
 # kg, friction of the can, N: what the hand holds, and what it must lose
 GRASPS = ((0.33, 0.8, 20.0), (0.33, 0.8, 40.0), (0.7, 0.6, 90.0), (0.33, 0.04, 20.0))
 CAN_HEIGHT = 0.12  # m
-SHAKE = np.array([0.12, 0.0, 0.0, 0.12, 0.0, 0.12, 0.4])  # rad
+# rad; the shoulder as fast to and fro as its motor can
+SHAKE = np.array([0.04, 0.0, 0.0, 0.12, 0.0, 0.12, 0.4])
 ANGLES = ('OPEN_FRIDGE', 'CLOSE_FRIDGE')
 
 

@@ -142,6 +142,13 @@ class Pr2World(unittest.TestCase):
         way = np.array([0.9, 0.2, 0.7]) - axis[:3, 3]
         self.assertGreater(axis[:3, 2] @ way / np.linalg.norm(way), 0.9995)
 
+    def test_the_robot_believes_to_stand_where_it_is_told(self) -> None:
+        told = from_rpy((0.07, -0.04, 0.0), yaw=0.03)
+        self.robot.localise(told)
+        self.assertTrue(np.allclose(self.robot.odom_from_base(), told, atol=1e-6))
+        self.robot.drive(from_rpy((0.0, 0.0, 0.0)))
+        self.assertTrue(np.allclose(self.robot.odom_from_base(), np.eye(4), atol=0.02))
+
     def test_a_snapshot_is_of_one_moment_and_no_two_have_the_same(self) -> None:
         topics = [
             Heard(name, kind)

@@ -59,6 +59,12 @@ class Robot(Protocol):
     def odom_from_base(self) -> np.ndarray:
         """4x4: where the robot believes to stand (ODOM_FRAME from BASE_FRAME)."""
 
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """Put right where the robot believes to stand (4x4), as for amcl's `initialpose`.
+
+        :raises RobotError: where the robot does not take it over.
+        """
+
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
         """Follow a joint trajectory.
 

@@ -28,6 +28,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike, quaternion
 from smach_oracle.ros.goal_link import GoalEvent, GoalLink, SentGoal, lost
 
+from .pose_teller import TOLD_S, PoseTeller, told
 from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, GripperState, RobotError
 from .ros_senses import RosSenses
 from .ros_time import WorldTime
@@ -64,6 +65,7 @@ class RosRobot:
         self._link('head_traj_controller/point_head_action', PointHeadAction)
         self._link('torso_controller/position_joint_action', SingleJointPositionAction)
         self._link('move_base', MoveBaseAction)
+        self._localisation = PoseTeller()
         self._aborted = threading.Event()
         self._calls = threading.RLock()
 
@@ -117,6 +119,19 @@ class RosRobot:
         """
         self._check_allowed()
         return self._senses.transform(ODOM_FRAME, BASE_FRAME)
+
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """See Robot."""
+        until = time.monotonic() + self._timeout_s
+        while True:
+            # again and again: the first may go out before anybody listens
+            self._localisation.tell(odom_from_base)
+            time.sleep(TOLD_S)
+            if told(odom_from_base, self.odom_from_base()):
+                return
+            if time.monotonic() > until or rospy.is_shutdown():
+                raise RobotError('the robot did not take over where it stands: nobody listens to '
+                                 '{}, or it moves'.format(self._localisation.name))
 
     def see(self) -> CameraImage:
         """See Robot."""

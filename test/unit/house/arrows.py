@@ -67,7 +67,7 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'pr2': [
-        'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses', 'ros_time'},
+        'nodes', {'skills', 'ros_robot'}, {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
         'perception', {'model', 'robot', 'kitchen'}, 'work_costs'
     ],
     'testing': [

@@ -80,7 +80,7 @@ def read_scene(world):
     bodies = {}
     for name in world.body_names:
         body = world.body(name)
-        size = body.size if body.shape == 'box' else (2 * body.size[0], 2 * body.size[1],
+        size = body.size if body.shape != 'cylinder' else (2 * body.size[0], 2 * body.size[1],
                                                       body.size[2])
         bodies[name] = TrueBody(name, base @ world.body_pose(name), tuple(size), name
                                 in world.movable(), world.holding(name))

@@ -54,6 +54,14 @@ def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(worl
     assert verdict.success, verdict.why
 
 
+@pytest.mark.parametrize('seed', [2, 6])
+def test_a_drink_that_two_fingers_press_on_counts_as_held(world, seed):
+    """Though there be a hair's breadth between a finger and the drink, as the solver has it."""
+    world.reset(before_the_shelf(seed))
+    pull_out(attempt(world), lambda scene: scene.bodies['drink_0'])
+    assert world.holding('drink_0') == 'right'
+
+
 def test_a_hand_that_misses_in_the_fridge_comes_out_open(world):
     world.reset(before_the_shelf(3))
     at = attempt(world)._replace(slip=lambda: np.array([0.0, 0.0, 0.10]))

@@ -68,6 +68,6 @@ class Hand:
 
     def shake(self, seconds=6.0):
         """Wrist, elbow and shoulder to and fro."""
-        rest, amplitude = self.angles(), np.array([0.12, 0, 0, 0.12, 0, 0.12, 0.4])
+        rest, amplitude = self.angles(), np.array([0.04, 0, 0, 0.12, 0, 0.12, 0.4])
         way = np.array([rest + amplitude * (-1) ** k for k in range(round(seconds / 0.3))] + [rest])
         self.robot.follow(ARM_JOINTS[self.arm], way, 0.3 * np.arange(1, len(way) + 1))

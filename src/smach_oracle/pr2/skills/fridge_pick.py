@@ -14,7 +14,7 @@ from .door import WIDE, named_boxes
 from .pick import HeldObject, ObjectSlipped, pick
 
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
-PADDING = 0.015  # m
+PADDING = 0.03  # m, for the fridge is not quite where the map has it
 BESIDE = 0.004  # m around things on the shelf
 SAME = 0.03  # m between the middles of two boxes that are the same thing
 
@@ -52,7 +52,7 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, base_from_fridge: 
 
 
 def _padded(box: MapBox) -> MapBox:
-    """The box, wider by the base's likely error; not higher, for things stand on shelves."""
+    """The box, wider by what may be wrong; not higher, for things stand on shelves."""
     return box._replace(half=box.half + [PADDING, PADDING, 0.0])
 
 

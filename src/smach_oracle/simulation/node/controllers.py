@@ -5,6 +5,7 @@ from typing import Callable, Dict, Optional, Tuple
 import actionlib
 import genpy
 import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from trajectory_msgs.msg import JointTrajectory
 
@@ -117,6 +118,9 @@ class Controllers:
         ]
         for arm in ARMS:
             self._add_arm(arm)
+        rospy.Subscriber('initialpose', PoseWithCovarianceStamped,
+                         lambda message: self._loop.post(partial(self._localise, message)),
+                         queue_size=2, tcp_nodelay=True)
 
     def _add_arm(self, arm: str) -> None:
         side = arm[0]
@@ -183,6 +187,15 @@ class Controllers:
         else:
             motion = StreamedTarget(dict(zip(joints, positions[0].tolist())), float(times[0]))
         self._motions.start(part, motion, lambda end: self._streamed(), NEWER)
+
+    def _localise(self, message: PoseWithCovarianceStamped) -> None:
+        """Take over where the robot stands, as amcl does from this topic."""
+        pose = PoseStamped(message.header, message.pose.pose)
+        try:
+            self._world.localise(goals.odom_from_pose(pose, self._world.odom_from_base()))
+        except goals.BadGoal as err:
+            rospy.logwarn('initialpose: refused: %s', err)
+        self._streamed()
 
     def streaming(self) -> bool:
         """Whether a target of a stream is on its way."""

@@ -18,9 +18,10 @@ from control_msgs.msg import (
     SingleJointPositionFeedback,
     SingleJointPositionResult,
 )
-from smach_oracle.geometry.transforms import inverse, quaternion
-from smach_oracle.pr2.robot import CAMERA_FRAME, ODOM_FRAME
+from smach_oracle.geometry.transforms import quaternion
+from smach_oracle.pr2.robot import ODOM_FRAME
 
+from ..physics.camera import believed_camera
 from ..physics.motions import GripperMotion, HeadMotion, TorsoMotion
 from ..physics.trajectory import Motion, Trajectory
 from ..physics.world import World
@@ -70,7 +71,7 @@ def gripper_result(name: str, world: World, _motion: GripperMotion,
 
 def head(world: World, motion: HeadMotion) -> PointHeadFeedback:
     """The angle that is left."""
-    camera = inverse(world.true_base()) @ world.link_pose(CAMERA_FRAME)
+    camera = believed_camera(world)
     direction = motion.point - camera[:3, 3]
     cosine = float(direction @ camera[:3, 2]) / max(float(np.linalg.norm(direction)), 1e-9)
     return PointHeadFeedback(float(np.arccos(min(1.0, max(-1.0, cosine)))))

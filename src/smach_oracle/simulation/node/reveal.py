@@ -13,9 +13,9 @@ from smach_oracle.geometry.depth import pixels_of
 from smach_oracle.geometry.joints import origin_of
 from smach_oracle.geometry.transforms import inverse, quaternion
 from smach_oracle.msg import RevealedBody
-from smach_oracle.pr2.robot import BASE_FRAME, CAMERA_FRAME
+from smach_oracle.pr2.robot import BASE_FRAME
 
-from ..physics.camera import RenderedView, intrinsics_of, size_of
+from ..physics.camera import RenderedView, camera_pose, intrinsics_of, size_of
 from ..physics.world import World
 from ..scenes.fridge import DOOR_JOINT
 
@@ -40,7 +40,7 @@ def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[Reveal
     if unknown:
         raise ValueError('no body {!r} in this scene; there: {}'.format(
             unknown[0], ', '.join(parts) or 'none'))
-    seen = RenderedView(world, world.link_pose(CAMERA_FRAME), size_of(world)).bodies
+    seen = RenderedView(world, camera_pose(world), size_of(world)).bodies
     return [_message(world, name, parts[name], seen, stamp) for name in names or parts]
 
 
@@ -92,7 +92,7 @@ def _message(world: World, name: str, part: _BodyPart, seen: np.ndarray,
 def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
     """Where the camera has it, and the share of its outline that nothing hides."""
     corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * part.size
-    camera = world.link_pose(CAMERA_FRAME)
+    camera = camera_pose(world)
     points = corners @ part.pose[:3, :3].T + part.pose[:3, 3]
     pixels = pixels_of(points, intrinsics_of(world), camera)
     if (pixels[:, 2] <= 0).any():

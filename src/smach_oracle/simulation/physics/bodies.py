@@ -9,10 +9,16 @@ import numpy as np
 import pybullet
 
 from ..scenes.scene import Body, Scene
-from .meshes import drum, egg
+from .meshes import drum, egg, turned
 
 RESERVED = ('robot', 'floor')  # names that no body of a scene may have
-SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH}
+SHAPES = {'box': pybullet.GEOM_BOX, 'cylinder': pybullet.GEOM_CYLINDER, 'round': pybullet.GEOM_MESH,
+          'cup': pybullet.GEOM_MESH, 'bottle': pybullet.GEOM_MESH}
+# radius and height of rings, as shares of the thing's extents
+PROFILES = {
+    'cup': ((0.34, -0.5), (0.5, 0.5)),
+    'bottle': ((0.47, -0.5), (0.5, -0.45), (0.5, 0.0), (0.42, 0.22), (0.15, 0.5))
+}
 FLOOR_COLOUR = (0.62, 0.60, 0.57, 1.0)
 FLOOR_SIZE = 12.0  # m, of what is seen of it
 TURNING_FRICTION = 0.002  # m, against spinning and rolling
@@ -48,8 +54,12 @@ def check_scene(scene: Scene) -> None:
         raise SceneBuildError(
             'the goal is about a body {!r} that is not in the scene; there: {}'.format(
                 scene.goal.body, ', '.join(seen) or 'none'))
-    for name, values in (('goal.position', scene.goal.position), ('robot.base', scene.robot.base),
-                         ('robot.drive_error', scene.robot.drive_error), ('camera', scene.camera)):
+    robot = scene.robot
+    for name, values in (('goal.position', scene.goal.position), ('robot.base', robot.base),
+                         ('robot.drive_error', robot.drive_error),
+                         ('robot.localisation_error', robot.localisation_error),
+                         ('robot.encoder_errors', [error for _, error in robot.encoder_errors]),
+                         ('robot.camera_error', robot.camera_error), ('camera', scene.camera)):
         if not _finite(values):
             raise SceneBuildError('{} is {}; allowed: finite numbers'.format(name, tuple(values)))
     camera = scene.camera
@@ -76,6 +86,10 @@ def _check_body(body: Body) -> None:
             raise SceneBuildError(
                 'body {!r}: joint {!r} is given {}; allowed: finite numbers'.format(
                     body.name, joint, value))
+    for joint, hinge in body.joint_closing:
+        if not _finite(hinge) or min(hinge) <= 0:
+            raise SceneBuildError('body {!r}: joint {!r} closes with {}; allowed: above 0'.format(
+                body.name, joint, hinge))
     if body.shape != 'urdf' and not (len(body.size) == 3 and _finite(body.size)
                                      and min(body.size) > 0):
         raise SceneBuildError('body {!r}: size is {}; allowed: three lengths above 0 m'.format(
@@ -121,8 +135,9 @@ def _create(client: int, body: Body, turn: Sequence[float]) -> int:
     if body.shape == 'box':
         half = [extent / 2 for extent in body.size]
         solid, seen = {'halfExtents': half}, {'halfExtents': half}
-    elif body.shape == 'round':
-        solid = seen = {'fileName': egg(), 'meshScale': list(body.size)}
+    elif body.shape in ('round', *PROFILES):
+        file = egg() if body.shape == 'round' else turned(body.shape, PROFILES[body.shape])
+        solid = seen = {'fileName': file, 'meshScale': list(body.size)}
     else:
         solid = {'radius': body.size[0], 'height': body.size[2]}
         seen = {'fileName': drum(), 'meshScale': list(body.size[:1] * 2 + body.size[2:])}
@@ -160,7 +175,7 @@ def _set_joints(client: int, placed: PlacedBody) -> None:
     """Where its joints start, and their dry friction; nothing else drives them."""
     friction = dict(placed.body.joint_friction)
     start = dict(placed.body.joints)
-    for name in list(friction) + list(start):
+    for name in list(friction) + list(start) + [each[0] for each in placed.body.joint_closing]:
         if name not in placed.joints:
             raise SceneBuildError('body {!r}: no joint {!r}; there: {}'.format(
                 placed.body.name, name, ', '.join(placed.joints) or 'none'))

@@ -7,10 +7,11 @@ import pybullet
 from scipy import ndimage
 
 from smach_oracle.geometry.camera_image import CameraImage
-from smach_oracle.geometry.transforms import inverse
+from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.pr2.robot import CAMERA_FRAME
 
 from ..scenes.scene import CameraQuality
+from .neck import NECK, neck
 from .world import World
 
 WIDTH, HEIGHT = 640, 480  # pixels of the sensor
@@ -44,6 +45,17 @@ def size_of(world: World) -> Tuple[int, int]:
 def intrinsics_of(world: World) -> np.ndarray:
     """(3, 3), of the head camera's images."""
     return _intrinsics(world.binning)
+
+
+def camera_pose(world: World) -> np.ndarray:
+    """4x4, the world from the head camera, in truth."""
+    x, y, z, roll, pitch, yaw = world.scene.robot.camera_error
+    return world.link_pose(CAMERA_FRAME) @ from_rpy((x, y, z), roll, pitch, yaw)
+
+
+def believed_camera(world: World) -> np.ndarray:
+    """4x4, base_footprint from the head camera, by the encoders and the URDF."""
+    return neck().forward(np.array([world.robot.position(name) for name in NECK]))
 
 
 class RenderedView:
@@ -106,7 +118,7 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
     """
     lights = world.disturbances.lights
     quality = lights.quality(world.scene.camera, world.periods)
-    pose = world.link_pose(CAMERA_FRAME)
+    pose = camera_pose(world)
     rendered = RenderedView(world, pose, size_of(world))
     dazzled = lights.dazzled(world.periods, pose, intrinsics_of(world), size_of(world))
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
@@ -114,7 +126,7 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
                         noisy_colour(rendered.colour, quality, generator, dazzled),
                         noisy_depth(rendered.depth, quality, generator, world.binning, dazzled),
                         intrinsics_of(world),
-                        inverse(world.true_base()) @ pose)
+                        believed_camera(world))
     if counted:
         world.happened('see')
     return image

@@ -1,7 +1,9 @@
 """Things that happen to a trial's world while it goes on, each once, at its event.
 
 Kinds, with their values (a scene's Disturbance.values) and the defaults of these:
-* ``arm``: joints by name, rad: somebody moves an arm there, in ``duration`` s (1.5).
+* ``arm``: joints of an arm by name, rad: somebody pushes it there, in ``duration`` s (1.5). Its
+  controllers are stopped meanwhile, and hold it then where it was let go; with ``motors`` 1 (0)
+  they run on, and take it back. See pushed_arm.py.
 * ``dim``: the light falls to ``brightness`` (0.15) for ``duration`` s (60).
 * ``glare``: a place (``x``, ``y``, ``z``, m in the world) reflects light towards ``eye_x``,
   ``eye_y``, ``eye_z`` for ``duration`` s (60), within ``lobe`` rad (0.2) about that direction; it
@@ -31,7 +33,8 @@ from . import light
 from .bodies import SceneBuildError
 from .cause_log import CauseLog
 from .easing import eased
-from .pr2_body import PERIOD, Pr2Body
+from .pr2_body import PERIOD, Pr2Body, arm_of
+from .pushed_arm import SETTLING_S
 
 EVENTS = ('start', 'follow', 'torso', 'look_at', 'drive', 'see') + tuple(
     '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
@@ -39,7 +42,7 @@ FASTEST = 0.5  # m/s, of a nudge
 LOOK_PERIODS = 30  # control periods from one look at what has become of the causes to the next
 SIGNED = ('dx', 'dy') + light.PLACES  # values that may be negative
 OPTIONS: Dict[str, Dict[str, float]] = {
-    'arm': {'duration': 1.5},
+    'arm': {'duration': 1.5, 'motors': 0},
     **light.OPTIONS,
     'swing': {'angle': 0.0, 'duration': 1.5},
     'nudge': {'dx': 0.0, 'dy': 0.0, 'duration': 0.4},
@@ -55,7 +58,7 @@ class DisturbedWorld(Protocol):
     def robot(self) -> Pr2Body:
         """See World."""
 
-    def set_target(self, joint: str, position: float, velocity: float) -> None:
+    def push_arm(self, joints: Dict[str, float], seconds: float, motors: bool) -> None:
         """See World."""
 
     def body_pose(self, name: str) -> np.ndarray:
@@ -154,7 +157,7 @@ class Disturbances:
             values = _values(disturbance)
             self.log.began(disturbance.cause, world.periods)
             self._moving.append(
-                _ActiveDisturbance(disturbance, values, max(1, round(values['duration'] / PERIOD)),
+                _ActiveDisturbance(disturbance, values, _periods(disturbance, values),
                                    world.periods, _start(world, disturbance)))
         self._due = [each for each in self._due if each not in now]
         for active in list(self._moving):
@@ -162,19 +165,13 @@ class Disturbances:
             if done >= active.periods:
                 self._moving.remove(active)
                 self.log.ended(active.cause.cause, world.periods)
-            if active.cause.kind == 'arm' and done < active.periods:
-                _move_arm(world, active, done)
+            if active.cause.kind == 'arm' and not done:
+                world.push_arm({name: active.values[name] for name in active.start},
+                               active.values['duration'], bool(active.values['motors']))
             elif active.cause.kind.startswith('swing'):
                 _swing_body(world, active, done)
             elif active.cause.kind != 'arm':
                 _move_body(world, active, done)
-
-
-def _move_arm(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
-    for name, start in active.start.items():
-        way = active.values[name] - start
-        here, there = (eased(step / active.periods) for step in (done, done + 1))
-        world.set_target(name, start + way * there, way * (there - here) / PERIOD)
 
 
 def _move_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
@@ -200,16 +197,25 @@ def _values(disturbance: Disturbance) -> Dict[str, float]:
                 **dict(disturbance.values))
 
 
+def _periods(disturbance: Disturbance, values: Dict[str, float]) -> int:
+    """How many control periods it takes until the world is left to itself."""
+    seconds = values['duration'] + (SETTLING_S if disturbance.kind == 'arm' else 0.0)
+    return max(1, round(seconds / PERIOD))
+
+
 def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
     if disturbance.kind == 'arm':
-        return {
-            name: world.robot.position(name)
-            for name, _ in disturbance.values if name not in OPTIONS['arm'] and name != 'delay'
-        }
+        return {name: world.robot.position(name) for name in _joints(disturbance)}
     kind, _, body = disturbance.kind.partition(':')
     if kind == 'swing':
         return {joint: world.body_joint(body, joint) for joint in world.body_joints(body)}
     return dict(zip('xy', world.body_pose(body)[:2, 3].tolist()))
+
+
+def _joints(disturbance: Disturbance) -> List[str]:
+    """Those that an ``arm`` names."""
+    return [name for name, _ in disturbance.values
+            if name not in OPTIONS['arm'] and name != 'delay']
 
 
 def _numbered(event: str) -> str:
@@ -248,4 +254,7 @@ def _wrong_value(kind: str, disturbance: Disturbance, robot: Pr2Body) -> str:
             return 'unknown value {!r}; allowed: {}'.format(name, ', '.join(OPTIONS[kind]))
         elif robot.refusal(name, value):
             return robot.refusal(name, value)
+    arms = {arm_of(name) for name in _joints(disturbance)}
+    if kind == 'arm' and (len(arms) != 1 or '' in arms):
+        return 'joints of arms {}; allowed: those of one'.format(sorted(arms))
     return ''

@@ -2,7 +2,7 @@
 import os
 import tempfile
 from functools import lru_cache
-from typing import List
+from typing import List, Tuple
 
 import numpy as np
 
@@ -69,6 +69,37 @@ def egg() -> str:
                 'f {0}//{0} {1}//{1} {2}//{2}'.format(low, after + ROUND_SIDES, low + ROUND_SIDES)
             ]
     return _written('egg.obj', points + normals + faces)
+
+
+@lru_cache(maxsize=None)
+def turned(name: str, profile: Tuple[Tuple[float, float], ...]) -> str:
+    """A file with a thing of 1 by 1 by 1 as from a lathe; two processes may write it at once.
+
+    :param name: of the file, without its ending.
+    :param profile: radius and height, 0 to 0.5 and -0.5 to 0.5, from the lowest ring to the
+        highest; convex, for physics fills what is not.
+    """
+    rings = np.array(profile)
+    angles = np.arange(SIDES) * 2 * np.pi / SIDES
+    lines = ['v {:.6f} {:.6f} {:.6f}'.format(radius * np.cos(angle), radius * np.sin(angle), z)
+             for radius, z in rings for angle in angles]
+    normals, faces = ['vn 0 0 -1', 'vn 0 0 1'], []
+    for ring, (low, high) in enumerate(zip(rings[:-1], rings[1:])):
+        out = np.array([high[1] - low[1], low[0] - high[0]])
+        out /= np.linalg.norm(out)
+        first, base = len(normals) + 1, ring * SIDES + 1
+        normals += ['vn {:.6f} {:.6f} {:.6f}'.format(out[0] * np.cos(angle), out[0] * np.sin(angle),
+                                                     out[1]) for angle in angles]
+        for k in range(SIDES):
+            after = (k + 1) % SIDES
+            side = ['{}//{}'.format(base + point, first + normal) for point, normal in (
+                (k, k), (after, after), (SIDES + after, after), (SIDES + k, k))]
+            faces += ['f {} {} {}'.format(*side[:3]), 'f {0} {2} {3}'.format(*side)]
+    top = (len(rings) - 1) * SIDES + 1
+    for k in range(1, SIDES - 1):
+        faces += ['f 1//1 {}//1 {}//1'.format(k + 2, k + 1),
+                  'f {0}//2 {1}//2 {2}//2'.format(top, top + k, top + k + 1)]
+    return _written(name + '.obj', lines + normals + faces)
 
 
 def _written(name: str, lines: List[str]) -> str:

@@ -1,16 +1,15 @@
 """Motions of the PR2's other controllers: grippers, torso, head, base."""
 import math
-from functools import lru_cache
 from typing import List, Optional, Sequence
 
 import numpy as np
 
-from smach_oracle.geometry.chain import JointChain
-from smach_oracle.geometry.transforms import VectorLike, apply, from_rpy, inverse, yaw_of
-from smach_oracle.pr2.model.pr2_model import BASE_JOINTS, pr2_urdf
-from smach_oracle.pr2.robot import ARMS, BASE_FRAME, CAMERA_FRAME, GRIPPER_OPEN, GripperState
+from smach_oracle.geometry.transforms import VectorLike, from_rpy, inverse, yaw_of
+from smach_oracle.pr2.model.pr2_model import BASE_JOINTS
+from smach_oracle.pr2.robot import ARMS, GRIPPER_OPEN, GripperState
 
 from .easing import eased
+from .neck import NECK, head_angles
 from .pr2_body import PERIOD
 from .trajectory import ARRIVAL_S, GOAL_TOLERANCE, MotionResult, Trajectory
 from .world import World
@@ -112,48 +111,19 @@ class HeadMotion(Trajectory):
         """
         turn = head_angles(world.robot.position('torso_lift_joint'), point)
         self.point = np.asarray(point, float)
-        here = [world.robot.position(name) for name in ('head_pan_joint', 'head_tilt_joint')]
-        for name, angle in zip(('head_pan_joint', 'head_tilt_joint'), turn):
+        here = [world.robot.position(name) for name in NECK[1:]]
+        for name, angle in zip(NECK[1:], turn):
             if world.robot.refusal(name, angle):
                 raise ValueError('cannot look at {}: {}'.format(
                     np.round(np.asarray(point, float), 3).tolist(),
                     world.robot.refusal(name, angle)))
         span = max(0.2, float(np.abs(turn - here).max()) / HEAD_SPEED)
-        super().__init__(['head_pan_joint', 'head_tilt_joint'], turn[None], np.array([span]),
+        super().__init__(NECK[1:], turn[None], np.array([span]),
                          np.zeros((1, 2)))
 
     def events(self) -> Sequence[str]:
         """See Motion."""
         return ['look_at']
-
-
-@lru_cache(maxsize=1)
-def _neck() -> JointChain:
-    return JointChain.from_urdf(pr2_urdf().read_text(encoding='utf-8'), BASE_FRAME, CAMERA_FRAME)
-
-
-def head_angles(torso: float, point: VectorLike) -> np.ndarray:
-    """Pan and tilt (2,) rad that take the optical axis through a point (3,) of BASE_FRAME.
-
-    :raises ValueError: for a point that is not finite, or at the camera itself.
-    """
-    if len(point) != 3 or not np.isfinite(point).all():
-        raise ValueError('cannot look at {}: not three finite numbers'.format(list(point)))
-    where = np.asarray(point, float)
-
-    def miss(angles: np.ndarray) -> np.ndarray:
-        seen = apply(inverse(_neck().forward(np.concatenate([[torso], angles]))), where)
-        return np.array(
-            [np.arctan2(seen[0], seen[2]),
-             np.arctan2(seen[1], np.hypot(seen[0], seen[2]))])
-    angles = np.array([math.atan2(where[1], where[0]), 0.0])
-    for _ in range(20):
-        error = miss(angles)
-        slope = np.column_stack([(miss(angles + step) - error) / 1e-6 for step in 1e-6 * np.eye(2)])
-        angles = angles - np.clip(np.linalg.lstsq(slope, error, rcond=None)[0], -0.5, 0.5)
-    if np.abs(miss(angles)).max() > 1e-3:
-        raise ValueError('cannot look at {}: it is too near to the head'.format(where.tolist()))
-    return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
 class BaseMotion:
@@ -197,7 +167,7 @@ class BaseMotion:
         way = inverse(world.odom_from_base()) @ self._goal
         error = world.drive_error(
             min(1.0, (float(np.hypot(way[0, 3], way[1, 3])) + abs(yaw_of(way))) / LONG_DRIVE))
-        true_goal = self._goal @ error
+        true_goal = inverse(world.map_error) @ self._goal @ error
         self._begun = world.periods
         self._start = np.array([world.robot.position(name) for name in BASE_JOINTS])
         turn = (yaw_of(true_goal) - self._start[2] + np.pi) % (2 * np.pi) - np.pi

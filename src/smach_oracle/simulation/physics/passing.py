@@ -7,8 +7,8 @@ from .world import World
 STILL = 2e-4
 LOOK_PERIODS = 6  # control periods of physics from one look whether all stands still to the next
 # control periods of physics, at most, from one leap to the next: what trembles for longer, as a
-# thing between fingers may, stays where it is
-UNREST_PERIODS = 180
+# thing between fingers may, stays where it is; a door takes up to 225 to fall shut
+UNREST_PERIODS = 240
 
 
 def pass_time(world: World, periods: int, tick: Optional[Callable[[], None]] = None,

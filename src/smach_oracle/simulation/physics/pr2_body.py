@@ -1,7 +1,7 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
 import math
 import xml.etree.ElementTree as ElementTree
-from typing import Collection, Dict, List, Optional
+from typing import Callable, Collection, Dict, List, Optional, Set
 
 import numpy as np
 import pybullet
@@ -18,12 +18,14 @@ SUBSTEPS = 4  # steps of physics in a control period
 STEP = 1.0 / 240.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
-FORCE = 300.0  # N m; the effort limits of the URDF presume springs that carry the arms
-STRONG = dict({name: 5000.0 for name in BASE_JOINTS}, torso_lift_joint=10000.0)  # N
+# N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the URDF's efforts
+BASE_EFFORT = {'base_x': 1000.0, 'base_y': 1000.0, 'base_theta': 300.0}
 GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
 # together
 LEAD = 0.003
+# N m, of an arm whose motors are off; shoulder and elbow have most of it
+DRY_FRICTION = (1.0, 1.0, 0.5, 0.5, 0.2, 0.2, 0.1)
 STIFFNESS = 0.3  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
 STAND = {  # how a PR2 stands unless the scene says otherwise
@@ -65,9 +67,14 @@ class Pr2Body:
         self._frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
         self._targets = np.zeros(len(infos))
         self._rates = np.zeros(len(infos))
-        self._forces = np.array([STRONG.get(name, FORCE) for name in self.numbers])
+        # N m or N, that each motor gives at most
+        self.efforts = {info[1].decode(): info[10] for info in infos}
+        self.efforts.update(BASE_EFFORT)
+        self._forces = np.array([self.efforts[name] for name in self.numbers])
         self._moving: List[int] = []
         self._changed = set(range(len(infos)))
+        self._read_more = np.zeros(len(infos))  # what encoders read too much
+        self._limp: Set[int] = set()  # joints whose motors are off
         self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
         self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
         self._stand(start)
@@ -78,6 +85,11 @@ class Pr2Body:
                                         rollingFriction=0.0005, physicsClientId=client)
 
     def _stand(self, start: RobotStart) -> None:
+        for name, error in start.encoder_errors:
+            if name not in self.encoders:
+                raise SceneBuildError('robot: no joint {!r}; there: {}'.format(
+                    name, ', '.join(self.encoders)))
+            self._read_more[self.numbers[name]] = error
         wanted = dict(STAND)
         for name, position in start.joints:
             if name not in self.encoders:
@@ -89,7 +101,8 @@ class Pr2Body:
             wrong = self.refusal(name, position)
             if wrong:
                 raise SceneBuildError('robot: ' + wrong)
-            pybullet.resetJointState(self.index, self.numbers[name], position,
+            number = self.numbers[name]
+            pybullet.resetJointState(self.index, number, position - self._read_more[number],
                                      physicsClientId=self._client)
             self._targets[self.numbers[name]] = position
         for arm in ARMS:
@@ -117,15 +130,20 @@ class Pr2Body:
 
         :param field: 0: positions (rad or m), 1: velocities (rad/s or m/s), 3: efforts (N m or N).
         """
-        states = pybullet.getJointStates(self.index, [self.numbers[name] for name in self.encoders],
-                                         physicsClientId=self._client)
-        return {name: state[field] for name, state in zip(self.encoders, states)}
+        numbers = [self.numbers[name] for name in self.encoders]
+        states = pybullet.getJointStates(self.index, numbers, physicsClientId=self._client)
+        more = self._read_more[numbers] if field == 0 else np.zeros(len(numbers))
+        return {
+            name: state[field] + float(extra)
+            for name, state, extra in zip(self.encoders, states, more)
+        }
 
     def position(self, name: str) -> float:
-        """rad or m of one joint, also of the base's."""
-        position: float = pybullet.getJointState(self.index, self.numbers[name],
+        """rad or m of one joint, as its encoder reads it, also of the base's."""
+        number = self.numbers[name]
+        position: float = pybullet.getJointState(self.index, number,
                                                  physicsClientId=self._client)[0]
-        return position
+        return position + float(self._read_more[number])
 
     def base(self) -> np.ndarray:
         """4x4, the world from base_footprint."""
@@ -156,7 +174,7 @@ class Pr2Body:
 
     def set_target(self, name: str, position: float, velocity: float,
                    force: Optional[float]) -> None:
-        """Send a joint to a position (rad or m) at the end of the coming control period.
+        """Send a joint to a position (rad or m, by its encoder) at the end of the coming period.
 
         :param velocity: rad/s or m/s until then.
         :param force: N m or N, at most; None: as before.
@@ -166,6 +184,30 @@ class Pr2Body:
         if force is not None:
             self._forces[number] = force
         self._changed.add(number)
+
+    def go_limp(self, arm: str) -> None:
+        """Switch an arm's motors off: it stays where it is, and what pushes it takes it along."""
+        numbers = [self.numbers[name] for name in ARM_JOINTS[arm]]
+        self._limp.update(numbers)
+        pybullet.setJointMotorControlArray(self.index, numbers, pybullet.VELOCITY_CONTROL,
+                                           targetVelocities=[0.0] * len(numbers),
+                                           forces=DRY_FRICTION, physicsClientId=self._client)
+
+    def hold(self, arm: str) -> None:
+        """Switch an arm's motors on again: they hold it where it is."""
+        for name in ARM_JOINTS[arm]:
+            self._limp.discard(self.numbers[name])
+            self.set_target(name, self.position(name), 0.0, None)
+
+    def push(self, link: str, point: np.ndarray, force: np.ndarray) -> None:
+        """Push a link of the URDF in the coming step of physics.
+
+        :param point: (3,) m, where, in the world.
+        :param force: (3,) N, in the world's axes.
+        """
+        pybullet.applyExternalForce(self.index, self.links[self._frames[link][0]], force.tolist(),
+                                    point.tolist(), pybullet.WORLD_FRAME,
+                                    physicsClientId=self._client)
 
     def target(self, name: str) -> float:
         """rad or m, where a joint was sent last."""
@@ -188,28 +230,34 @@ class Pr2Body:
         states = pybullet.getJointStates(self.index, self._jaws[arm], physicsClientId=self._client)
         return float(min(abs(state[3]) for state in states))
 
-    def advance(self) -> None:
-        """One control period of physics."""
+    def advance(self, pull: Callable[[], None]) -> None:
+        """One control period of physics.
+
+        :param pull: applies the forces from outside that hold for one step; called before each.
+        """
         for arm in ARMS:
             self._drive_jaws(arm)
         moving = [number for number in self._changed if self._rates[number]]
         self._send(self._changed, SUBSTEPS)
+        pull()
         pybullet.stepSimulation(physicsClientId=self._client)
         for left in range(SUBSTEPS - 1, 0, -1):
             self._send(moving, left)
+            pull()
             pybullet.stepSimulation(physicsClientId=self._client)
         self._rates[moving] = 0.0
         self._changed = set(moving)
 
     def _send(self, numbers: Collection[int], left: int) -> None:
         """Give the motors their targets, with `left` steps of the period to go."""
-        if not numbers:
+        chosen = sorted(set(numbers) - self._limp)
+        if not chosen:
             return
-        chosen = sorted(numbers)
         rates = self._rates[chosen]
         pybullet.setJointMotorControlArray(
             self.index, chosen, pybullet.POSITION_CONTROL,
-            targetPositions=self._targets[chosen] - left * STEP * rates, targetVelocities=rates,
+            targetPositions=self._targets[chosen] - self._read_more[chosen] - left * STEP * rates,
+            targetVelocities=rates,
             forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
             velocityGains=[1.0] * len(chosen), physicsClientId=self._client)
 

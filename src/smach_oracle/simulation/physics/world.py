@@ -16,14 +16,15 @@ from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .cause_log import CauseSpan
 from .disturbances import Disturbances
+from .door_hinges import DoorHinges
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
+from .pushed_arm import PushedArm
+from .weights import Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
-TURNING_FORCE = 30.0  # N m, of what swings a door
 REST_PERIODS = 30  # control periods after a reset, in which things come to rest
-# of a step of physics; with 10 things are put down less exactly, with 30 a hand that is driven
-# closes on nothing at the can in the fridge
-ITERATIONS = 50
+# of a step of physics; with 10 fingers sink millimetres into what they hold
+ITERATIONS = 20
 
 
 class Contact(NamedTuple):
@@ -68,17 +69,21 @@ class World:
             raise
         self.close()
         self._client, self._robot, self._placed = client, robot, placed
+        self._weights = Weights(client, placed.values())
+        self._hinges = DoorHinges(client, placed)
+        self._pushed: List[PushedArm] = []
         self.scene, self._disturbances = scene, disturbances
         self._names = {robot.index: 'robot', floor: 'floor'}
         self._names.update({each.number: name for name, each in placed.items()})
         self._periods_before += self.periods
         self.periods = self.drives = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
+        x, y, yaw = scene.robot.localisation_error
+        self.map_error = from_rpy((x, y, 0.0), yaw=yaw)  # 4x4, odom_combined from the world
         self.step(REST_PERIODS)
         self.happened('start')
 
     def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, PlacedBody]]:
-        pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=ITERATIONS,
                                            deterministicOverlappingPairs=1, physicsClientId=client)
         floor = add_floor(client)
@@ -103,12 +108,24 @@ class World:
         """Let `count` control periods of 1/60 s pass."""
         for _ in range(count):
             self._disturbances.tick(self)
-            self._robot.advance()
+            self._hinges.tick()
+            self._robot.advance(self._push)
             self.periods += 1
 
     def leap(self, count: int) -> None:
         """Let `count` control periods pass in which nothing moves, without physics."""
         self.periods += count
+
+    def _push(self) -> None:
+        """What comes from outside, in the coming step of physics."""
+        self._weights.pull()
+        for each in self._pushed:
+            each.push()
+        self._pushed = [each for each in self._pushed if not each.over]
+
+    def push_arm(self, joints: Dict[str, float], seconds: float, motors: bool) -> None:
+        """Begin to push an arm as a person would; see PushedArm."""
+        self._pushed.append(PushedArm(self._robot, joints, seconds, motors))
 
     def happened(self, *events: str) -> None:
         """Count events, such as 'look_at'; they may set off a disturbance of the scene."""
@@ -192,8 +209,12 @@ class World:
         return self._robot.base()
 
     def odom_from_base(self) -> np.ndarray:
-        """4x4, where the robot believes to stand: odom_combined, the world's frame, from base."""
-        return self._robot.base() @ inverse(self.belief_error)
+        """4x4, where the robot believes to stand: odom_combined from base."""
+        return self.map_error @ self._robot.base() @ inverse(self.belief_error)
+
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """Tell the robot where it stands (4x4), as somebody or something has found out."""
+        self.map_error = odom_from_base @ self.belief_error @ inverse(self._robot.base())
 
     def drive_error(self, share: float = 1.0) -> np.ndarray:
         """4x4, by how much the next drive will miss its goal unknown to the robot.
@@ -302,21 +323,21 @@ class World:
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
         """Drive a joint of a body at rad/s with a person's strength; what is in its way stops it.
 
-        :param let_go: leave it to its own dry friction again.
+        :param let_go: leave it to its own hinge again.
         """
-        placed = self._find(name)
-        strength = dict(placed.body.joint_friction).get(joint, 0.0) if let_go else TURNING_FORCE
-        pybullet.setJointMotorControl2(placed.number, placed.joints[joint],
-                                       pybullet.VELOCITY_CONTROL, force=strength,
-                                       targetVelocity=0.0 if let_go else speed,
-                                       physicsClientId=self._client)
+        self._find(name)
+        if let_go:
+            self._hinges.let_go(name, joint)
+        else:
+            self._hinges.turn(name, joint, speed)
 
     def contacts(self, name: str) -> List[Contact]:
         """What touches a body ('robot' is one here, too), as of the last step."""
         index = self._robot.index if name == 'robot' else self._find(name).number
         found = []
         for point in pybullet.getContactPoints(bodyA=index, physicsClientId=self._client):
-            if point[8] <= 0:
+            # the solver presses on what is a hair's breadth away, too
+            if point[8] <= 0 or point[9] > 0:
                 found.append(
                     Contact(self._names[point[2]], self._link_name(point[2], point[4]),
                             np.array(point[6]), point[9]))

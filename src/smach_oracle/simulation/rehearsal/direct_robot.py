@@ -37,6 +37,10 @@ class DirectRobot:
         """See Robot."""
         return self._world.odom_from_base()
 
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """See Robot."""
+        self._world.localise(odom_from_base)
+
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
         """See Robot."""
         self._do(lambda: Trajectory(joints, positions, times))

@@ -1,8 +1,16 @@
-"""The refrigerator as a URDF model of our own: a body with shelves, and a door with a handle."""
+"""The refrigerator as a URDF model of our own: a body with shelves, and a door with a handle.
+
+Many a real one's door falls shut from where it is not open far enough: a cam in the hinge, or feet
+that tilt the whole, pull it. Past a stop it stays.
+"""
 import xml.etree.ElementTree as ElementTree
-from typing import Tuple
+from typing import Optional, Tuple
+
+import numpy as np
 
 from smach_oracle.pr2.kitchen import Kitchen
+
+from .scene import Body, ClosingHinge
 
 DOOR_JOINT = 'door_hinge'  # rad; 0 closed, positive open
 DOOR_LIMIT = 1.75  # rad; a stop, as of a cabinet beside it
@@ -10,7 +18,30 @@ WHITE, GLASS, DARK = (0.93, 0.93, 0.95), (0.75, 0.82, 0.90), (0.20, 0.20, 0.22)
 DOOR_MASS, BODY_MASS = 8.0, 60.0  # kg
 GAP = 0.02  # m below and above the door
 
+DOOR_FRICTION = 3.0  # N m, dry, of a door that stays where it is left
+# N m: at the handle 7 to 11 N, which one hand does not mind
+CLOSING_TORQUE = (4.0, 6.0)
+CLOSING_STOP = (np.radians(50.0), np.radians(85.0))  # rad
+
 Triple = Tuple[float, float, float]
+
+
+def fridge(kitchen: Kitchen, closing: Optional[ClosingHinge] = None) -> Body:
+    """The refrigerator of a kitchen, its door closed.
+
+    :param closing: of its door; None: it stays where it is left.
+    """
+    x, y, yaw = kitchen.place
+    hinges = () if closing is None else ((DOOR_JOINT, closing),)
+    return Body('fridge', 'urdf', (0.0, 0.0, 0.0), (x, y, 0.0), yaw, urdf=fridge_urdf(kitchen),
+                joints=((DOOR_JOINT, 0.0),), joint_friction=((DOOR_JOINT, DOOR_FRICTION),),
+                joint_closing=hinges)
+
+
+def closing_hinge(generator: np.random.Generator) -> ClosingHinge:
+    """One of a door that falls shut: no two makes have the same."""
+    return ClosingHinge(float(generator.uniform(*CLOSING_TORQUE)),
+                        float(generator.uniform(*CLOSING_STOP)))
 
 
 def fridge_urdf(kitchen: Kitchen) -> str:

@@ -2,7 +2,7 @@
 
 Neither the executive nor the subsystems learn of them.
 """
-from typing import Callable, Dict, List, NamedTuple, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -16,13 +16,14 @@ from .cause_draws import (
     passing_seconds,
 )
 from .drafts import caused, declared
-from .scene import Body, Disturbance, SceneCause, Vector
+from .fridge import closing_hinge
+from .scene import Body, ClosingHinge, Disturbance, SceneCause, Vector
 
 # why, and why so often: doc/protocol.md
 AMOUNT = 0.55  # chance that a trial has a cause
 KINDS_OF = {
-    LASTING: {'base_misplaced': 0.30, 'glare': 0.25, 'crowded': 0.15, 'slippery_drink': 0.15,
-              'dim_light': 0.15},
+    LASTING: {'base_misplaced': 0.25, 'glare': 0.20, 'crowded': 0.15, 'slippery_drink': 0.15,
+              'door_falls_shut': 0.15, 'dim_light': 0.10},
     PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
 }
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
@@ -32,6 +33,10 @@ TARGET = 0  # the drink that stands nearest to the front
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 STEADY: Vector = (0.008, 0.008, 0.006)
+# m, m, rad, least and most, by which a localisation is wrong after somebody has pushed the robot,
+# or that has mistaken one thing for another
+LOST_FROM: Vector = (0.06, 0.0, 0.0)
+LOST_TO: Vector = (0.12, 0.05, 0.03)
 
 
 class KitchenDraft(NamedTuple):
@@ -41,6 +46,8 @@ class KitchenDraft(NamedTuple):
     front: Tuple[float, float]  # x, y of the middle of the fridge's opening, m
     half_width: float  # m from there to the inner side of a wall
     drive_error: Vector = STEADY
+    localisation_error: Vector = (0.0, 0.0, 0.0)  # see RobotStart
+    closing: Optional[ClosingHinge] = None  # of the fridge's door
     disturbances: Tuple[Disturbance, ...] = ()
     causes: Tuple[SceneCause, ...] = ()
 
@@ -56,10 +63,15 @@ def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE) 
 
 
 def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """Every drive ends centimetres off: the base is in the door's way, or too far for the arm."""
-    sigma = float(generator.uniform(0.05, 0.075))
-    return caused(draft._replace(drive_error=(sigma, 0.3 * sigma, 0.25 * sigma)), 'base_misplaced',
-                  'drives end {:.1f} cm too near or too far (sigma)'.format(100 * sigma))
+    """The localisation is wrong: the base is in the door's way, or too far for the arm.
+
+    It stays wrong until the robot has looked at something that it knows.
+    """
+    x, y, yaw = (side * float(generator.uniform(least, most)) for side, least, most in zip(
+        generator.choice([-1.0, 1.0], 3), LOST_FROM, LOST_TO))
+    return caused(draft._replace(localisation_error=(x, y, yaw)), 'base_misplaced',
+                  'the robot believes to be {:+.1f} cm further on, {:+.1f} cm further left and '
+                  '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)))
 
 
 def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -68,6 +80,14 @@ def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> Ki
     return caused(draft, 'door_swings_back',
                   'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
                   Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
+
+
+def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """The hinge pulls the door shut, unless it stands open past its stop."""
+    hinge = closing_hinge(generator)
+    return caused(draft._replace(closing=hinge), 'door_falls_shut',
+                  'the door falls shut where it is open by less than {:.0f} degrees'.format(
+                      np.degrees(hinge.stop)))
 
 
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -157,8 +177,9 @@ def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
 
 Maker = Callable[[KitchenDraft, np.random.Generator], KitchenDraft]
 MAKERS: Dict[str, Maker] = {
-    'base_misplaced': _base_misplaced, 'door_swings_back': _door_swings_back, 'crowded': _crowded,
-    'glare': _glare, 'reflex': _reflex, 'dim_light': _dim_light, 'shadow': _shadow,
+    'base_misplaced': _base_misplaced, 'door_falls_shut': _door_falls_shut,
+    'door_swings_back': _door_swings_back, 'crowded': _crowded, 'glare': _glare,
+    'reflex': _reflex, 'dim_light': _dim_light, 'shadow': _shadow,
     'slippery_drink': _slippery_drink, 'drink_moved': _drink_moved
 }
 KINDS: List[str] = sorted(MAKERS)

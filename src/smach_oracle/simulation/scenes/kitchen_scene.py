@@ -3,23 +3,24 @@ from typing import List, Tuple
 
 import numpy as np
 
-from smach_oracle.pr2.kitchen import Kitchen
+from smach_oracle.pr2.kitchen import Kitchen, odom_from_pose
 from smach_oracle.pr2.planning.travel import TRAVEL
 from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
 
+from .calibration import camera_error, encoder_errors
 from .cause_draws import LASTING_SHARE
-from .fridge import DOOR_JOINT, fridge_urdf
+from .fridge import fridge
 from .kitchen_causes import KitchenDraft, with_causes
-from .person import PALM, PALM_SIZE, person
+from .person import PALM_SIZE, person
 from .scene import Body, Goal, RobotStart, Scene
+from .unlike_the_map import drink_size, localisation_error, true_kitchen, true_palm
 
 TASK = 'drink_retrieval'
-DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
+DRINK_MASS = 0.33  # kg
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
            (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
-DOOR_FRICTION = 3.0  # N m, dry
 START_TORSO = 0.15  # m
 
 
@@ -33,24 +34,22 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     if seed < 0:
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
     generator = np.random.default_rng([seed, 2])
-    kitchen = Kitchen()
-    draft = KitchenDraft(tuple(_drinks(generator, kitchen)), kitchen.place[:2],
-                         kitchen.width / 2 - kitchen.wall)
+    kitchen = true_kitchen(seed)
+    draft = KitchenDraft(tuple(_drinks(seed, generator, kitchen)), kitchen.place[:2],
+                         kitchen.width / 2 - kitchen.wall,
+                         localisation_error=localisation_error(seed))
     if not benign:
         draft = with_causes(draft, seed, lasting)
-    goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
-    return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
-                 RobotStart(_posture(), drive_error=draft.drive_error),
+    palm = true_palm(seed)
+    goal = Goal('in_hand', '', palm, PALM_SIZE[0] / 2)
+    return Scene(TASK, seed, (fridge(kitchen, draft.closing),) + draft.drinks + person(palm), goal,
+                 RobotStart(_posture(), drive_error=draft.drive_error,
+                            localisation_error=draft.localisation_error,
+                            encoder_errors=encoder_errors(seed), camera_error=camera_error(seed)),
                  disturbances=draft.disturbances, causes=draft.causes)
 
 
-def _fridge(kitchen: Kitchen) -> Body:
-    x, y, yaw = kitchen.place
-    return Body('fridge', 'urdf', (0.0, 0.0, 0.0), (x, y, 0.0), yaw, urdf=fridge_urdf(kitchen),
-                joints=((DOOR_JOINT, 0.0),), joint_friction=((DOOR_JOINT, DOOR_FRICTION),))
-
-
-def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
+def _drinks(seed: int, generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
     """Upright on the shelf, apart from each other, near the front; the foremost comes first."""
     places: List[Tuple[float, float]] = []
     for _ in range(100):
@@ -59,13 +58,17 @@ def _drinks(generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
                 np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
+    return [_drink(seed, index, place, kitchen) for index, place in enumerate(places)]
+
+
+def _drink(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen) -> Body:
+    """A can at a place (m) in the fridge's frame."""
+    radius, height = drink_size(seed, index)
+    spot = odom_from_pose(kitchen, place[0], place[1], 0.0)[:2, 3]
     floor = kitchen.shelves[kitchen.drinks_shelf]
-    return [
-        Body('drink_{}'.format(index), 'cylinder', (DRINK_RADIUS, DRINK_RADIUS, DRINK_HEIGHT),
-             (kitchen.place[0] + x, kitchen.place[1] + y, floor + DRINK_HEIGHT / 2 + 0.001),
-             mass=DRINK_MASS, colour=COLOURS[index % len(COLOURS)])
-        for index, (x, y) in enumerate(places)
-    ]
+    return Body('drink_{}'.format(index), 'cylinder', (radius, radius, height),
+                (float(spot[0]), float(spot[1]), floor + height / 2 + 0.001), mass=DRINK_MASS,
+                colour=COLOURS[index % len(COLOURS)])
 
 
 def _posture() -> Tuple[Tuple[str, float], ...]:

@@ -31,9 +31,12 @@ STANDS: Vector = (0.20, 0.53, 0.0)  # m, from the palm
 WRIST, ELBOW = (0.0, 0.07, 0.765), (0.0, 0.45, 0.885)  # x and y in m from the palm
 
 
-def person() -> Tuple[Body, ...]:
-    """The palm, which is the tray, and everything else that is seen of the person."""
-    x, y, top = PALM
+def person(at: Vector = PALM) -> Tuple[Body, ...]:
+    """The palm, which is the tray, and everything else that is seen of the person.
+
+    :param at: m, the middle of the palm's upper face.
+    """
+    x, y, top = at
     palm = Body('palm', 'box', PALM_SIZE, (x, y, top - PALM_SIZE[2] / 2), colour=TRAY)
     arm = _limb('person_arm', (x, y, 0.0), WRIST, ELBOW, 0.08)
     hand = Body('person_hand', 'round', HAND_SIZE,

@@ -4,6 +4,14 @@ from typing import NamedTuple, Tuple
 Vector = Tuple[float, float, float]
 
 
+class ClosingHinge(NamedTuple):
+    """What pulls a door towards 0, unless it stands open past its stop."""
+
+    torque: float  # N m
+    stop: float  # rad; from there on the door stays where it is left
+    pace: float = 0.4  # rad/s: it is damped, and does not slam
+
+
 class Body(NamedTuple):
     """A thing in the world, in whose frame its pose is.
 
@@ -11,8 +19,9 @@ class Body(NamedTuple):
     """
 
     name: str
-    shape: str  # 'box', 'cylinder', 'round' (between a ball and a cylinder) or 'urdf'
-    size: Vector  # m; box, round: full extents; cylinder: radius, radius, height; urdf: unused
+    # 'box', 'cylinder', 'round' (between a ball and a cylinder), 'cup', 'bottle' or 'urdf'
+    shape: str
+    size: Vector  # m; cylinder: radius, radius, height; urdf: unused; others: full extents
     position: Vector  # m, of its centre (urdf: of its root)
     yaw: float = 0.0  # rad, as roll and pitch: about the fixed axes z, x and y, roll first
     roll: float = 0.0
@@ -23,6 +32,7 @@ class Body(NamedTuple):
     urdf: str = ''  # text of the model, for shape 'urdf'
     joints: Tuple[Tuple[str, float], ...] = ()  # urdf: where its joints start
     joint_friction: Tuple[Tuple[str, float], ...] = ()  # urdf: N or N m
+    joint_closing: Tuple[Tuple[str, ClosingHinge], ...] = ()  # urdf: those that close by themselves
 
 
 class CameraQuality(NamedTuple):
@@ -64,6 +74,12 @@ class RobotStart(NamedTuple):
     base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
     # sigma of x, y, yaw that each drive adds between truth and odometry
     drive_error: Vector = (0.0, 0.0, 0.0)
+    # x, y, yaw of the world in odom_combined: by so much the robot's localisation is wrong, until
+    # it is told better
+    localisation_error: Vector = (0.0, 0.0, 0.0)
+    encoder_errors: Tuple[Tuple[str, float], ...] = ()  # rad that joints read too much
+    # m and rad (roll, pitch, yaw) of the head camera, from where the URDF has it, in its own frame
+    camera_error: Tuple[float, float, float, float, float, float] = (0.0,) * 6
 
 
 class Goal(NamedTuple):

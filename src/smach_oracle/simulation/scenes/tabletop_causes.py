@@ -205,7 +205,9 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
 
 
 def _radius(thing: Body) -> float:
-    return thing.size[0] if thing.shape == 'cylinder' else float(np.hypot(*thing.size[:2])) / 2
+    if thing.shape == 'box':
+        return float(np.hypot(*thing.size[:2])) / 2
+    return thing.size[0] if thing.shape == 'cylinder' else thing.size[0] / 2
 
 
 Maker = Callable[[TabletopDraft, np.random.Generator], Optional[TabletopDraft]]

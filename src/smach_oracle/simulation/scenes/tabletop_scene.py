@@ -1,11 +1,15 @@
 """The world of the first use case (paper, VI-B): a table and things, drawn from the seed."""
-from typing import List, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
+from .calibration import camera_error, encoder_errors
 from .cause_draws import LASTING_SHARE
+from .chance import generator_for
+from .clutter import another
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
 from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
+from .unlike_the_map import TrueTable, true_table
 
 TASK = 'pick_and_place'
 TABLE_X = 0.82  # m, of its middle
@@ -28,23 +32,34 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     :param benign: without any reason to fail.
     :param lasting: the share of the causes that last, 0 to 1.
     """
-    draft = TabletopDraft(_things(np.random.default_rng([seed, 61])))
+    target, *others = _things(np.random.default_rng([seed, 61]))
+    draft = TabletopDraft((target, *(another(generator_for(seed, 'clutter:' + each.name), each,
+                                             TABLE_TOP) for each in others)))
     if not benign:
         draft = with_causes(draft, seed, lasting)
-    height = TABLE_TOP + draft.things[0].size[2] / 2
+    table = true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE)
+    height = table.height + draft.things[0].size[2] / 2
     goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
-    return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal,
-                 RobotStart((('torso_lift_joint', TORSO),)), CameraQuality(), draft.disturbances,
+    return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal,
+                 RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
+                            camera_error=camera_error(seed)), CameraQuality(), draft.disturbances,
                  draft.causes)
 
 
-def _table() -> List[Body]:
-    top = Body('table', 'box', TABLE_SIZE, (TABLE_X, 0.0, TABLE_TOP - TABLE_SIZE[2] / 2),
-               colour=WOOD)
-    tall = TABLE_TOP - TABLE_SIZE[2]
+def _standing_on(table: TrueTable, things: Sequence[Body]) -> List[Body]:
+    """Things that stand on a table of TABLE_TOP, on another."""
+    lift = table.height - TABLE_TOP
+    return [each._replace(position=(*each.position[:2], each.position[2] + lift))
+            for each in things]
+
+
+def _table(table: TrueTable) -> List[Body]:
+    deep, wide, thick = table.size
+    top = Body('table', 'box', table.size, (table.x, 0.0, table.height - thick / 2), colour=WOOD)
+    tall = table.height - thick
     legs = [
         Body('leg_{}'.format(2 * i + j), 'box', (0.06, 0.06, tall),
-             (TABLE_X + x * (TABLE_SIZE[0] / 2 - 0.06), y * (TABLE_SIZE[1] / 2 - 0.06), tall / 2),
+             (table.x + x * (deep / 2 - 0.06), y * (wide / 2 - 0.06), tall / 2),
              colour=(0.35, 0.25, 0.17)) for i, x in enumerate((-1, 1))
         for j, y in enumerate((-1, 1))
     ]

@@ -32,7 +32,8 @@ def seen(world, seed, degrees, **sensor):
         scene._replace(
             bodies=(fridge,) + scene.bodies[1:], camera=scene.camera._replace(**sensor),
             robot=scene.robot._replace(base=IN_THE_FRIDGE,
-                                       joints=(('torso_lift_joint', TORSO_HEIGHT),))))
+                                       joints=scene.robot.joints +
+                                       (('torso_lift_joint', TORSO_HEIGHT),))))
     robot = DirectRobot(world)
     believed = base_from_fridge(Kitchen(), robot.odom_from_base())
     robot.look_at(look_point(Kitchen(), believed))

@@ -8,7 +8,7 @@ from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
 from smach_oracle.simulation.scenes.kitchen_scene import draw as draw_kitchen
-from smach_oracle.simulation.scenes.scene import Disturbance
+from smach_oracle.simulation.scenes.scene import Body, Disturbance
 
 IN_VIEW = {
     'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
@@ -33,12 +33,39 @@ def test_a_pushed_arm_is_in_the_view_when_the_head_has_turned(world):
     robot = DirectRobot(world)
     robot.look_at(LOOK)
     assert not world.disturbed
+    pushed_to = world.joints()
     for name, position in IN_VIEW.items():
-        assert world.joints()[name] == pytest.approx(position, abs=0.02)
+        assert pushed_to[name] == pytest.approx(position, abs=0.1)
+    # it stays, for its motors hold it there
+    world.step(120)
+    assert world.joints() == pytest.approx(pushed_to, abs=0.01)
     # it can be taken out again
     robot.follow(['l_shoulder_pan_joint'], np.array([[before]]), np.array([2.0]))
     robot.look_at(LOOK)
     assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=0.02)
+
+
+def test_an_arm_whose_motors_run_springs_back_when_the_person_lets_go(world):
+    pushed = Disturbance('arm', 'torso', tuple(IN_VIEW.items()) + (('motors', 1.0),))
+    world.reset(scene(disturbances=(pushed,)))
+    before = world.joints()['l_shoulder_pan_joint']
+    world.happened('torso')
+    world.step(90)
+    assert world.joints()['l_shoulder_pan_joint'] < before - 0.3
+    DirectRobot(world).torso(0.2)
+    world.step(240)
+    assert world.joints()['l_shoulder_pan_joint'] == pytest.approx(before, abs=0.02)
+
+
+def test_what_is_in_its_way_stops_a_pushed_arm(world):
+    """A person pushes the arm against a wall, but not through it."""
+    wall = Body('wall', 'box', (0.04, 2.0, 2.0), (0.55, 0.0, 1.0))
+    pushed = Disturbance('arm', 'torso', tuple(IN_VIEW.items()))
+    world.reset(scene(wall, disturbances=(pushed,)))
+    world.happened('torso')
+    DirectRobot(world).torso(0.2)
+    assert 'wall' in {contact.other for contact in world.contacts('robot')}
+    assert world.tool_pose('left')[0, 3] < 0.56
 
 
 def test_a_nudged_body_slides_and_stays_upright(world):

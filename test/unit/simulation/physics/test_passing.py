@@ -71,7 +71,7 @@ def test_what_never_rests_is_leapt_over_after_some_seconds(make):
     world.fastest = lambda name: 1.0
     steps, periods = counted(world), world.periods
     pass_time(world, 6000)
-    assert len(steps) == 180 and world.periods == periods + 6000
+    assert len(steps) == 240 and world.periods == periods + 6000
 
 
 def test_no_leap_while_the_robot_is_moved(make):

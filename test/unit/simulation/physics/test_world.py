@@ -137,7 +137,7 @@ def test_clients_are_given_back(world):
     (scene(TABLE, TABLE), "'table'.*taken"),
     (scene(TABLE._replace(name='robot')), "'robot'"),
     (scene(CAN._replace(shape='sphere')),
-     "'can': shape is 'sphere'; allowed: box, cylinder, round, urdf"),
+     "'can': shape is 'sphere'; allowed: bottle, box, cup, cylinder, round, urdf"),
     (scene(CAN._replace(size=(0.03, 0.03, 0.0))), "'can': size"),
     (scene(CAN._replace(mass=math.nan)), "'can': mass nan"),
     (scene(CAN._replace(position=(0.0, math.inf, 0.0))), "'can': position"),
@@ -159,6 +159,8 @@ def test_clients_are_given_back(world):
     (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
     (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
      "no joint 'l_elbow_joint'"),
+    (scene(disturbances=(Disturbance('arm', 'see', (('torso_lift_joint', 0.1),)),)),
+     'joints of arms .*allowed: those of one'),
     (scene(disturbances=(Disturbance('glare', 'see', (('radius', -1.0),)),)), 'radius is -1'),
 ])
 def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wrong, text):
