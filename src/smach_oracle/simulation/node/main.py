@@ -165,8 +165,8 @@ class WorldNode:
         sim_s = self._world.time
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent,
-                              self._loop.watch.used)
+        record = truth.record(verdict, self._world.harm.found(self._world), sim_s,
+                              self._loop.watch.spent, self._loop.watch.used)
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:

@@ -2,8 +2,10 @@
 import json
 import os
 import time
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, Mapping, Optional, Tuple
 
+from ..physics.harm import Harm, harm_record
+from ..physics.judge import TrialVerdict
 from ..scenes.scene import Scene
 
 
@@ -19,16 +21,18 @@ class TrialTruth:
         self._sim_s = sim_s
         self._began = time.monotonic() if began_s is None else began_s
 
-    def record(self, success: bool, why: str, sim_s: float, spent: Mapping[str, float],
-               used: Mapping[str, float]) -> Dict[str, Any]:
+    def record(self, verdict: TrialVerdict, harm: Tuple[Harm, ...], sim_s: float,
+               spent: Mapping[str, float], used: Mapping[str, float]) -> Dict[str, Any]:
         """What is to be written at its end.
 
+        :param harm: all that came to harm in it.
         :param spent: wall s by what the world's process did in them.
         :param used: processor s of the world's thread, likewise.
         """
         wall = time.monotonic() - self._began
         return {
-            'seed': self._scene.seed, 'task': self._scene.task, 'success': success, 'why': why,
+            'seed': self._scene.seed, 'task': self._scene.task, 'success': verdict.success,
+            'why': verdict.why, 'wrong_object': verdict.wrong_object, 'damage': harm_record(harm),
             'causes': [{'kind': cause.kind, 'text': cause.text} for cause in self._scene.causes],
             'sim_s': round(sim_s - self._sim_s, 3), 'wall_s': round(wall, 3), 'share': {
                 what: round(seconds / max(wall, 1e-9), 4)

@@ -15,6 +15,7 @@ from smach_oracle.pr2.robot import ARMS, TOOL_FRAME
 from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .disturbances import Disturbances
+from .harm import HarmWatch
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
@@ -73,6 +74,7 @@ class World:
         self._periods_before += self.periods
         self.periods = self.drives = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
+        self.harm = HarmWatch()  # what comes to harm since the reset
         self.step(REST_PERIODS)
         self.happened('start')
 
@@ -104,6 +106,7 @@ class World:
             self._disturbances.tick(self)
             self._robot.advance()
             self.periods += 1
+            self.harm.tick(self)
 
     def happened(self, *events: str) -> None:
         """Count events, such as 'look_at'; they may set off a disturbance of the scene."""

@@ -14,6 +14,7 @@ from .scene import Body, Goal, RobotStart, Scene
 
 TASK = 'drink_retrieval'
 DRINK_RADIUS, DRINK_HEIGHT, DRINK_MASS = 0.031, 0.12, 0.33
+ORDERED = 'drink_0'  # the red one: red is what the task orders
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
            (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
@@ -36,7 +37,7 @@ def draw(seed: int, benign: bool = False) -> Scene:
                          kitchen.width / 2 - kitchen.wall)
     if not benign:
         draft = with_causes(draft, seed)
-    goal = Goal('in_hand', '', PALM, PALM_SIZE[0] / 2)
+    goal = Goal('in_hand', ORDERED, PALM, PALM_SIZE[0] / 2)
     return Scene(TASK, seed, (_fridge(kitchen),) + draft.drinks + person(), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error),
                  disturbances=draft.disturbances, causes=draft.causes)

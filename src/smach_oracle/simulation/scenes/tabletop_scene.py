@@ -29,8 +29,9 @@ def draw(seed: int, benign: bool = False) -> Scene:
     draft = TabletopDraft(_things(np.random.default_rng([seed, 61])))
     if not benign:
         draft = with_causes(draft, seed)
-    height = TABLE_TOP + draft.things[0].size[2] / 2
-    goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
+    target = min(draft.things, key=lambda thing: float(np.hypot(*thing.position[:2])))
+    height = TABLE_TOP + target.size[2] / 2
+    goal = Goal('stands_at', target.name, (GOAL[0], GOAL[1], height), TOLERANCE)
     return Scene(TASK, seed, tuple(_table() + list(draft.things)), goal,
                  RobotStart((('torso_lift_joint', TORSO),)), CameraQuality(), draft.disturbances,
                  draft.causes)
