@@ -32,7 +32,7 @@ from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.msg import TrialCause
 from smach_oracle.pr2.robot import ARM_JOINTS, RobotError
 from smach_oracle.pr2.ros_robot import RosRobot
-from smach_oracle.srv import Judge, ResetWorld, Reveal, Snapshot
+from smach_oracle.srv import Judge, PassTime, ResetWorld, Reveal, Snapshot
 
 RIGHT = ARM_JOINTS['right']
 LIMIT_S = 40.0
@@ -201,6 +201,20 @@ class Pr2World(unittest.TestCase):
         before, time = things(), rospy.get_time()
         self.assertTrue(wait_for(lambda: rospy.get_time() > time + 3.0, LIMIT_S))
         self.assertEqual(things(), before)
+
+    def test_time_passes_for_who_asks_for_it_in_one_leap(self) -> None:
+        before = call('world/snapshot', Snapshot, False).stamp
+        stamp = call('world/pass_time', PassTime, 3600.0, 'thinking').stamp
+        self.assertGreaterEqual((stamp - before).to_sec(), 3600.0)
+        for seconds in (-1.0, float('nan'), float('inf'), 36001.0):
+            with self.assertRaisesRegex(rospy.ServiceException, 'allowed: 0 to 36000'):
+                call('world/pass_time', PassTime, seconds, 'thinking')
+
+    def test_motions_go_on_while_time_passes(self) -> None:
+        sent = send_arm(arm_goal([[-1.3]], [0.6], RIGHT[:1]))
+        call('world/pass_time', PassTime, 10.0, 'thinking')
+        self.assertEqual(sent.status(), GoalStatus.SUCCEEDED)
+        self.assertAlmostEqual(self.robot.joints()[RIGHT[0]], -1.3, delta=0.011)
 
     def test_bad_goals_are_rejected_in_words(self) -> None:
         here = [0.0] * 7

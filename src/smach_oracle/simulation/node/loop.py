@@ -5,6 +5,8 @@ import time
 from concurrent.futures import Future, wait
 from typing import Callable, Dict, Optional, TypeVar
 
+from ..physics.passing import pass_time
+from ..physics.world import World
 from .motion_table import MotionTable
 from .settings import WorldSettings
 from .sim_clock import SimClock
@@ -81,6 +83,16 @@ class WorldLoop:
         for _ in range(round(seconds / PERIOD_S)):
             self._motions.tick()
             self._clock.advance(PERIOD_S)
+
+    def pass_by(self, world: World, seconds: float) -> None:
+        """Let time pass in the world that the motions move; for the world's own thread.
+
+        What is due is published on the way. In a world that runs at a pace it does nothing.
+        """
+        if self._settings.lock_step:
+            pass_time(world, round(seconds / PERIOD_S), self._tick,
+                      lambda periods: self._clock.skip(periods * PERIOD_S),
+                      lambda: bool(self._motions))
 
     def run(self, closed: Callable[[], None]) -> None:
         """Run until stop(). What a motion or a job raises ends it.

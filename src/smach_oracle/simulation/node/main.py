@@ -19,6 +19,9 @@ from smach_oracle.srv import (
     Judge,
     JudgeRequest,
     JudgeResponse,
+    PassTime,
+    PassTimeRequest,
+    PassTimeResponse,
     ResetWorld,
     ResetWorldRequest,
     ResetWorldResponse,
@@ -47,6 +50,7 @@ from .truth import TrialTruth, append_line
 # simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
 # wakes every action server of every node.
 CLOCK_S = {False: 0.05, True: 0.2}
+LONGEST_PASS_S = 36000.0  # of the world's time, that may pass at once
 REST_S = 1.0  # after a trial, before it is judged
 # for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
 # sends a second signal; it takes a tenth of a second where nothing else is done
@@ -84,6 +88,7 @@ class WorldNode:
                                         lambda: self._clock.now_ns / 1e9, self._publish_state)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
+                          rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
                           rospy.Service('world/judge', Judge, self._answer_judge)]
 
@@ -140,6 +145,12 @@ class WorldNode:
             self._publish_image(stamp, counted=True)
         return stamp
 
+    def _pass_time(self, seconds: float, what: str) -> rospy.Time:
+        self._loop.pass_by(self._world, seconds)
+        if self._truth is not None and self._settings.lock_step:
+            self._truth.passed(seconds, what)
+        return self._publish_state()
+
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
         self._finish_trial()
@@ -191,6 +202,16 @@ class WorldNode:
                                     self._loop.call(lambda: self._snapshot(request.camera)))
         except WorldStopped as err:
             return SnapshotResponse(False, str(err), rospy.Time())
+
+    def _answer_pass_time(self, request: PassTimeRequest) -> PassTimeResponse:
+        if not 0 <= request.seconds <= LONGEST_PASS_S:
+            raise rospy.ServiceException('seconds is {}; allowed: 0 to {:g}'.format(
+                request.seconds, LONGEST_PASS_S))
+        try:
+            return PassTimeResponse(
+                self._loop.call(lambda: self._pass_time(request.seconds, request.what)))
+        except WorldStopped as err:
+            raise rospy.ServiceException(str(err)) from err
 
     def _answer_reveal(self, request: RevealRequest) -> RevealResponse:
         try:

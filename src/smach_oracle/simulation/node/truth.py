@@ -20,6 +20,11 @@ class TrialTruth:
         self._scene = scene
         self._sim_s = sim_s
         self._began = time.monotonic() if began_s is None else began_s
+        self._passed: Dict[str, float] = {}  # s of the world's time, by what took it
+
+    def passed(self, seconds: float, what: str) -> None:
+        """Add up the world's time (s) that passed for some work."""
+        self._passed[what] = self._passed.get(what, 0.0) + seconds
 
     def record(self, verdict: TrialVerdict, harm: Tuple[Harm, ...], sim_s: float,
                spent: Mapping[str, float], used: Mapping[str, float]) -> Dict[str, Any]:
@@ -34,7 +39,10 @@ class TrialTruth:
             'seed': self._scene.seed, 'task': self._scene.task, 'success': verdict.success,
             'why': verdict.why, 'wrong_object': verdict.wrong_object, 'damage': harm_record(harm),
             'causes': [{'kind': cause.kind, 'text': cause.text} for cause in self._scene.causes],
-            'sim_s': round(sim_s - self._sim_s, 3), 'wall_s': round(wall, 3), 'share': {
+            'sim_s': round(sim_s - self._sim_s, 3), 'passed_s': {
+                what: round(seconds, 3)
+                for what, seconds in sorted(self._passed.items())
+            }, 'wall_s': round(wall, 3), 'share': {
                 what: round(seconds / max(wall, 1e-9), 4)
                 for what, seconds in sorted(spent.items())
             }, 'cpu_s': {what: round(seconds, 4)

@@ -118,6 +118,10 @@ class Disturbances:
         """Something is being moved."""
         return bool(self._due or self._moving)
 
+    def next_period(self, period: int, end: int) -> int:
+        """The control period, from `period` to `end`, up to which no disturbance is due."""
+        return period if self.moving else end
+
     def tick(self, world: DisturbedWorld) -> None:
         """Move what is disturbed; called before each control period."""
         for disturbance in self._due:

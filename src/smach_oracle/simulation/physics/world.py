@@ -108,6 +108,10 @@ class World:
             self.periods += 1
             self.harm.tick(self)
 
+    def leap(self, count: int) -> None:
+        """Let `count` control periods pass in which nothing moves, without physics."""
+        self.periods += count
+
     def happened(self, *events: str) -> None:
         """Count events, such as 'look_at'; they may set off a disturbance of the scene."""
         for event in events:
@@ -252,6 +256,15 @@ class World:
         linear, angular = pybullet.getBaseVelocity(
             self._find(name).number, physicsClientId=self._client)
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
+
+    def fastest(self, name: str) -> float:
+        """How fast a body or any of its joints moves or turns, m/s or rad/s, whichever is more."""
+        placed = self._find(name)
+        joints = [
+            abs(state[1]) for state in pybullet.getJointStates(
+                placed.number, list(placed.joints.values()), physicsClientId=self._client)
+        ] if placed.joints else []
+        return max([*self.body_speed(name), *joints])
 
     def body_joint(self, name: str, joint: str) -> float:
         """rad or m of a joint of a body.

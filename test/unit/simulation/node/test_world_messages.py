@@ -165,3 +165,10 @@ def test_the_truth_is_a_line_for_each_trial(tmp_path):
     truth = read_truth(str(path))[7]
     assert truth.wrong_object == 'cup' and truth.damage == ((DROPPED, 'can'),)
     assert lines[0]['share']['physics'] > 0 and lines[0]['cpu_s'] == {'physics': 0.25}
+
+
+def test_the_truth_adds_up_the_time_that_was_let_pass():
+    truth = TrialTruth(scene(), 0.0)
+    for seconds, what in ((2.0, 'planning'), (5.0, 'expert'), (0.5, 'planning')):
+        truth.passed(seconds, what)
+    assert truth.record(True, '', 9.0, {}, {})['passed_s'] == {'planning': 2.5, 'expert': 5.0}
