@@ -106,6 +106,7 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
     quality = world.disturbances.camera_quality(world.scene.camera)
     pose = world.link_pose(CAMERA_FRAME)
     rendered = RenderedView(world, pose, size_of(world))
+    world.labels = rendered.bodies
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
     image = CameraImage(world.time, noisy_colour(rendered.colour, quality, generator),
                         noisy_depth(rendered.depth, quality, generator, world.binning),

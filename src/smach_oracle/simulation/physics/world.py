@@ -75,6 +75,8 @@ class World:
         self.periods = self.drives = 0
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
         self.harm = HarmWatch()  # what comes to harm since the reset
+        # (h, w): the number of the body that each pixel of the last image shows
+        self.labels = np.zeros((0, 0), int)
         self.step(REST_PERIODS)
         self.happened('start')
 

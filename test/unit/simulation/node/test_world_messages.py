@@ -171,4 +171,5 @@ def test_the_truth_adds_up_the_time_that_was_let_pass():
     truth = TrialTruth(scene(), 0.0)
     for seconds, what in ((2.0, 'planning'), (5.0, 'expert'), (0.5, 'planning')):
         truth.passed(seconds, what)
-    assert truth.record(True, '', 9.0, {}, {})['passed_s'] == {'planning': 2.5, 'expert': 5.0}
+    record = truth.record(TrialVerdict(True, ''), (), 9.0, {}, {})
+    assert record['passed_s'] == {'planning': 2.5, 'expert': 5.0}
