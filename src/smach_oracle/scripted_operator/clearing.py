@@ -6,7 +6,7 @@ import numpy as np
 from .manoeuvres import Attempt, ManoeuvreError, Target, found, pick, put_down
 from .seen_scene import SeenScene, SeenThing
 
-CROWDED = 0.025  # m between two things that are too close to each other for a hand
+CROWDED = 0.015  # m between two things that are too close to each other for a hand
 ROOM = 0.15  # m between the middles of things, where each has room
 SPOTS_X, SPOTS_Y = (0.50, 0.56, 0.62, 0.68), (0.05, 0.12, 0.19, 0.26, 0.33, 0.40)  # m, y outwards
 # m from the middle of the place that something shall stand at: other things hinder the hand there

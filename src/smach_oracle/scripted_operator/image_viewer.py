@@ -9,7 +9,7 @@ from smach_oracle.msg import SeenThing as SeenThingMessage
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import Recognise, RecogniseRequest, RecogniseResponse
 
-from .seen_scene import Outline, SeenScene, SeenThing, seen_scene
+from .seen_scene import ROBOT, Outline, SeenScene, SeenThing, seen_scene
 
 _ANSWER_S = 30.0  # wall time
 
@@ -49,8 +49,7 @@ class ImageViewer:
             raise ViewError(str(err)) from err
         size = taken.image.depth.shape[1], taken.image.depth.shape[0]
         found = self.outlines(taken.message.header.stamp, size)
-        if names:
-            found += self.outlines(taken.message.header.stamp, size, names)
+        found += self.outlines(taken.message.header.stamp, size, (ROBOT, *names))
         return seen_scene(taken.image, found)
 
     def outlines(self, stamp: rospy.Time, size: Tuple[int, int],

@@ -34,10 +34,12 @@ def look_about(plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene,
         return _about_place(plan, userdata, means, holds)
     scene, thing = _search(_where_to_look(plan, userdata), first, means)
     if thing is None or thing.box is None:
-        return Impression(Sight(seen=thing is not None, located=False, holds=holds), AHEAD)
+        return Impression(Sight(seen=thing is not None, located=False, holds=holds,
+                                covered=thing is not None and scene.covered(thing)), AHEAD)
     reachable = plan.means != TAKE or _reaches(plan, thing.box.centre)
-    return Impression(Sight(holds=holds, crowded=in_the_way(scene, thing) is not None,
-                            reachable=reachable), thing.box.centre)
+    sight = Sight(holds=holds, crowded=in_the_way(scene, thing) is not None,
+                  covered=scene.covered(thing) and not holds, reachable=reachable)
+    return Impression(sight, thing.box.centre)
 
 
 def _where_to_look(plan: StatePlan, userdata: Mapping[str, Any]) -> List[np.ndarray]:

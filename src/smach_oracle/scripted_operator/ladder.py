@@ -31,6 +31,7 @@ class Sight(NamedTuple):
     holds: bool = False  # the hand of the plan holds something
     crowded: bool = False  # another thing stands close beside it
     blocked: bool = False  # another thing stands where something shall be put
+    covered: bool = False  # a limb of the robot is right beside it, or before it
     reachable: bool = True  # the hand of the plan reaches the thing
 
 
@@ -71,7 +72,8 @@ class Rung(NamedTuple):
 
 _LADDERS: Dict[str, List[Rung]] = {
     SHOW: [
-        Rung(MARK, 1, lambda sight: sight.located and not sight.crowded),
+        Rung(HIDDEN, 1, lambda sight: sight.covered),
+        Rung(MARK, 1, lambda sight: sight.located),
         Rung(CLEAR, 1, lambda sight: sight.located and sight.crowded),
         Rung(MARK, 0, lambda sight: sight.seen),
         Rung(HIDDEN, 2, lambda sight: not sight.seen),
@@ -82,7 +84,8 @@ _LADDERS: Dict[str, List[Rung]] = {
         Rung(CLEAR, 2, lambda sight: sight.located and sight.crowded),
     ],
     TAKE: [
-        Rung(BY_HAND, 1, lambda sight: sight.located and sight.reachable and not sight.crowded),
+        Rung(HIDDEN, 1, lambda sight: sight.covered),
+        Rung(BY_HAND, 1, lambda sight: sight.located and sight.reachable),
         Rung(CLEAR, 1, lambda sight: sight.located and sight.crowded),
         Rung(CLOSER, 2, lambda sight: sight.located and not sight.reachable),
         Rung(BY_HAND, 0, lambda sight: sight.holds or sight.located),
@@ -166,6 +169,6 @@ def _made(act: str, plan: StatePlan, asked: Asked) -> Optional[NextAct]:
 
 
 _WHY = {
-    AGAIN: 'once more', WAIT: 'once more, a while later', HIDDEN: 'nothing of it can be seen',
+    AGAIN: 'once more', WAIT: 'once more, a while later', HIDDEN: 'it is hidden',
     LOST: 'the hand holds nothing', BACK: 'from further back', LEAVE: 'it is left as it is'
 }

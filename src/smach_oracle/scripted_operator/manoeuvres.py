@@ -28,6 +28,7 @@ OUT = 0.28  # m straight back out of a shelf
 HELD = (0.006, 0.079)  # m between the tips, where there is something between them
 HALF_TALL = 0.06  # m, of a thing of which nothing is seen in the hand
 UNTIL_IT_TOUCHES = 0.06  # m that a hand is lowered at most until what it holds touches
+LIES = 0.75  # of its height: what is seen lower has fallen over
 IN_HAND = 0.13  # m from the tool to the middle of what is in the hand
 FAR = 0.95  # m from the shoulder, which no hand reaches
 
@@ -247,6 +248,15 @@ def put_down(attempt: Attempt, place: np.ndarray, surface: Optional[float]) -> N
     _check_stands(attempt, held.name, place)
 
 
+def wrong_thing(attempt: Attempt) -> str:
+    """The name of what is seen in the hand, where that is another thing than the wanted one."""
+    tool = attempt.driver.hand.tool()[:3, 3]
+    scene = attempt.watcher.look_at(tool)
+    held = scene.near(tool, IN_HAND)
+    known = any(thing.wanted for thing in scene.things)
+    return held.name if held is not None and not held.wanted and known else ''
+
+
 def _look_at_hand(attempt: Attempt) -> InHand:
     """What the hand holds: between its fingers, as high as it is seen, as tall as it stood."""
     tool = attempt.driver.hand.tool()[:3, 3]
@@ -311,6 +321,8 @@ def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
     beside = float(np.hypot(*(thing.box.centre - place)[:2]))
     if beside > 0.05:
         raise ManoeuvreError('{} is {:.0f} cm beside its place'.format(name, 100 * beside))
+    if float(thing.box.size[2]) < LIES * (attempt.watcher.tall(name) or 0.0):
+        raise ManoeuvreError('{} lies at its place'.format(name))
 
 
 def as_far_as_it_goes(drive: Callable[[], None]) -> None:

@@ -10,7 +10,15 @@ from .hand_driver import HandDriver, StuckError
 from .image_viewer import ImageViewer, ViewError
 from .interface_clients import FinishClient, PerceptionClient
 from .ladder import BY_HAND, CLEAR, CLOSER, MARK, NextAct
-from .manoeuvres import Attempt, ManoeuvreError, found, pick, pull_out, put_down
+from .manoeuvres import (
+    Attempt,
+    ManoeuvreError,
+    found,
+    pick,
+    pull_out,
+    put_down,
+    wrong_thing,
+)
 from .robot_means import RobotMeans
 from .seen_scene import SeenScene, SeenThing
 from .showing import show
@@ -119,11 +127,26 @@ def _state_by_hand(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -
     attempt = take_wheel(task.plan.arm)
     if task.plan.means == PUT_DOWN:
         place, surface = place_of(task.plan, task.userdata, means)
+        other = wrong_thing(attempt)
+        if other:
+            _put_away(attempt, task, place)
+            raise ManoeuvreError('{} was in the hand: it is the wrong thing'.format(other))
         put_down(attempt, place, surface)
     elif task.plan.inside:
         pull_out(attempt, SeenScene.wanted, task.about)
     else:
         pick(attempt, SeenScene.wanted, task.about)
+
+
+def _put_away(attempt: Attempt, task: ManualTask, place: np.ndarray) -> None:
+    """Put what the hand holds where there is room."""
+    kept = [place] + [np.array(each) for each in task.plan.keep]
+    scene = attempt.watcher.look_at(AHEAD)
+    spot = free_spot(scene, task.plan.arm, kept, '')
+    if spot is None:
+        raise ManoeuvreError('the wrong thing is in the hand, and there is no room for it')
+    there = np.array([spot[0], spot[1], place[2]])
+    put_down(attempt, there, attempt.watcher.look_at(there).surface_at(there))
 
 
 def _clear(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
@@ -145,7 +168,8 @@ def _clear(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     if kept and arm == task.plan.arm:
         raise ManoeuvreError('{} is in the way, and no hand is free for it'.format(thing.name))
     name = thing.name
-    move_aside(take_wheel(arm), lambda scene: scene.named(name), thing.box.centre, kept)
+    move_aside(take_wheel(arm), lambda scene: scene.named(name), thing.box.centre,
+               kept + [np.array(each) for each in task.plan.keep])
 
 
 def _closer(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:

@@ -6,6 +6,7 @@ is lost, a person still tells about where a thing stands, by what it stands on.
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+from scipy import ndimage
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.camera_image import CameraImage
@@ -17,6 +18,9 @@ ON_SURFACE = 0.008  # m: what is not higher belongs to the surface
 LEAST_DEPTH = 25  # pixels of an outline with a depth
 LEVEL = 0.01  # m, of a surface
 LEAST_SURFACE = 60  # points
+ROBOT = 'robot'  # the name under which its limbs are recognised
+BESIDE = 0.015  # of the image's width: a limb that near a thing hinders
+LEAST_LIMB = 0.0003  # of the image's pixels
 FLOOR = 0.25  # m: things are put on furniture, which is higher
 STANDING = 0.03  # m between the lowest point that is seen of a thing and what it stands on
 WELL_SEEN = 0.2  # of the points of the level with the most of them
@@ -58,6 +62,7 @@ class SeenScene(NamedTuple):
 
     things: List[SeenThing]
     image: CameraImage
+    limbs: Optional[np.ndarray] = None  # (h, w) bool: where the robot's own limbs are seen
 
     def wanted(self) -> Optional[SeenThing]:
         """The thing that the task is about, where it is seen."""
@@ -66,6 +71,14 @@ class SeenScene(NamedTuple):
     def named(self, name: str) -> Optional[SeenThing]:
         """The thing of that name, where it is seen."""
         return next((thing for thing in self.things if thing.name == name), None)
+
+    def covered(self, thing: SeenThing) -> bool:
+        """Whether a limb of the robot is seen right beside a thing, or before it."""
+        if self.limbs is None:
+            return False
+        beside = ndimage.binary_dilation(
+            thing.mask, iterations=max(1, round(BESIDE * thing.mask.shape[1])))
+        return int((beside & self.limbs).sum()) > LEAST_LIMB * thing.mask.size
 
     def heights(self) -> Dict[str, float]:
         """How tall (m) the things are that are seen standing, by name."""
@@ -110,6 +123,8 @@ class SeenScene(NamedTuple):
     def _free_points(self) -> np.ndarray:
         """(n, 3) m: measured points that belong to no thing."""
         free = np.isfinite(self.image.depth)
+        if self.limbs is not None:
+            free &= ~self.limbs
         for thing in self.things:
             if thing.movable:
                 free &= ~thing.mask
@@ -121,10 +136,14 @@ class SeenScene(NamedTuple):
 def seen_scene(image: CameraImage, outlines: Sequence[Outline]) -> SeenScene:
     """What a person makes of an image and the outlines recognised in it."""
     points = points_of(image.depth, image.intrinsics, image.base_from_camera)
+    limbs = next((each.mask for each in outlines if each.name == ROBOT), None)
+    outlines = [each for each in outlines if each.name != ROBOT]
     taken = np.zeros(image.depth.shape, bool)
     for outline in outlines:
         taken |= outline.mask
-    return SeenScene([_seen(image, points, taken, outline) for outline in outlines], image)
+    if limbs is not None:
+        taken |= limbs
+    return SeenScene([_seen(image, points, taken, outline) for outline in outlines], image, limbs)
 
 
 def _seen(image: CameraImage, points: np.ndarray, taken: np.ndarray,

@@ -15,7 +15,7 @@ SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
 # means, and the interface of each by the name under which the oracle's settings offer it
 MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
 _TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave')
-_MOST_LOOKS = 10
+_MOST_POINTS = 10
 Point = Tuple[float, float, float]
 
 
@@ -37,6 +37,7 @@ class StatePlan(NamedTuple):
     # m, m, rad along its own axes, by which the base is driven, where nothing else helps; 0: never
     base: Point = (0.0, 0.0, 0.0)
     look: Tuple[Point, ...] = ()  # m, base_footprint: where a person looks for the thing
+    keep: Tuple[Point, ...] = ()  # likewise: where nothing is put that is moved aside
 
 
 class StatePlans:
@@ -81,11 +82,15 @@ def _plan(state: str, value: object) -> StatePlan:
         raise SettingsError(state, dict(value), 'either place or onto')
     whole(1, 'a number from 1 to 20', 20)(state + '.tries', value.get('tries', 2))
     flag(state + '.inside', value.get('inside', False))
-    looks = value.get('look', [])
-    if not isinstance(looks, (list, tuple)) or len(looks) > _MOST_LOOKS:
-        raise SettingsError(state + '.look', looks, 'a list of up to {} points'.format(_MOST_LOOKS))
     return StatePlan(**dict(value, base=_point(state + '.base', value.get('base', [0, 0, 0])),
-                            look=tuple(_point(state + '.look', each) for each in looks)))
+                            look=_points(state + '.look', value.get('look', [])),
+                            keep=_points(state + '.keep', value.get('keep', []))))
+
+
+def _points(key: str, value: object) -> Tuple[Point, ...]:
+    if not isinstance(value, (list, tuple)) or len(value) > _MOST_POINTS:
+        raise SettingsError(key, value, 'a list of up to {} points'.format(_MOST_POINTS))
+    return tuple(_point(key, each) for each in value)
 
 
 def _point(key: str, value: object) -> Point:

@@ -86,7 +86,8 @@ class DirectWatcher:
 
     def look(self, *names):
         image = see(self._world)
-        found = recognised(view_of(self._world, image.colour), self._world.movable() + list(names))
+        found = recognised(view_of(self._world, image.colour),
+                           self._world.movable() + ['robot', *names])
         wanted = self._world.scene.goal.body
         return seen_scene(image, [
             Outline(name, name == wanted, name in self._world.movable(), mask)

@@ -61,16 +61,20 @@ def test_what_is_seen_is_shown_and_what_is_not_seen_is_looked_for_elsewhere():
     assert [act for act, _ in course('DETECT', seen_without_depth, 3)] == [MARK, WAIT, MARK]
 
 
+def test_a_limb_that_is_in_the_way_is_sent_aside_first_but_once_alone():
+    assert course('DETECT', Sight(covered=True), 2) == [(HIDDEN, 'ARMS'), (MARK, 'perception')]
+
+
 def test_what_stands_too_close_is_moved_aside_and_then_the_machine_goes_back():
-    assert course('PICK', Sight(crowded=True), 2, worked=True) == [
-        (CLEAR, 'manipulation'), (BACK, 'DETECT')]
-    assert course('DETECT', Sight(crowded=True), 1) == [(CLEAR, 'manipulation')]
+    acts = course('PICK', Sight(crowded=True), 3, worked=True)
+    assert acts == [(BY_HAND, 'manipulation'), (CLEAR, 'manipulation'), (BACK, 'DETECT')]
+    assert [act for act, _ in course('DETECT', Sight(crowded=True), 2)] == [MARK, CLEAR]
     assert course('PLACE', Sight(holds=True, blocked=True), 1) == [(CLEAR, 'manipulation')]
 
 
 def test_where_it_could_not_be_moved_something_else_is_done():
-    acts = [act for act, _ in course('PICK', Sight(crowded=True), 3)]
-    assert acts[0] == CLEAR and CLEAR not in acts[1:]
+    acts = [act for act, _ in course('PICK', Sight(crowded=True), 4)]
+    assert acts[1] == CLEAR and CLEAR not in acts[2:]
 
 
 def test_what_is_out_of_reach_is_put_nearer_and_nobody_grasps_for_it_first():

@@ -69,3 +69,17 @@ def test_what_stands_close_or_on_the_place_is_in_the_way_and_there_is_room_elsew
     assert spot is not None
     assert all(np.hypot(spot[0] - body.position[0], spot[1] - body.position[1]) > 0.1
                for body in scene.bodies if body.mass > 0 and body.name != 'object_2')
+
+
+def test_an_arm_before_a_thing_is_seen_as_one(world):
+    scene = next(each for each in map(draw, range(400))
+                 if [cause.kind for cause in each.causes] == ['arm_in_view'])
+    world.reset(scene)
+    watcher = DirectWatcher(world)
+    world.step(200)  # the arm is pushed there once the head has turned
+    free = watcher.look()
+    watcher.look_at(LOOK)
+    world.step(200)
+    over = watcher.look()
+    assert free.wanted() is None or not free.covered(free.wanted())
+    assert over.wanted() is None or over.covered(over.wanted())

@@ -39,7 +39,7 @@ def view_of(world: World, colour: np.ndarray) -> SeenView:
     names = {int(number): world.seen_as(int(number)) for number in numbers}
     return SeenView(colour, world.labels, {
         number: name
-        for number, name in names.items() if name not in ('', 'robot', 'floor')
+        for number, name in names.items() if name not in ('', 'floor')
     }, world.periods, world.scene.seed)
 
 
