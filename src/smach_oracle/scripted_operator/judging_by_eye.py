@@ -11,6 +11,7 @@ from .robot_means import RobotMeans
 from .seen_scene import SeenScene, SeenThing
 from .state_plans import PUT_DOWN, RETRY, TAKE, StatePlan
 
+_MOVED = 0.035  # m: what is seen that far from where it was detected is elsewhere
 _REACHED_INSIDE = 0.95  # m from the robot's middle, of a thing on a shelf
 
 
@@ -38,16 +39,26 @@ def look_about(plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene,
                                 covered=thing is not None and scene.covered(thing)), AHEAD)
     reachable = plan.means != TAKE or _reaches(plan, thing.box.centre)
     sight = Sight(holds=holds, crowded=in_the_way(scene, thing) is not None,
-                  covered=scene.covered(thing) and not holds, reachable=reachable)
+                  covered=scene.covered(thing) and not holds, reachable=reachable,
+                  moved=_moved(detected_in(plan, userdata), thing.box.centre))
     return Impression(sight, thing.box.centre)
 
 
 def _where_to_look(plan: StatePlan, userdata: Mapping[str, Any]) -> List[np.ndarray]:
     """Points (3,) m: where the robot has detected the thing, and those of the settings."""
-    detected = userdata.get(plan.what)
-    point = point_in_base(detected[0] if isinstance(detected, list) and detected else detected)
+    point = detected_in(plan, userdata)
     points = [np.array(each) for each in plan.look] or [AHEAD]
     return points if point is None else [point] + points
+
+
+def detected_in(plan: StatePlan, userdata: Mapping[str, Any]) -> Optional[np.ndarray]:
+    """(3,) m: where the robot has detected the thing, or None."""
+    detected = userdata.get(plan.what)
+    return point_in_base(detected[0] if isinstance(detected, list) and detected else detected)
+
+
+def _moved(detected: Optional[np.ndarray], seen: np.ndarray) -> bool:
+    return detected is not None and float(np.hypot(*(detected - seen)[:2])) > _MOVED
 
 
 def _search(points: Sequence[np.ndarray], first: SeenScene,

@@ -32,6 +32,7 @@ class Sight(NamedTuple):
     crowded: bool = False  # another thing stands close beside it
     blocked: bool = False  # another thing stands where something shall be put
     covered: bool = False  # a limb of the robot is right beside it, or before it
+    moved: bool = False  # it stands elsewhere than where the robot has detected it
     reachable: bool = True  # the hand of the plan reaches the thing
 
 
@@ -85,6 +86,7 @@ _LADDERS: Dict[str, List[Rung]] = {
     ],
     TAKE: [
         Rung(HIDDEN, 1, lambda sight: sight.covered),
+        Rung(BACK, 1, lambda sight: sight.moved and not sight.holds),
         Rung(BY_HAND, 1, lambda sight: sight.located and sight.reachable),
         Rung(CLEAR, 1, lambda sight: sight.located and sight.crowded),
         Rung(CLOSER, 2, lambda sight: sight.located and not sight.reachable),

@@ -77,6 +77,12 @@ def test_where_it_could_not_be_moved_something_else_is_done():
     assert acts[1] == CLEAR and CLEAR not in acts[2:]
 
 
+def test_what_stands_elsewhere_than_detected_is_detected_anew_before_it_is_taken():
+    acts = course('PICK', Sight(moved=True), 2)
+    assert acts == [(BACK, 'DETECT'), (BY_HAND, 'manipulation')]
+    assert course('PICK', Sight(moved=True, holds=True), 1) == [(BY_HAND, 'manipulation')]
+
+
 def test_what_is_out_of_reach_is_put_nearer_and_nobody_grasps_for_it_first():
     acts = course('PICK', Sight(reachable=False), 2, worked=True)
     assert acts == [(CLOSER, 'manipulation'), (BACK, 'DETECT')]
