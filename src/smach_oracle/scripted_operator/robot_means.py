@@ -69,7 +69,8 @@ class RobotMeans:
         self.turn_head(point)
         self.pass_time(_GLANCE_S)
         scene = self._eye.look(*names)
-        self._tall.update(scene.heights())
+        for name, height in scene.heights().items():  # one that lies was taller before
+            self._tall[name] = max(height, self._tall.get(name, 0.0))
         return scene
 
     def forget(self) -> None:

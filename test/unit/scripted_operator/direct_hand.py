@@ -97,7 +97,8 @@ class DirectWatcher:
     def look_at(self, point, *names):
         self._robot.look_at(point)
         scene = self.look(*names)
-        self._tall.update(scene.heights())
+        for name, height in scene.heights().items():
+            self._tall[name] = max(height, self._tall.get(name, 0.0))
         return scene
 
     def tall(self, name):

@@ -1,6 +1,8 @@
 """The scripted operator's hand in the world, without ROS: it takes things, puts them down, and
 knows when it failed.
 """
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from direct_hand import DirectHand, DirectWatcher
@@ -11,11 +13,12 @@ from smach_oracle.scripted_operator.hand_driver import HandDriver, StuckError
 from smach_oracle.scripted_operator.manoeuvres import (
     Attempt,
     ManoeuvreError,
+    _check_stands,
     grasps,
     pick,
     put_down,
 )
-from smach_oracle.scripted_operator.seen_scene import SeenScene
+from smach_oracle.scripted_operator.seen_scene import SeenScene, SeenThing
 from smach_oracle.simulation.physics.judge import judge
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.scenes.tabletop_scene import GOAL, TABLE_TOP, draw
@@ -86,3 +89,18 @@ def test_grasps_avoid_what_stands_beside_and_before():
                np.arctan2(*alone[1::-1, 0])) > 0.2 or past[2, 0] < alone[2, 0] - 0.2
     wide = can._replace(size=np.array([0.2, 0.2, 0.12]))
     assert grasps(wide, [], 'right') == []
+
+
+@pytest.mark.parametrize('tall, beside, says', [(0.12, 0.0, ''), (0.06, 0.0, 'lies at its place'),
+                                                (0.12, 0.08, '8 cm beside')])
+def test_what_was_put_down_is_looked_at(tall, beside, says):
+    place = np.array([0.6, -0.3, 0.78])
+    box = UprightBox(place + [beside, 0.0, 0.0], np.array([0.06, 0.06, tall]), 0.0)
+    seen = SeenScene([SeenThing('can', True, True, (0, 0, 1, 1), np.ones((1, 1), bool), box)], None)
+    watcher = SimpleNamespace(look_at=lambda point: seen, tall=lambda name: 0.12)
+    looked = Attempt(None, watcher, 0, lambda: np.zeros(3))
+    if not says:
+        _check_stands(looked, 'can', place)
+        return
+    with pytest.raises(ManoeuvreError, match=says):
+        _check_stands(looked, 'can', place)
