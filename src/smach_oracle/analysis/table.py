@@ -4,11 +4,12 @@ Definitions: doc/statistics.md.
 """
 import csv
 import json
-from typing import IO, Any, Dict, List, Sequence
+from typing import IO, Any, Dict, List, Optional, Sequence
 
 from .bag_events import SkippedBag
 from .causes import cause_rows, format_causes
 from .trials import TrialSummary
+from .truth import Truth
 from .variants import (
     ANSWERED,
     ENDED_IN_FAILURE,
@@ -146,11 +147,18 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
              if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth', 'unwell_s')]
     writer = csv.writer(target, lineterminator='\n')
     writer.writerow(plain + ['seed', 'causes', 'true_success', 'why', 'sim_s', 'wall_s',
-                             'unwell_s'])
+                             'unwell_s', 'wrong_object', 'damage'])
     for trial in trials:
         data = _trial_data(trial)
         cause, truth = trial.cause, trial.truth
         world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
         world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
         writer.writerow(['' if data[name] is None else data[name] for name in plain] + world
-                        + [trial.unwell_s])
+                        + [trial.unwell_s] + _harm(truth))
+
+
+def _harm(truth: Optional[Truth]) -> List[Any]:
+    """The wrong object, and how often something came to harm; '' where that is not known."""
+    if truth is None or truth.damage is None:
+        return ['', '']
+    return [truth.wrong_object, len(truth.damage)]

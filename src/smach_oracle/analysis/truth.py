@@ -1,7 +1,7 @@
 """The world's own record of how each trial ended: `truth.jsonl` beside the bags.
 
-One JSON object a line: {"seed", "task", "success", "why", "causes": [{"kind", "text"}], "sim_s",
-"wall_s", "share"}.
+One JSON object a line: {"seed", "task", "success", "why", "wrong_object", "damage", "causes":
+[{"kind", "text"}], "sim_s", "wall_s", "share"}. Older lines have no "wrong_object" and "damage".
 """
 import json
 import os
@@ -11,11 +11,14 @@ from .bag_events import BagError
 
 TRUTH_FILE = 'truth.jsonl'
 # by name: the types that are allowed, and their name
-_FIELDS: Mapping[str, Tuple[Tuple[type, ...], str]] = {
+DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds; each lists names of things
+Allowed = Mapping[str, Tuple[Tuple[type, ...], str]]
+_FIELDS: Allowed = {
     'seed': ((int,), 'an int'), 'task': ((str,), 'a str'), 'success': ((bool,), 'a bool'),
     'why': ((str,), 'a str'), 'causes': ((list,), 'a list'), 'sim_s': ((int, float), 'a number'),
     'wall_s': ((int, float), 'a number'), 'share': ((dict,), 'a dict')
 }
+_LATER_FIELDS: Allowed = {'wrong_object': ((str,), 'a str'), 'damage': ((dict,), 'a dict')}
 
 
 class Truth(NamedTuple):
@@ -29,6 +32,14 @@ class Truth(NamedTuple):
     sim_s: float  # simulated time that the trial took
     wall_s: float  # time that it took
     share: Mapping[str, float]  # of wall_s, per part of the simulation
+    wrong_object: str = ''  # another thing than the task's own that was brought to the goal
+    # kind (one of DAMAGE) and thing, once for each time; None: the line is older than that
+    damage: Optional[Tuple[Tuple[str, str], ...]] = None
+
+    @property
+    def false_success(self) -> bool:
+        """Whether the goal was met with another thing than the one that was meant."""
+        return bool(self.wrong_object)
 
 
 def read_truth(path: str) -> Dict[int, Truth]:
@@ -66,7 +77,8 @@ def _parse(line: str, where: str) -> Truth:
         raise BagError('{}: not JSON: {}'.format(where, err)) from err
     if not isinstance(data, dict):
         raise BagError('{}: not a JSON object'.format(where))
-    for name, (kinds, allowed) in _FIELDS.items():
+    later = {name: each for name, each in _LATER_FIELDS.items() if name in data}
+    for name, (kinds, allowed) in {**_FIELDS, **later}.items():
         value = data.get(name)
         is_bool = isinstance(value, bool)
         if not isinstance(value, kinds) or (is_bool and bool not in kinds):
@@ -74,7 +86,16 @@ def _parse(line: str, where: str) -> Truth:
                 where, name, value, allowed))
     return Truth(data['seed'], data['task'], data['success'], data['why'],
                  _causes(data['causes'], where), float(data['sim_s']), float(data['wall_s']),
-                 _shares(data['share'], where))
+                 _shares(data['share'], where), data.get('wrong_object', ''),
+                 _damage(data['damage'], where) if 'damage' in data else None)
+
+
+def _damage(by_kind: Mapping[str, Any], where: str) -> Tuple[Tuple[str, str], ...]:
+    things = {kind: by_kind.get(kind, []) for kind in DAMAGE}
+    if not all(isinstance(names, list) for names in things.values()):
+        raise BagError('{}: damage: {!r} is not allowed; allowed: lists of names by {}'.format(
+            where, by_kind, ', '.join(DAMAGE)))
+    return tuple((kind, str(name)) for kind, names in things.items() for name in names)
 
 
 def _causes(items: Iterable[Any], where: str) -> Tuple[Tuple[str, str], ...]:

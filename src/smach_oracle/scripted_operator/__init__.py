@@ -1,4 +1,5 @@
-"""A scripted operator who answers questions with the interfaces that people use.
+"""A scripted operator who answers questions with the means that people have.
 
-It sees the world as it truly is, and works through the perception and manipulation interfaces.
+It sees what a person would in the robot's images, and works through the perception and manipulation
+interfaces, and by the head and the base.
 """

@@ -49,9 +49,10 @@ class PerceptionClient:
         self._segment = rospy.ServiceProxy(interface + '/segment', SegmentObject)
         self._use_frame = rospy.ServiceProxy(interface + '/use_frame', UseFrame)
 
-    def take_image(self, limit_s: float) -> None:
+    def take_image(self, limit_s: float) -> rospy.Time:
         """Have a fresh image shown, waiting at most so long (wall time) for the interface to begin.
 
+        :returns: its stamp.
         :raises GoalEndedError: where it does not, or gets no image.
         """
         def use_fresh() -> UseFrameResponse:
@@ -63,6 +64,7 @@ class PerceptionClient:
         answer = until(use_fresh, shows, limit_s)
         if not answer.ok:
             raise GoalEndedError('the perception interface shows nothing: ' + answer.message)
+        return answer.stamp
 
     def segment(self, region: Region, strokes: Sequence[OperatorStroke]) -> MarkedResult:
         """See showing.SegmentCall."""
@@ -73,9 +75,9 @@ class PerceptionClient:
             for line in strokes
         ]
         answer = self._segment(request)
-        at, size = answer.object.pose.position, answer.size
-        return MarkedResult(answer.ok, answer.message, np.array([at.x, at.y, at.z]),
-                            np.array([size.x, size.y, size.z]))
+        mask = answer.mask
+        shown = np.frombuffer(mask.data, np.uint8).reshape(mask.height, mask.width) > 0
+        return MarkedResult(answer.ok, answer.message, shown if shown.size else None)
 
 
 def until(call: Callable[[], T], holds: Callable[[T], bool], limit_s: float) -> T:

@@ -1,5 +1,5 @@
 """Work by hand in place of the robot: take a thing, put it down."""
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.transforms import from_rpy, transform
 
 from .hand_driver import HandDriver, StuckError
-from .true_scene import TrueBody, TrueScene
+from .seen_scene import SeenScene, SeenThing
 
 # m, before the chest
 READY = {'right': np.array([0.52, -0.22, 1.0]), 'left': np.array([0.52, 0.22, 1.0])}
@@ -20,11 +20,33 @@ CLEAR_OF = 0.07  # m beside the middle of the hand that neighbours should be awa
 _TURNS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad beside the straight heading
 _PITCHES = (0.45, 0.9, 0.15)  # rad downwards
 _LEVEL = (0.1, 0.3)  # the same, inside a shelf
+_WAYS = 3  # of taking a thing, that are tried one after the other, where the arm gets stuck
 _OFF_SHELF = 0.03  # m that a thing is lifted inside a shelf
 _SQUEEZE = 90.0  # N: the robot, which grips with less, may have lost it before
 OUT = 0.28  # m straight back out of a shelf
 
-ReadScene = Callable[[], TrueScene]
+HELD = (0.006, 0.079)  # m between the tips, where there is something between them
+HALF_TALL = 0.06  # m, of a thing of which nothing is seen in the hand
+UNTIL_IT_TOUCHES = 0.06  # m that a hand is lowered at most until what it holds touches
+LIES = 0.75  # of its height: what is seen lower has fallen over
+IN_HAND = 0.13  # m from the tool to the middle of what is in the hand
+FAR = 0.95  # m from the shoulder, which no hand reaches
+
+
+class Watcher(Protocol):
+    """What a person sees and feels while driving a hand."""
+
+    def look_at(self, point: np.ndarray, *names: str) -> SeenScene:
+        """Turn the head to a point (3,) m, base_footprint, and look.
+
+        :param names: of furniture that is looked for besides the things.
+        """
+
+    def gap(self, arm: str) -> float:
+        """m between the finger tips of an arm."""
+
+    def tall(self, name: str) -> Optional[float]:
+        """How tall a thing is (m), where it was seen standing in this trial, or None."""
 
 
 class ManoeuvreError(Exception):
@@ -35,62 +57,116 @@ class Attempt(NamedTuple):
     """One try at a state's work by hand."""
 
     driver: HandDriver
-    read_scene: ReadScene
+    watcher: Watcher
     number: int  # of tries before this one
     slip: Callable[[], np.ndarray]  # (3,) m, by how much a person misjudges a place
 
+    @property
+    def holds(self) -> bool:
+        """Whether there is something between the fingers."""
+        return HELD[0] < self.watcher.gap(self.driver.hand.arm) < HELD[1]
 
-def pick(attempt: Attempt, target: Callable[[TrueScene], Optional[TrueBody]]) -> None:
+
+Target = Callable[[SeenScene], Optional[SeenThing]]
+
+
+def found(attempt: Attempt, target: Target, about: np.ndarray) -> Tuple[SeenScene, SeenThing]:
+    """A thing, and all that is seen, with the head turned to it.
+
+    :param about: (3,) m, where it is looked for first.
+    :raises ManoeuvreError: where it is not seen, or nobody can tell where it is.
+    """
+    thing = None
+    for _ in range(2):
+        scene = attempt.watcher.look_at(about)
+        thing = target(scene)
+        if thing is None or thing.box is None:
+            break
+        about = thing.box.centre
+    if thing is None or thing.box is None:
+        raise ManoeuvreError('there is nothing to take: it cannot be seen')
+    return scene, thing
+
+
+def pick(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     """Take a thing and lift it.
 
-    :param target: finds it in the scene.
+    :param target: finds it in what is seen.
+    :param about: (3,) m, where it is looked for.
     :raises ManoeuvreError: where it is not in the hand in the end.
     :raises StuckError: where the hand does not get there.
     """
-    driver, arm = attempt.driver, attempt.driver.hand.arm
-    scene = attempt.read_scene()
-    if scene.held_by(arm) is None:
-        thing = target(scene)
-        if thing is None:
-            raise ManoeuvreError('there is nothing to take')
-        _fetch(attempt, scene, thing)
-    driver.shift(z=LIFT, share=0.5)
-    driver.rest(10)
-    if attempt.read_scene().held_by(arm) is None:
+    if not attempt.holds:
+        _fetch(attempt, *found(attempt, target, about))
+    attempt.driver.shift(z=LIFT, share=0.5)
+    attempt.driver.rest(10)
+    if not attempt.holds:
         raise ManoeuvreError('it slipped out of the hand')
 
 
-def _fetch(attempt: Attempt, scene: TrueScene, thing: TrueBody) -> None:
+def _fetch(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
     driver = attempt.driver
-    ways = grasps(thing.box, [other.box for other in scene.movable() if other.name != thing.name],
-                  driver.hand.arm)
-    if not ways:
-        raise ManoeuvreError('{} is too wide for the hand'.format(thing.name))
-    grasp = ways[attempt.number % len(ways)]
-    grasp[:3, 3] += attempt.slip()
+    top = thing.bottom + float(_box(thing).size[2])
     driver.open()
-    come_out(driver, thing.top)
-    before = transform(grasp[:3, 3] - BEFORE * grasp[:3, 0], grasp[:3, :3])
-    above = before.copy()
-    above[2, 3] = max(above[2, 3], thing.top + 0.10)
-    driver.go(above, near=(0.04, 0.2))
-    driver.go(before)
-    driver.go(grasp, share=0.4, near=(0.006, 0.05))
+    for last, grasp in enumerate(_grasps_to_try(attempt, scene, thing), 1 - _WAYS):
+        come_out(driver, top)
+        try:
+            _approach(driver, grasp, top)
+            break
+        except StuckError:
+            if last == 0:
+                raise
     grip = driver.close()
-    if not grip.stalled or attempt.read_scene().held_by(driver.hand.arm) is None:
+    if not grip.stalled or not attempt.holds:
         driver.open()
         driver.back(BEFORE)
         raise ManoeuvreError('the hand closed on nothing')
+
+
+def _approach(driver: HandDriver, grasp: np.ndarray, top: float) -> None:
+    """Bring the open hand around a thing: above the place before it, down, and straight in."""
+    before = transform(grasp[:3, 3] - BEFORE * grasp[:3, 0], grasp[:3, :3])
+    above = before.copy()
+    above[2, 3] = max(above[2, 3], top + 0.10)
+    driver.go(above, near=(0.04, 0.2))
+    driver.go(before)
+    driver.go(grasp, share=0.4, near=(0.006, 0.05))
+
+
+def _grasps_to_try(attempt: Attempt, scene: SeenScene, thing: SeenThing,
+                   pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
+    """How the hand shall take a thing: another way at each try, and misjudged a little.
+
+    :returns: _WAYS of them, perhaps the same again.
+    :raises ManoeuvreError: where there is no way.
+    """
+    arm, box = attempt.driver.hand.arm, _box(thing)
+    if float(np.hypot(*(box.centre[:2] - SHOULDER[arm]))) > FAR:
+        raise ManoeuvreError('{} is out of reach'.format(thing.name))
+    ways = grasps(box, scene.boxes_but(thing.name), arm, pitches)
+    if not ways:
+        raise ManoeuvreError('{} is too wide for the hand'.format(thing.name))
+    chosen = [ways[(_WAYS * attempt.number + number) % len(ways)].copy() for number in range(_WAYS)]
+    missed = attempt.slip()
+    for grasp in chosen:
+        grasp[:3, 3] += missed
+    return chosen
+
+
+def _box(thing: SeenThing) -> UprightBox:
+    if thing.box is None:
+        raise ManoeuvreError('nobody can tell where {} is'.format(thing.name))
+    return thing.box
 
 
 def come_out(driver: HandDriver, height: float) -> None:
     """Take the hand out from among things: back, up over `height` m, and before the chest."""
     tool = driver.hand.tool()
     if tool[0, 3] > 0.45 and tool[2, 3] < height + 0.12:
-        _as_far_as_it_goes(lambda: driver.back(0.10))
-        _as_far_as_it_goes(lambda: driver.shift(z=height + 0.15 - tool[2, 3]))
+        as_far_as_it_goes(lambda: driver.back(0.10))
+        as_far_as_it_goes(lambda: driver.shift(z=height + 0.15 - tool[2, 3]))
     elif tool[2, 3] < height + 0.05:
-        _as_far_as_it_goes(lambda: driver.shift(z=height + 0.10 - tool[2, 3]))
+        as_far_as_it_goes(lambda: driver.shift(z=height + 0.10 - tool[2, 3]))
     driver.come_to(READY[driver.hand.arm] +
                    [0.0, 0.0, max(0.0, height + 0.1 - READY[driver.hand.arm][2])])
 
@@ -136,55 +212,85 @@ def _beside(pose: np.ndarray, other: UprightBox) -> float:
     return float(abs(offset @ np.array([-way[1], way[0]])) - other.wide / 2)
 
 
-def put_down(attempt: Attempt, place: np.ndarray) -> None:
+class InHand(NamedTuple):
+    """What the hand holds, as far as it is seen."""
+
+    centre: np.ndarray  # (3,) m
+    half: float  # m from its middle down to its lowest point
+    name: str  # '': nothing of it is seen
+
+
+def put_down(attempt: Attempt, place: np.ndarray, surface: Optional[float]) -> None:
     """Put what the hand holds down upright.
 
     :param place: (3,) m, where its centre shall be, in base_footprint; it comes to stand on what is
         below.
+    :param surface: m, how high that is; None: as far as the hand gets.
     :raises ManoeuvreError: where it does not stand there in the end.
     :raises StuckError: where the hand does not get there.
     """
-    driver, arm = attempt.driver, attempt.driver.hand.arm
-    thing = attempt.read_scene().held_by(arm)
-    if thing is None:
+    driver = attempt.driver
+    if not attempt.holds:
         raise ManoeuvreError('the hand holds nothing')
-    carry(attempt, thing, place + [0.0, 0.0, 0.10])
-    thing = _in_hand(attempt, arm)
-    support = attempt.read_scene().support_below(thing)
-    down = thing.bottom - (support.top if support is not None else place[2] - thing.size[2] / 2)
-    offset = (place - thing.centre)[:2] + attempt.slip()[:2]
+    held = _look_at_hand(attempt)
+    level = surface if surface is not None else float(place[2]) - held.half
+    _carry(attempt, held, np.array([place[0], place[1], level + held.half + 0.10]))
+    if not attempt.holds:
+        raise ManoeuvreError('it was lost on the way')
+    held = _look_at_hand(attempt)
+    offset = (place - held.centre)[:2] + attempt.slip()[:2]
     driver.shift(offset[0], offset[1], share=0.5)
-    _as_far_as_it_goes(lambda: driver.shift(z=-down + 0.004, share=0.3))
+    down = float(held.centre[2]) - held.half - level
+    as_far_as_it_goes(lambda: driver.shift(z=0.02 - down, share=0.5))
+    # until it touches: its lower end is hidden by the hand
+    as_far_as_it_goes(lambda: driver.shift(z=-UNTIL_IT_TOUCHES, share=0.1))
     let_go(driver)
-    left = attempt.read_scene().bodies.get(thing.name)
-    if left is None:
-        raise ManoeuvreError('{} is gone'.format(thing.name))
-    _check_stands(left, place)
+    _check_stands(attempt, held.name, place)
 
 
-def carry(attempt: Attempt, thing: TrueBody, centre: np.ndarray) -> None:
-    """Carry a thing until its centre is at (3,) m: up, then across, turning with the arm.
+def wrong_thing(attempt: Attempt) -> str:
+    """The name of what is seen in the hand, where that is another thing than the wanted one."""
+    tool = attempt.driver.hand.tool()[:3, 3]
+    scene = attempt.watcher.look_at(tool)
+    held = scene.near(tool, IN_HAND)
+    known = any(thing.wanted for thing in scene.things)
+    return held.name if held is not None and not held.wanted and known else ''
 
-    :raises ManoeuvreError: where it is lost, or the hand does not get there.
+
+def _look_at_hand(attempt: Attempt) -> InHand:
+    """What the hand holds: between its fingers, as high as it is seen, as tall as it stood."""
+    tool = attempt.driver.hand.tool()[:3, 3]
+    thing = attempt.watcher.look_at(tool).near(tool, IN_HAND)
+    if thing is None or thing.box is None:
+        return InHand(tool, HALF_TALL, '')
+    half = (attempt.watcher.tall(thing.name) or 2 * HALF_TALL) / 2
+    high = thing.bottom + float(thing.box.size[2])
+    return InHand(np.array([tool[0], tool[1], high - half]), half, thing.name)
+
+
+def _carry(attempt: Attempt, held: InHand, centre: np.ndarray) -> None:
+    """Carry what is held until its centre is at (3,) m: up, then across, turning with the arm.
+
     :raises StuckError: where the hand does not get there.
     """
     driver, arm = attempt.driver, attempt.driver.hand.arm
-    rise = centre[2] - thing.centre[2]
+    rise = float(centre[2] - held.centre[2])
+    now = held.centre
     if rise > 0.02:
         driver.shift(z=rise, share=0.6)
-    tool, now = driver.hand.tool(), _in_hand(attempt, arm).centre
+        now = now + [0.0, 0.0, rise]
+    tool = driver.hand.tool()
     turn = _heading(centre, arm) - _heading(now, arm)
     goals = tuple(_carried(tool, now, centre, part * turn) for part in (1.0, 0.5, 0.0))
     _first_that_goes(driver, goals)
-    _in_hand(attempt, arm)
 
 
 def let_go(driver: HandDriver) -> None:
     """Open the gripper, and draw the hand back and up."""
     driver.open()
     driver.rest(5)
-    _as_far_as_it_goes(lambda: driver.back(0.13, share=0.4))
-    _as_far_as_it_goes(lambda: driver.shift(z=0.10))
+    as_far_as_it_goes(lambda: driver.back(0.13, share=0.4))
+    as_far_as_it_goes(lambda: driver.shift(z=0.10))
 
 
 def _carried(tool: np.ndarray, now: np.ndarray, centre: np.ndarray, turn: float) -> np.ndarray:
@@ -207,21 +313,19 @@ def _heading(point: np.ndarray, arm: str) -> float:
     return float(np.arctan2(*(point[:2] - SHOULDER[arm])[::-1]))
 
 
-def _in_hand(attempt: Attempt, arm: str) -> TrueBody:
-    thing = attempt.read_scene().held_by(arm)
-    if thing is None:
-        raise ManoeuvreError('it was lost on the way')
-    return thing
+def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
+    """Look whether a thing stands at its place; what is not seen is taken to stand there."""
+    thing = attempt.watcher.look_at(place).named(name)
+    if thing is None or thing.box is None:
+        return
+    beside = float(np.hypot(*(thing.box.centre - place)[:2]))
+    if beside > 0.05:
+        raise ManoeuvreError('{} is {:.0f} cm beside its place'.format(name, 100 * beside))
+    if float(thing.box.size[2]) < LIES * (attempt.watcher.tall(name) or 0.0):
+        raise ManoeuvreError('{} lies at its place'.format(name))
 
 
-def _check_stands(thing: TrueBody, place: np.ndarray) -> None:
-    beside = float(np.hypot(*(thing.centre - place)[:2]))
-    if not thing.upright or beside > 0.05 or thing.held:
-        raise ManoeuvreError('{} {} {:.0f} cm beside its place'.format(
-            thing.name, 'stands' if thing.upright else 'lies', 100 * beside))
-
-
-def _as_far_as_it_goes(drive: Callable[[], None]) -> None:
+def as_far_as_it_goes(drive: Callable[[], None]) -> None:
     """A motion that need not get all the way."""
     try:
         drive()
@@ -229,40 +333,33 @@ def _as_far_as_it_goes(drive: Callable[[], None]) -> None:
         return
 
 
-def pull_out(attempt: Attempt, target: Callable[[TrueScene], Optional[TrueBody]]) -> None:
+def pull_out(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     """Take a thing out of a shelf: level, straight in, lifted a little, straight back.
 
+    :param target: finds it in what is seen.
+    :param about: (3,) m, where it is looked for.
     :raises ManoeuvreError: where it is not in the hand in the end.
     :raises StuckError: where the hand does not get there.
     """
-    driver, arm = attempt.driver, attempt.driver.hand.arm
-    scene = attempt.read_scene()
-    if scene.held_by(arm) is None:
-        thing = target(scene)
-        if thing is None:
-            raise ManoeuvreError('there is nothing to take')
-        _reach_in(attempt, scene, thing)
-    _as_far_as_it_goes(lambda: driver.shift(z=_OFF_SHELF, share=0.3))
-    _as_far_as_it_goes(lambda: driver.shift(x=-OUT, share=0.4))
-    if attempt.read_scene().held_by(arm) is None:
+    driver = attempt.driver
+    if not attempt.holds:
+        _reach_in(attempt, *found(attempt, target, about))
+    as_far_as_it_goes(lambda: driver.shift(z=_OFF_SHELF, share=0.3))
+    as_far_as_it_goes(lambda: driver.shift(x=-OUT, share=0.4))
+    if not attempt.holds:
         raise ManoeuvreError('it slipped out of the hand')
 
 
-def _reach_in(attempt: Attempt, scene: TrueScene, thing: TrueBody) -> None:
-    driver = attempt.driver
-    others = [other.box for other in scene.movable() if other.name != thing.name]
-    level = grasps(thing.box, others, driver.hand.arm, _LEVEL)
-    if not level:
-        raise ManoeuvreError('{} is too wide for the hand'.format(thing.name))
-    grasp = level[attempt.number % len(level)]
-    grasp[:3, 3] += attempt.slip()
+def _reach_in(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
+    driver, centre = attempt.driver, _box(thing).centre
+    grasp = _grasps_to_try(attempt, scene, thing, _LEVEL)[0]
     driver.open()
-    _as_far_as_it_goes(lambda: driver.shift(
-        x=min(0.0, thing.centre[0] - OUT - driver.hand.tool()[0, 3]), share=0.5))
-    _as_far_as_it_goes(lambda: driver.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
+    as_far_as_it_goes(lambda: driver.shift(
+        x=min(0.0, centre[0] - OUT - driver.hand.tool()[0, 3]), share=0.5))
+    as_far_as_it_goes(lambda: driver.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
     driver.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
     driver.go(grasp, share=0.4, near=(0.006, 0.05))
-    if not driver.close(_SQUEEZE).stalled or attempt.read_scene().held_by(driver.hand.arm) is None:
+    if not driver.close(_SQUEEZE).stalled or not attempt.holds:
         driver.open()
         driver.back(OUT * 0.7)
         raise ManoeuvreError('the hand closed on nothing')

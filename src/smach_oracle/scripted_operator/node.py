@@ -17,25 +17,24 @@ from smach_oracle.ros.parameters import name_of, number_of
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
-from .ground_truth import GroundTruth, GroundTruthError
-from .manual_task import ManualTask, OperatorInterfaces, carry_out, connect, think
-from .showing import what_to_show
-from .state_plans import (
-    PUT_DOWN,
-    SHOW,
-    OperatorAnswer,
-    QuestionFacts,
-    StatePlan,
-    StatePlans,
-    choose_answer,
-    missing,
+from .image_viewer import ImageViewer, ViewError, ViewerTopics
+from .judging_by_eye import Impression, look_about
+from .ladder import Asked, NextAct, Sight, TrialMemory, choose
+from .manual_task import (
+    BASE,
+    InterfaceNames,
+    ManualTask,
+    OperatorInterfaces,
+    carry_out,
+    connect,
 )
+from .robot_means import MeansNames, RobotMeans
+from .seen_scene import SeenScene
+from .state_plans import StatePlan, StatePlans, missing
 from .topic_hand import GoalEndedError
-from .true_scene import TrueScene
 
 _PAUSE_S = 0.2
-_ATTEMPTS = 3  # at one question, where the world or its server does not answer
-_THINKING_S = 120.0  # wall time at most, where the clock stands
+_ATTEMPTS = 3  # at one question, where the camera or its server does not answer
 
 
 class OperatorSettings:
@@ -55,19 +54,37 @@ class OperatorSettings:
         self.manipulation = name_of('~manipulation', 'manipulation_interface')
         self.image = (int(number_of('~image_width', 640, 1,
                                     10000)), int(number_of('~image_height', 480, 1, 10000)))
+        self.eye = ViewerTopics(**{field: name_of('~' + field, default) for field, default
+                                in ViewerTopics._field_defaults.items()})
+        self.means = MeansNames(**{field: name_of('~' + field, default) for field, default
+                                   in MeansNames._field_defaults.items()})
+        self.grippers = grippers_of(rospy.get_param('~grippers', {}))
+
+
+def grippers_of(value: object) -> Dict[str, List[str]]:
+    """The joints of the grippers by arm.
+
+    :raises SettingsError: for anything but lists of names.
+    """
+    if not isinstance(value, dict) or not all(
+            isinstance(joints, list) and all(isinstance(each, str) for each in joints)
+            for joints in value.values()):
+        raise SettingsError('~grippers', value, 'a mapping from arms to lists of joints')
+    return {str(arm): list(joints) for arm, joints in value.items()}
 
 
 class ScriptedOperator:
     """Answers one question after the other."""
 
-    def __init__(self, settings: OperatorSettings, front_end: FrontEnd, world: GroundTruth,
+    def __init__(self, settings: OperatorSettings, front_end: FrontEnd, eye: ImageViewer,
                  interfaces: OperatorInterfaces) -> None:
         self._settings = settings
         self._front_end = front_end
-        self._world = world
+        self._eye = eye
         self._interfaces = interfaces
         self._trial: Tuple[str, str] = ('', '')
-        self._asked: Dict[str, int] = {}
+        self._memory = TrialMemory()
+        self._questions = 0  # of this trial
         self._done: List[str] = []  # keys of questions that were attended to
         # of these, the ones that came to nothing, once for each time
         self._failed_attempts: List[str] = []
@@ -88,7 +105,7 @@ class ScriptedOperator:
     def _attend_to(self, listed: ListedQuestion) -> None:
         try:
             self._answer(listed)
-        except (ServerGoneError, GroundTruthError, GoalEndedError, rospy.ServiceException) as err:
+        except (ServerGoneError, ViewError, GoalEndedError, rospy.ServiceException) as err:
             rospy.logwarn('%s of %s: %s', listed.goal.failed_state, listed.goal.container_path, err)
             self._front_end.release(listed)
             self._failed_attempts = self._failed_attempts[-99:] + [listed.key]
@@ -97,55 +114,69 @@ class ScriptedOperator:
 
     def _answer(self, listed: ListedQuestion) -> None:
         goal = listed.goal
-        number = self._count(listed)
-        scene = self._world.read_scene()
+        self._begin(listed)
+        scene = self._eye.look()
         generator = np.random.default_rng([
-            self._settings.seed, scene.seed,
-            zlib.crc32(goal.failed_state.encode()),
-            sum(self._asked.values())
+            self._settings.seed, self._eye.chance,
+            zlib.crc32(goal.failed_state.encode()), self._questions
         ])
         if not self._front_end.claim(listed).ok:
             return
-        think(
+        means = self._interfaces.means
+        means.pass_time(
             float(
                 generator.lognormal(math.log(max(self._settings.median_s, 1e-6)),
-                                    self._settings.sigma)),
-            _THINKING_S if self._settings.median_s > 0 else 0.0)
-        planned = self._plan_answer(listed, number, scene)
-        if not self._send_answer(listed, planned) or not planned.interface:
+                                    self._settings.sigma)))
+        userdata = userdata_of(goal.userdata)
+        choice, impression = self._decide(listed, userdata, scene)
+        self._prepare(choice)
+        if not self._send_answer(listed, choice):
+            return
+        number = self._memory.times(goal.failed_state, choice.act)
+        if not choice.interface:
+            self._memory.note(goal.failed_state, choice.act)
             return
         plan = self._settings.plans.of(goal.failed_state)
-        task = ManualTask(goal.query_id, plan, userdata_of(goal.userdata), number, generator)
+        task = ManualTask(goal.query_id, choice, plan, userdata, number, generator,
+                          impression.about)
         begun_s = time.monotonic()
-        wrong = carry_out(task, self._interfaces, self._world)
-        rospy.loginfo('%s by hand: %s (%.1f s)', goal.failed_state, wrong or 'done',
+        result = carry_out(task, self._interfaces)
+        self._memory.note(goal.failed_state, choice.act, result.worked)
+        rospy.loginfo('%s, %s: %s (%.1f s)', goal.failed_state, choice.act, result.text or 'done',
                       time.monotonic() - begun_s)
 
-    def _count(self, listed: ListedQuestion) -> int:
-        """How often this state was asked about in this trial before."""
+    def _begin(self, listed: ListedQuestion) -> None:
+        """Count the question; a new trial is begun with an empty memory."""
         goal = listed.goal
         if (goal.robot, goal.trial_id) != self._trial:
-            self._trial, self._asked = (goal.robot, goal.trial_id), {}
-        number = self._asked.get(goal.failed_state, 0)
-        self._asked[goal.failed_state] = number + 1
-        return number
+            self._trial = (goal.robot, goal.trial_id)
+            self._memory, self._questions = TrialMemory(), 0
+            self._interfaces.means.forget()
+        self._questions += 1
 
-    def _plan_answer(self, listed: ListedQuestion, number: int, scene: TrueScene) -> OperatorAnswer:
-        """The answer to a question."""
+    def _decide(self, listed: ListedQuestion, userdata: Dict[str, Any],
+                scene: SeenScene) -> Tuple[NextAct, Impression]:
+        """What to do about a question, after a look about."""
         goal = listed.goal
-        if sum(self._asked.values()) > self._settings.most_questions:
-            return OperatorAnswer(
-                why='{} questions in one trial are enough'.format(self._settings.most_questions))
         plan = self._settings.plans.of(goal.failed_state)
         offered = [offer.name for offer in goal.interfaces]
         self._warn(goal.failed_state, plan, offered)
-        facts = QuestionFacts(goal.failed_state,
-                              [choice.state
-                               for choice in goal.choices
-                               if not (choice.blocked or choice.container)], offered, number,
-                              plan.means != PUT_DOWN or scene.held_by(plan.arm) is not None,
-                              plan.means != SHOW or what_to_show(scene) is not None)
-        return choose_answer(plan, facts)
+        if self._questions > self._settings.most_questions:
+            return NextAct('give up', why='{} questions in one trial are enough'.format(
+                self._settings.most_questions)), Impression(Sight(), np.zeros(3))
+        impression = look_about(plan, userdata, scene, self._interfaces.means)
+        asked = Asked(goal.failed_state, [
+            choice.state for choice in goal.choices if not (choice.blocked or choice.container)
+        ], offered)
+        return choose(plan, asked, impression.sight, self._memory), impression
+
+    def _prepare(self, choice: NextAct) -> None:
+        """Do what comes before the machine goes on: wait, or drive the base."""
+        self._interfaces.means.pass_time(choice.wait_s)
+        if any(choice.base):
+            wrong = self._interfaces.means.drive(*choice.base)
+            if wrong:
+                rospy.logwarn('the base does not drive: %s', wrong)
 
     def _warn(self, state: str, plan: StatePlan, offered: List[str]) -> None:
         """Warn, once for each state, that it cannot be done as the settings want it."""
@@ -157,11 +188,11 @@ class ScriptedOperator:
                 'tried again '
                 'without.', state, plan.means, lacking, ', '.join(offered) or 'none')
 
-    def _send_answer(self, listed: ListedQuestion, planned: OperatorAnswer) -> bool:
+    def _send_answer(self, listed: ListedQuestion, planned: NextAct) -> bool:
         kind = (ExpertDecision.INTERFACE if planned.interface
                 else ExpertDecision.GOTO if planned.goto else ExpertDecision.GIVE_UP)
-        rospy.loginfo('%s failed (%s): %s', listed.goal.failed_state, listed.goal.text
-                      or listed.goal.outcome, planned.interface or planned.goto or 'given up')
+        rospy.loginfo('%s failed (%s): %s %s', listed.goal.failed_state, listed.goal.text
+                      or listed.goal.outcome, planned.act, planned.interface or planned.goto)
         answer = self._front_end.answer(listed, ExpertDecision(
             kind=kind, state=planned.goto, interface=planned.interface, why=planned.why))
         if not answer.ok:
@@ -196,6 +227,8 @@ def main() -> None:
     name = rospy.get_name().strip('/')
     front_end = FrontEnd(name)
     rospy.on_shutdown(front_end.stop)
-    interfaces = connect(settings.perception, settings.manipulation, name, settings.image,
-                         settings.rate_hz)
-    ScriptedOperator(settings, front_end, GroundTruth(), interfaces).run()
+    eye = ImageViewer(settings.eye, BASE)
+    means = RobotMeans(settings.means, settings.grippers, eye)
+    names = InterfaceNames(settings.perception, settings.manipulation, name)
+    interfaces = connect(names, eye, means, settings.image, settings.rate_hz)
+    ScriptedOperator(settings, front_end, eye, interfaces).run()

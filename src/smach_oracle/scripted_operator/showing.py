@@ -3,18 +3,13 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .true_scene import TrueBody, TrueScene
+from .seen_scene import Region, SeenThing
 
-LEAST_VISIBLE = 0.35  # share of a thing's outline that must be free, to show it
-LEAST_PIXELS = 12  # px of its width and height
 _USUAL_WIDTH = 640.0  # px of an image, for which these are
 _EDGE_SIGMA = 2.5  # px, by which a person misses each edge of the rectangle
 _MARGIN = 6  # px that a person leaves around it
-_TOO_FAR = 0.025  # m between the marked and the true middle that a person lets pass
-_TOO_LARGE = 0.035  # m between the marked and the true extents
+_ALIKE = 0.55  # of the pixels of mask and outline together, that both must have
 _TRIES = 4
-
-Region = Tuple[int, int, int, int]  # px: x, y, width, height
 
 
 class OperatorStroke(NamedTuple):
@@ -29,40 +24,31 @@ class MarkedResult(NamedTuple):
 
     ok: bool
     message: str
-    centre: np.ndarray  # (3,) m, in base_footprint
-    size: np.ndarray  # (3,) m
+    mask: Optional[np.ndarray]  # (h, w) bool, as it is shown to people; None: there is none
 
 
 SegmentCall = Callable[[Region, Sequence[OperatorStroke]], MarkedResult]
 
 
-def what_to_show(scene: TrueScene) -> Optional[TrueBody]:
-    """The nearest thing that can be seen well enough, which a task would take next; or None."""
-    seen = [
-        body for body in scene.movable()
-        if body.visible >= LEAST_VISIBLE and min(body.region[2:]) >= LEAST_PIXELS and not body.held
-        and (not scene.goal_body or body.name == scene.goal_body)
-    ]
-    if not seen:
-        return None
-    return min(seen, key=lambda body: float(np.hypot(*body.centre[:2])))
+Look = Callable[[], Optional[SeenThing]]
 
 
-def show(segment: SegmentCall, thing: TrueBody, image: Tuple[int, int],
-         generator: np.random.Generator, refresh: Callable[[], None]) -> str:
+def show(segment: SegmentCall, thing: SeenThing, generator: np.random.Generator,
+         look_again: Look) -> str:
     """Mark a thing until the mask looks right.
 
-    :param image: its width and height, px.
-    :param refresh: asks for another image, between two tries: glare passes.
+    :param look_again: shows another image, between two tries, and finds the thing there.
     :returns: '', else what is wrong with the last mask.
     """
     wrong = ''
     for number in range(_TRIES):
-        if number:
-            refresh()
-        strokes = strokes_on(thing.region, generator) if number % 2 else ()
-        marked = segment(rectangle(thing.region, image, generator), strokes)
-        wrong = marked.message or 'no object' if not marked.ok else looks_wrong(marked, thing)
+        seen = look_again() if number else thing
+        if seen is None:
+            return 'nothing of it can be seen'
+        image = seen.mask.shape[1], seen.mask.shape[0]
+        strokes = strokes_on(seen.region, generator) if number % 2 else ()
+        marked = segment(rectangle(seen.region, image, generator), strokes)
+        wrong = marked.message or 'no object' if not marked.ok else looks_wrong(marked, seen)
         if not wrong:
             return ''
     return wrong
@@ -92,12 +78,11 @@ def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[Operator
     return (inside,) + tuple(beside)
 
 
-def looks_wrong(marked: MarkedResult, thing: TrueBody) -> str:
-    """Why a person rejects a mask, or ''."""
-    beside = float(np.hypot(*(marked.centre - thing.centre)[:2]))
-    if beside > _TOO_FAR:
-        return 'it is {:.0f} cm beside the thing'.format(100 * beside)
-    larger = max(abs(np.sort(marked.size[:2]) - np.sort(np.array(thing.size)[:2])).max(),
-                 abs(marked.size[2] - thing.size[2]))
-    return 'it is {:.0f} cm larger or smaller than the thing'.format(
-        100 * larger) if larger > _TOO_LARGE else ''
+def looks_wrong(marked: MarkedResult, thing: SeenThing) -> str:
+    """Why a person rejects a mask: it is not what they see of the thing. Or ''."""
+    if marked.mask is None or marked.mask.shape != thing.mask.shape:
+        return 'no mask is shown'
+    both, either = (marked.mask & thing.mask).sum(), (marked.mask | thing.mask).sum()
+    alike = float(both) / max(int(either), 1)
+    return '' if alike >= _ALIKE else 'the mask shares {:.0f}% with what is seen of it'.format(
+        100 * alike)

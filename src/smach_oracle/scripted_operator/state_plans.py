@@ -4,7 +4,8 @@
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}
       default: {means: retry}
 """
-from typing import Dict, List, Mapping, NamedTuple, Sequence
+import math
+from typing import Dict, Mapping, NamedTuple, Sequence, Tuple
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.checks import choice, flag, whole
@@ -14,7 +15,8 @@ SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
 # means, and the interface of each by the name under which the oracle's settings offer it
 MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
 _TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave')
-_ROUNDS = 2  # of tries and going back, before a state is left undone
+_MOST_POINTS = 10
+Point = Tuple[float, float, float]
 
 
 class StatePlan(NamedTuple):
@@ -32,6 +34,10 @@ class StatePlan(NamedTuple):
     # state to go on to, this one left undone, where all that was tried twice; '' : never
     leave: str = ''
     tries: int = 2
+    # m, m, rad along its own axes, by which the base is driven, where nothing else helps; 0: never
+    base: Point = (0.0, 0.0, 0.0)
+    look: Tuple[Point, ...] = ()  # m, base_footprint: where a person looks for the thing
+    keep: Tuple[Point, ...] = ()  # likewise: where nothing is put that is moved aside
 
 
 class StatePlans:
@@ -55,51 +61,9 @@ class StatePlans:
         return self._plans.get(state, self._plans[DEFAULT])
 
 
-class OperatorAnswer(NamedTuple):
-    """An answer; with neither interface nor state it gives up."""
-
-    interface: str = ''  # start this one
-    goto: str = ''  # or go to this state
-    why: str = ''
-
-
-class QuestionFacts(NamedTuple):
-    """The facts about a question that decide its answer."""
-
-    state: str
-    states: List[str]  # that can be entered now
-    interfaces: List[str]  # on offer
-    tried: int  # how often this state was asked about in this trial before
-    holds: bool  # the hand of the plan holds something
-    seen: bool  # the thing to show can be seen
-
-
 def missing(plan: StatePlan, offered: Sequence[str]) -> str:
     """The interface that the plan needs, where it is not offered, else ''."""
     return '' if MEANS[plan.means] in offered else MEANS[plan.means]
-
-
-def choose_answer(plan: StatePlan, question: QuestionFacts) -> OperatorAnswer:
-    """The answer to a question."""
-    def go(state: str, why: str) -> OperatorAnswer:
-        return OperatorAnswer(
-            goto=next((each for each in (state, question.state) if each in question.states), ''),
-            why=why)
-
-    interface = MEANS[plan.means]
-    if plan.leave and question.tried >= _ROUNDS * (plan.tries + 1):
-        return go(plan.leave, 'it is left as it is')
-    if interface not in question.interfaces:
-        tired = question.tried % (plan.tries + 1) == plan.tries
-        return go(plan.otherwise if tired else '',
-                  'once more' if not tired else 'from further back')
-    if plan.means == SHOW and not question.seen:
-        return go(plan.hidden or plan.otherwise, 'nothing of it can be seen')
-    if plan.means == PUT_DOWN and not question.holds:
-        return go(plan.lost or plan.otherwise, 'the hand holds nothing')
-    if question.tried % (plan.tries + 1) == plan.tries:
-        return go(plan.otherwise, 'it did not work by hand')
-    return OperatorAnswer(interface=interface)
 
 
 def _plan(state: str, value: object) -> StatePlan:
@@ -118,4 +82,22 @@ def _plan(state: str, value: object) -> StatePlan:
         raise SettingsError(state, dict(value), 'either place or onto')
     whole(1, 'a number from 1 to 20', 20)(state + '.tries', value.get('tries', 2))
     flag(state + '.inside', value.get('inside', False))
-    return StatePlan(**value)
+    return StatePlan(**dict(value, base=_point(state + '.base', value.get('base', [0, 0, 0])),
+                            look=_points(state + '.look', value.get('look', [])),
+                            keep=_points(state + '.keep', value.get('keep', []))))
+
+
+def _points(key: str, value: object) -> Tuple[Point, ...]:
+    if not isinstance(value, (list, tuple)) or len(value) > _MOST_POINTS:
+        raise SettingsError(key, value, 'a list of up to {} points'.format(_MOST_POINTS))
+    return tuple(_point(key, each) for each in value)
+
+
+def _point(key: str, value: object) -> Point:
+    numbers = value if isinstance(value, (list, tuple)) else ()
+    if len(numbers) != 3 or any(
+            isinstance(each, bool) or not isinstance(each, (int, float)) or not math.isfinite(each)
+            or abs(each) > 5 for each in numbers):
+        raise SettingsError(key, value, 'three numbers from -5 to 5')
+    x, y, z = (float(each) for each in numbers)
+    return x, y, z

@@ -247,6 +247,13 @@ def test_csv_and_json_tell_seed_cause_and_truth():
     table.write_csv(target, [told(7, True, False, ['noise', 'slippery'])])
     (row,) = csv.DictReader(io.StringIO(target.getvalue()))
     assert (row['seed'], row['causes'], row['true_success']) == ('7', 'noise slippery', 'False')
+    assert (row['wrong_object'], row['damage']) == ('', ''), 'a line from before'
+    trial_now = told(8, True, False, ['noise'])
+    harmed = trial_now.truth._replace(wrong_object='can', damage=(('dropped', 'can'),))
+    target = io.StringIO()
+    table.write_csv(target, [trial_now._replace(truth=harmed)])
+    (row,) = csv.DictReader(io.StringIO(target.getvalue()))
+    assert (row['wrong_object'], row['damage']) == ('can', '1')
     target = io.StringIO()
     table.write_json(target, [], [told(7, True, False, ['noise'])], [])
     data = json.loads(target.getvalue())

@@ -32,6 +32,16 @@ def test_the_latest_line_of_a_seed_counts_and_a_torn_last_line_does_not(tmp_path
     assert list(found) == [7] and found[7].success and found[7].causes == (('noise', 'x4'),)
 
 
+def test_lines_tell_of_damage_and_of_a_wrong_object_and_older_ones_do_not(tmp_path):
+    damage = {'count': 2, 'knocked_over': ['cup'], 'dropped': [], 'pushed_off': ['can']}
+    path = write(tmp_path / 'truth.jsonl', LINE,
+                 dict(LINE, seed=8, success=False, wrong_object='can', damage=damage))
+    old, new = (read_truth(path)[seed] for seed in (7, 8))
+    assert (old.wrong_object, old.damage, old.false_success) == ('', None, False)
+    assert new.damage == (('knocked_over', 'cup'), ('pushed_off', 'can'))
+    assert new.wrong_object == 'can' and new.false_success
+
+
 def test_a_last_line_that_lacks_nothing_but_its_end_counts(tmp_path):
     assert list(read_truth(write(tmp_path / 'truth.jsonl', LINE, end=''))) == [7]
 
@@ -41,6 +51,8 @@ def test_a_last_line_that_lacks_nothing_but_its_end_counts(tmp_path):
                                          (dict(LINE, seed=True), 'seed: True'),
                                          (dict(LINE, causes=['noise']), 'causes: each needs'),
                                          (dict(LINE, share={'physics': 'much'}), 'share'),
+                                         (dict(LINE, wrong_object=None), 'wrong_object: None'),
+                                         (dict(LINE, damage={'dropped': 2}), 'lists of names'),
                                          ({'seed': 7}, 'task: None')])
 def test_a_wrong_line_is_named(tmp_path, line, words):
     with pytest.raises(BagError, match=words):

@@ -116,8 +116,8 @@ def test_no_package_has_too_many_modules():
 
 @pytest.mark.parametrize('room',
                          ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'interfaces', 'pr2',
-                          'inspection_robot/robot'])
-def test_neither_executive_nor_task_nor_subsystem_asks_for_the_truth_or_its_causes(room):
+                          'inspection_robot/robot', 'scripted_operator'])
+def test_neither_executive_nor_task_nor_subsystem_nor_expert_asks_for_the_truth_or_its_causes(room):
     for path in python_files('src/smach_oracle/' + room):
         found = re.findall(
             r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',

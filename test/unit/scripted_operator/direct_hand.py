@@ -1,5 +1,5 @@
 """The scripted expert's hand and eye in one process with the world, without ROS: the same drive,
-the same truth.
+the same outlines.
 """
 from pathlib import Path
 
@@ -9,7 +9,6 @@ import yaml
 from smach_oracle.geometry.chain import JointChain
 from smach_oracle.geometry.joints import read_joints
 from smach_oracle.geometry.links import link_pose
-from smach_oracle.geometry.transforms import inverse
 from smach_oracle.interfaces.manipulation.cartesian_drive import (
     CartesianDrive,
     DriveLimits,
@@ -17,7 +16,10 @@ from smach_oracle.interfaces.manipulation.cartesian_drive import (
 )
 from smach_oracle.pr2.model.pr2_model import pr2_urdf
 from smach_oracle.scripted_operator.hand_driver import GripResult
-from smach_oracle.scripted_operator.true_scene import TrueBody, TrueScene
+from smach_oracle.scripted_operator.seen_scene import Outline, seen_scene
+from smach_oracle.simulation.physics.camera import see
+from smach_oracle.simulation.physics.recognition import recognised, view_of
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 
 SETTINGS = yaml.safe_load(
     (Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text())
@@ -74,14 +76,33 @@ class DirectHand:
         return GripResult(now, now > gap + 0.004)
 
 
-def read_scene(world):
-    """Everything, as the eye sees it."""
-    base = inverse(world.true_base())
-    bodies = {}
-    for name in world.body_names:
-        body = world.body(name)
-        size = body.size if body.shape != 'cylinder' else (2 * body.size[0], 2 * body.size[1],
-                                                      body.size[2])
-        bodies[name] = TrueBody(name, base @ world.body_pose(name), tuple(size), name
-                                in world.movable(), world.holding(name))
-    return TrueScene(bodies, world.scene.seed, world.scene.goal.body)
+class DirectWatcher:
+    """Looks and feels as the operator's eye and means do."""
+
+    def __init__(self, world):
+        self._world = world
+        self._robot = DirectRobot(world)
+        self._tall = {}
+
+    def look(self, *names):
+        image = see(self._world)
+        found = recognised(view_of(self._world, image.colour),
+                           self._world.movable() + ['robot', *names])
+        wanted = self._world.scene.goal.body
+        return seen_scene(image, [
+            Outline(name, name == wanted, name in self._world.movable(), mask)
+            for name, mask in found.items()
+        ])
+
+    def look_at(self, point, *names):
+        self._robot.look_at(point)
+        scene = self.look(*names)
+        for name, height in scene.heights().items():
+            self._tall[name] = max(height, self._tall.get(name, 0.0))
+        return scene
+
+    def tall(self, name):
+        return self._tall.get(name)
+
+    def gap(self, arm):
+        return self._world.gap(arm)

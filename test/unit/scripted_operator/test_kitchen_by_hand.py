@@ -3,17 +3,21 @@ over.
 """
 import numpy as np
 import pytest
-from direct_hand import DirectHand, read_scene
+from direct_hand import DirectHand, DirectWatcher
 
 from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.scripted_operator.hand_driver import HandDriver
 from smach_oracle.scripted_operator.manoeuvres import Attempt, ManoeuvreError, pull_out, put_down
+from smach_oracle.scripted_operator.seen_scene import SeenScene
 from smach_oracle.simulation.physics.judge import judge
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
 from smach_oracle.simulation.scenes.kitchen_scene import draw
 from smach_oracle.tasks.drink_retrieval import HOME, IN_THE_FRIDGE, OUT_OF_THE_FRIDGE, TORSO_HEIGHT
+
+SHELF = np.array([0.7, 0.15, 0.88])  # m, base_footprint, where a person looks
+PALM = np.array([0.62, 0.0, 0.85])
 
 
 @pytest.fixture(scope='module', name='world')
@@ -35,21 +39,20 @@ def before_the_shelf(seed):
 
 def attempt(world, number=0, sigma=0.004):
     generator = np.random.default_rng(number)
-    return Attempt(HandDriver(DirectHand(world, 'right')), lambda: read_scene(world), number,
+    return Attempt(HandDriver(DirectHand(world, 'right')), DirectWatcher(world), number,
                    lambda: generator.normal(0.0, sigma, 3))
 
 
 def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(world):
     world.reset(before_the_shelf(3))
-    pull_out(attempt(world), lambda scene: scene.bodies['drink_0'])
+    pull_out(attempt(world), SeenScene.wanted, SHELF)
     assert world.holding('drink_0') == 'right'
     robot = DirectRobot(world)
     for x, y, yaw in (OUT_OF_THE_FRIDGE, HOME):
         robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
-    scene = read_scene(world)
-    palm, drink = scene.bodies['palm'], scene.held_by('right')
-    put_down(attempt(world),
-             np.array([palm.centre[0], palm.centre[1], palm.top + drink.size[2] / 2]))
+    at = attempt(world)
+    palm = at.watcher.look_at(PALM, 'palm').named('palm')
+    put_down(at, palm.top, float(palm.top[2]))
     verdict = judge(world, world.scene.goal)
     assert verdict.success, verdict.why
 
@@ -66,6 +69,6 @@ def test_a_hand_that_misses_in_the_fridge_comes_out_open(world):
     world.reset(before_the_shelf(3))
     at = attempt(world)._replace(slip=lambda: np.array([0.0, 0.0, 0.10]))
     with pytest.raises(ManoeuvreError, match='closed on nothing'):
-        pull_out(at, lambda scene: scene.bodies['drink_0'])
+        pull_out(at, SeenScene.wanted, SHELF)
     assert world.gap('right') > 0.07
     assert not [each for each in world.contacts('fridge') if each.other == 'robot']

@@ -4,46 +4,32 @@ strokes, giving up.
 import numpy as np
 import pytest
 
-from smach_oracle.geometry.transforms import transform
-from smach_oracle.scripted_operator.showing import (
-    MarkedResult,
-    looks_wrong,
-    rectangle,
-    show,
-    what_to_show,
-)
-from smach_oracle.scripted_operator.true_scene import TrueBody, TrueScene
+from smach_oracle.scripted_operator.seen_scene import SeenThing
+from smach_oracle.scripted_operator.showing import MarkedResult, looks_wrong, rectangle, show
 
 IMAGE = (640, 480)
-FRAMES = []  # that were asked for
+REGION = (300, 200, 40, 60)
+LOOKS = []  # at another image
 
 
-def thing(name='can', x=0.6, region=(300, 200, 40, 60), visible=0.9, held=''):
-    return TrueBody(name, transform([x, 0.1, 0.78]), (0.06, 0.06, 0.12), True, held, region,
-                    visible)
+def outline(dx=0, grown=0):
+    left, top, width, height = REGION
+    mask = np.zeros((IMAGE[1], IMAGE[0]), bool)
+    mask[top - grown:top + height + grown, left + dx - grown:left + dx + width + grown] = True
+    return mask
 
 
-def marked(seen, beside=0.0, larger=0.0, ok=True, message=''):
-    return MarkedResult(ok, message, seen.centre + [beside, 0.0, 0.0], np.array(seen.size) + larger)
+def thing():
+    return SeenThing('can', True, True, REGION, outline(), None)
 
 
-def scene(*things, goal=''):
-    return TrueScene({each.name: each for each in things}, 1, goal)
+def marked(ok=True, message='', **where):
+    return MarkedResult(ok, message, outline(**where) if ok else None)
 
 
-def showing():
+def showing(seen=True):
     """What `show` is told beside the interface."""
-    return thing(), IMAGE, np.random.default_rng(1), lambda: FRAMES.append(1)
-
-
-def test_the_nearest_thing_that_can_be_seen_is_shown():
-    near, far = thing('near'), thing('far', x=0.8)
-    assert what_to_show(scene(far, near)).name == 'near'
-    assert what_to_show(scene(far, near._replace(visible=0.1))).name == 'far'
-    assert what_to_show(scene(far, near._replace(held='left'))).name == 'far'
-    assert what_to_show(scene(far, near, goal='far')).name == 'far'
-    assert what_to_show(scene(near._replace(region=(0, 0, 0, 0)))) is None and what_to_show(
-        scene()) is None
+    return thing(), np.random.default_rng(1), lambda: LOOKS.append(1) or (thing() if seen else None)
 
 
 def test_rectangles_are_drawn_by_hand_about_the_thing_and_stay_in_the_image():
@@ -59,27 +45,30 @@ def test_rectangles_are_drawn_by_hand_about_the_thing_and_stay_in_the_image():
 
 def test_a_good_mask_is_accepted_at_once():
     calls = []
-    assert show(lambda *drawn: calls.append(drawn) or marked(thing()), *showing()) == ''
+    assert show(lambda *drawn: calls.append(drawn) or marked(), *showing()) == ''
     assert len(calls) == 1 and not calls[0][1]
 
 
 def test_a_bad_mask_is_mended_with_strokes():
     def segment(_region, strokes):
-        return marked(thing()) if strokes else marked(thing(), beside=0.06)
+        return marked() if strokes else marked(dx=60)
     calls = []
-    FRAMES.clear()
+    LOOKS.clear()
     assert show(lambda *drawn: calls.append(drawn) or segment(*drawn), *showing()) == ''
     assert [bool(strokes) for _, strokes in calls] == [False, True]
-    assert len(FRAMES) == 1, 'the second try is on another frame'
+    assert len(LOOKS) == 1, 'the second try is on another image'
     assert {line.foreground for line in calls[1][1]} == {True, False}
 
 
-@pytest.mark.parametrize('wrong, says', [({'beside': 0.05}, '5 cm beside'),
-                                         ({'larger': 0.06}, '6 cm larger'),
+@pytest.mark.parametrize('wrong, says', [({'dx': 60}, 'shares 0%'), ({'grown': 20}, 'shares 30%'),
                                          ({'ok': False, 'message': 'no depth'}, 'no depth')])
 def test_what_stays_wrong_is_given_up_with_its_reason(wrong, says):
-    assert says in show(lambda *_: marked(thing(), **wrong), *showing())
+    assert says in show(lambda *_: marked(**wrong), *showing())
+
+
+def test_what_is_not_seen_any_more_is_not_marked_again():
+    assert 'nothing of it' in show(lambda *_: marked(dx=60), *showing(seen=False))
 
 
 def test_an_eye_lets_pass_what_a_person_would():
-    assert looks_wrong(marked(thing(), beside=0.015, larger=0.02), thing()) == ''
+    assert looks_wrong(marked(dx=5), thing()) == '' and looks_wrong(marked(grown=3), thing()) == ''

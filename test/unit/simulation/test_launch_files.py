@@ -52,3 +52,19 @@ def test_the_rates_that_are_launched_are_those_of_the_node_unless_told_otherwise
     assert [config.params['/pr2_world/' + rate].value
             for rate in rates] == [getattr(node, rate) for rate in rates]
     assert launched('pr2_world', 'camera_rate:=7').params['/pr2_world/camera_rate'].value == 7
+
+
+@pytest.mark.parametrize('task', ['pick_and_place', 'drink_retrieval'])
+def test_the_truth_is_offered_to_nobody_unless_one_asks_the_world_for_it(task):
+    config = launched(task)
+    assert config.params['/pr2_world/reveal'].value is False
+    assert not any(name.endswith('reveal') and param.value for name, param in config.params.items())
+    assert launched(task, 'reveal:=true').params['/pr2_world/reveal'].value is False
+    assert launched('pr2', 'reveal:=true').params['/pr2_world/reveal'].value is True
+    assert read_settings(lambda name, usual: usual).reveal is False
+
+
+@pytest.mark.parametrize('factor, service', [(0, 'world/pass_time'), (1, 'none')])
+def test_the_operators_time_passes_in_the_world_or_by_the_clock_of_a_paced_one(factor, service):
+    config = launched('pr2', 'real_time_factor:={}'.format(factor))
+    assert config.params['/scripted_operator/pass_time'].value == service

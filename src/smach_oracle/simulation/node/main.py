@@ -22,6 +22,9 @@ from smach_oracle.srv import (
     PassTime,
     PassTimeRequest,
     PassTimeResponse,
+    Recognise,
+    RecogniseRequest,
+    RecogniseResponse,
     ResetWorld,
     ResetWorldRequest,
     ResetWorldResponse,
@@ -42,6 +45,7 @@ from .camera_publisher import CameraPublisher
 from .controllers import Controllers
 from .loop import PERIOD_S, WorldLoop, WorldStopped
 from .motion_table import MotionTable
+from .recognition import Recognition
 from .reveal import reveal
 from .settings import WorldSettings, read_settings
 from .sim_clock import SimClock
@@ -81,6 +85,7 @@ class WorldNode:
         self._state = StatePublisher(publish_description(), list(self._world.joints()),
                                      settings.lock_step)
         self._camera = CameraPublisher()
+        self._recognition = Recognition(self._world)
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
         self._state_due = self._image_due = 0.0
         self._published = -1  # the world's periods at the last state that was published
@@ -90,8 +95,10 @@ class WorldNode:
                           # before snapshots: who has these finds it, and charges it from the start
                           rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
-                          rospy.Service('world/reveal', Reveal, self._answer_reveal),
-                          rospy.Service('world/judge', Judge, self._answer_judge)]
+                          rospy.Service('world/recognise', Recognise, self._answer_recognise)]
+        if settings.reveal:  # where experiments run nobody can ask for the truth
+            self._services += [rospy.Service('world/reveal', Reveal, self._answer_reveal),
+                               rospy.Service('world/judge', Judge, self._answer_judge)]
 
     def run(self) -> None:
         """Serve until close(); in the thread that shall own the physics."""
@@ -134,6 +141,7 @@ class WorldNode:
     def _publish_image(self, stamp: rospy.Time, counted: bool) -> None:
         self._loop.watch.add_time('publish')
         image = take_image(self._world, counted)
+        self._recognition.keep(stamp, image.colour)
         self._loop.watch.add_time('camera')
         self._camera.publish(image.colour, image.depth, image.intrinsics, stamp)
         self._loop.watch.add_time('publish')
@@ -161,6 +169,7 @@ class WorldNode:
         self._loop.watch.restart()
         began_s = time.monotonic()
         self._world.reset(self._drawn(seed))
+        self._recognition.forget()
         self._loop.watch.add_time('reset')
         self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
         causes = self._world.scene.causes
@@ -181,8 +190,8 @@ class WorldNode:
         truth.happened(self._world.cause_spans())
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = truth.record(verdict.success, verdict.why, sim_s, self._loop.watch.spent,
-                              self._loop.watch.used)
+        record = truth.record(verdict, self._world.harm.found(self._world), sim_s,
+                              self._loop.watch.spent, self._loop.watch.used)
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
@@ -218,6 +227,12 @@ class WorldNode:
         except WorldStopped as err:
             raise rospy.ServiceException(str(err)) from err
 
+    def _answer_recognise(self, request: RecogniseRequest) -> RecogniseResponse:
+        try:
+            return self._loop.call(lambda: self._recognition.answer(request))
+        except WorldStopped as err:
+            return RecogniseResponse(ok=False, message=str(err))
+
     def _answer_reveal(self, request: RevealRequest) -> RevealResponse:
         try:
             bodies = self._loop.call(
@@ -241,7 +256,7 @@ def main() -> None:
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
         '~lasting, '
         '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate, '
-        '~camera_binning; see '
+        '~camera_binning, ~reveal; see '
         'doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:

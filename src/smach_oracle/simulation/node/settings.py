@@ -31,6 +31,8 @@ class WorldSettings(NamedTuple):
     state_rate: float = 10.0
     # images per simulated s for those who subscribe; at factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
+    # offer the truth to everybody, as services world/reveal and world/judge: to try things out
+    reveal: bool = False
     # columns and rows of the camera's sensor that make one pixel of its images
     camera_binning: int = 1
 
@@ -60,6 +62,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         seed=taken('seed', 0, checks.whole(0, 'a whole number from 0')),
         benign=taken('benign', False, checks.flag),
         lasting=number('lasting', LASTING_SHARE, 0.0, 1.0),
+        reveal=taken('reveal', False, checks.flag),
         idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),

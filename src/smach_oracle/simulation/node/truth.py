@@ -2,9 +2,11 @@
 import json
 import os
 import time
-from typing import Any, Dict, List, Mapping, Optional, Sequence
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from ..physics.cause_log import CauseSpan
+from ..physics.harm import Harm, harm_record
+from ..physics.judge import TrialVerdict
 from ..scenes.scene import Scene
 
 
@@ -32,16 +34,18 @@ class TrialTruth:
         """Take the world's log of the causes, as it is at the trial's end."""
         self._causes = [each._asdict() for each in spans]
 
-    def record(self, success: bool, why: str, sim_s: float, spent: Mapping[str, float],
-               used: Mapping[str, float]) -> Dict[str, Any]:
+    def record(self, verdict: TrialVerdict, harm: Tuple[Harm, ...], sim_s: float,
+               spent: Mapping[str, float], used: Mapping[str, float]) -> Dict[str, Any]:
         """What is to be written at its end.
 
+        :param harm: all that came to harm in it.
         :param spent: wall s by what the world's process did in them.
         :param used: processor s of the world's thread, likewise.
         """
         wall = time.monotonic() - self._began
         return {
-            'seed': self._scene.seed, 'task': self._scene.task, 'success': success, 'why': why,
+            'seed': self._scene.seed, 'task': self._scene.task, 'success': verdict.success,
+            'why': verdict.why, 'wrong_object': verdict.wrong_object, 'damage': harm_record(harm),
             'causes': self._causes,
             'sim_s': round(sim_s - self._sim_s, 3), 'passed_s': {
                 what: round(seconds, 3)

@@ -121,6 +121,7 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
     pose = camera_pose(world)
     rendered = RenderedView(world, pose, size_of(world))
     dazzled = lights.dazzled(world.periods, pose, intrinsics_of(world), size_of(world))
+    world.labels = rendered.bodies
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
     image = CameraImage(world.time,
                         noisy_colour(rendered.colour, quality, generator, dazzled),

@@ -19,6 +19,7 @@ class TrialVerdict(NamedTuple):
 
     success: bool
     why: str
+    wrong_object: str = ''  # another thing than the goal's own that was brought to the goal
 
 
 def judge(world: World, goal: Goal) -> TrialVerdict:
@@ -42,7 +43,20 @@ def judge(world: World, goal: Goal) -> TrialVerdict:
                     if goal.kind == 'stands_at' else 'is in the receiving hand', 100 * off))
         found.append((off, name, ', '.join(faults)))
     _, name, text = min(found)
-    return TrialVerdict(False, '{} {}'.format(name, text))
+    why = '{} {}'.format(name, text)
+    wrong = _wrong_object(world, goal) if goal.body else ''
+    return TrialVerdict(
+        False, 'wrong object: {} was brought, {}'.format(wrong, why) if wrong else why, wrong)
+
+
+def _wrong_object(world: World, goal: Goal) -> str:
+    """Another thing that is at the goal as its own should be, and that a hand has carried."""
+    for name in world.movable():
+        off = float(np.linalg.norm(world.body_pose(name)[:2, 3] - goal.position[:2]))
+        brought = goal.kind == 'in_hand' or world.harm.was_carried(name)
+        if name != goal.body and brought and not _faults(world, goal, name, off):
+            return name
+    return ''
 
 
 def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:

@@ -17,6 +17,7 @@ from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .cause_log import CauseSpan
 from .disturbances import Disturbances
 from .door_hinges import DoorHinges
+from .harm import HarmWatch
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 from .pushed_arm import PushedArm
 from .weights import Weights
@@ -80,6 +81,9 @@ class World:
         self.belief_error = np.eye(4)  # 4x4, where the robot believes to be, from where it is
         x, y, yaw = scene.robot.localisation_error
         self.map_error = from_rpy((x, y, 0.0), yaw=yaw)  # 4x4, odom_combined from the world
+        self.harm = HarmWatch()  # what comes to harm since the reset
+        # (h, w): the number of the body that each pixel of the last image shows
+        self.labels = np.zeros((0, 0), int)
         self.step(REST_PERIODS)
         self.happened('start')
 
@@ -111,6 +115,7 @@ class World:
             self._hinges.tick()
             self._robot.advance(self._push)
             self.periods += 1
+            self.harm.tick(self)
 
     def leap(self, count: int) -> None:
         """Let `count` control periods pass in which nothing moves, without physics."""

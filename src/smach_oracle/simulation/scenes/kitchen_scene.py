@@ -17,6 +17,7 @@ from .unlike_the_map import drink_size, localisation_error, true_kitchen, true_p
 
 TASK = 'drink_retrieval'
 DRINK_MASS = 0.33  # kg
+ORDERED = 'drink_0'  # the red one: red is what the task orders
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
            (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
@@ -41,7 +42,7 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     if not benign:
         draft = with_causes(draft, seed, lasting)
     palm = true_palm(seed)
-    goal = Goal('in_hand', '', palm, PALM_SIZE[0] / 2)
+    goal = Goal('in_hand', ORDERED, palm, PALM_SIZE[0] / 2)
     return Scene(TASK, seed, (fridge(kitchen, draft.closing),) + draft.drinks + person(palm), goal,
                  RobotStart(_posture(), drive_error=draft.drive_error,
                             localisation_error=draft.localisation_error,

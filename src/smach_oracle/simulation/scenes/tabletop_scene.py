@@ -38,8 +38,8 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     if not benign:
         draft = with_causes(draft, seed, lasting)
     table = true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE)
-    height = table.height + draft.things[0].size[2] / 2
-    goal = Goal('stands_at', '', (GOAL[0], GOAL[1], height), TOLERANCE)
+    target = min(draft.things, key=lambda thing: float(np.hypot(*thing.position[:2])))
+    goal = Goal('stands_at', target.name, (*GOAL, table.height + target.size[2] / 2), TOLERANCE)
     return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal,
                  RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
                             camera_error=camera_error(seed)), CameraQuality(), draft.disturbances,

@@ -8,6 +8,7 @@ import pytest
 from rospy import Time
 from std_msgs.msg import Header
 
+from smach_oracle.analysis.truth import read_truth
 from smach_oracle.geometry.transform_tree import TransformTree
 from smach_oracle.geometry.transforms import from_quaternion, from_rpy, inverse
 from smach_oracle.pr2.kitchen import Kitchen
@@ -20,6 +21,8 @@ from smach_oracle.simulation.node.streamed_target import StreamedTarget
 from smach_oracle.simulation.node.truth import TrialTruth, append_line
 from smach_oracle.simulation.physics.camera import INTRINSICS
 from smach_oracle.simulation.physics.cause_log import CauseSpan
+from smach_oracle.simulation.physics.harm import DROPPED, Harm
+from smach_oracle.simulation.physics.judge import TrialVerdict
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
 from smach_oracle.simulation.scenes.scene import Body, Goal, RobotStart, Scene, SceneCause
@@ -152,14 +155,17 @@ def test_the_truth_is_a_line_for_each_trial(tmp_path):
     path = tmp_path / 'truth.jsonl'
     for seconds in (12.0, 14.0):
         append_line(str(path),
-                    TrialTruth(scene(), 10.0).record(True, 'stands', seconds, {'physics': 0.5},
-                                                     {'physics': 0.25}))
+                    TrialTruth(scene(), 10.0).record(
+                        TrialVerdict(False, 'wrong', 'cup'), (Harm(DROPPED, 'can'),), seconds,
+                        {'physics': 0.5}, {'physics': 0.25}))
     lines = [json.loads(line) for line in path.read_text(encoding='utf-8').splitlines()]
     assert [line['sim_s'] for line in lines] == [2.0, 4.0]
     assert lines[0]['causes'] == [{
         'kind': 'crowded', 'text': 'by much', 'lasting': False, 'began_s': None, 'ended_s': None}]
     assert {key: lines[0][key] for key in ('seed', 'task', 'success', 'why')} == {
-        'seed': 7, 'task': 'test', 'success': True, 'why': 'stands'}
+        'seed': 7, 'task': 'test', 'success': False, 'why': 'wrong'}
+    truth = read_truth(str(path))[7]
+    assert truth.wrong_object == 'cup' and truth.damage == ((DROPPED, 'can'),)
     assert lines[0]['share']['physics'] > 0 and lines[0]['cpu_s'] == {'physics': 0.25}
 
 
@@ -167,11 +173,12 @@ def test_the_truth_adds_up_the_time_that_was_let_pass():
     truth = TrialTruth(scene(), 0.0)
     for seconds, what in ((2.0, 'planning'), (5.0, 'expert'), (0.5, 'planning')):
         truth.passed(seconds, what)
-    assert truth.record(True, '', 9.0, {}, {})['passed_s'] == {'planning': 2.5, 'expert': 5.0}
+    record = truth.record(TrialVerdict(True, ''), (), 9.0, {}, {})
+    assert record['passed_s'] == {'planning': 2.5, 'expert': 5.0}
 
 
 def test_the_truth_tells_when_a_cause_was_there():
     truth = TrialTruth(scene(), 0.0)
     truth.happened([CauseSpan('crowded', 'by much', True, 0.0, 7.5)])
-    assert truth.record(True, '', 9.0, {}, {})['causes'] == [{
+    assert truth.record(TrialVerdict(True, ''), (), 9.0, {}, {})['causes'] == [{
         'kind': 'crowded', 'text': 'by much', 'lasting': True, 'began_s': 0.0, 'ended_s': 7.5}]

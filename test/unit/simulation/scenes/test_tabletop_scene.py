@@ -91,8 +91,16 @@ def test_cups_and_bottles_stand_as_wide_and_high_as_they_should():
         world.close()
 
 
+@pytest.mark.parametrize('seed', range(1, 60))
+def test_the_target_is_the_thing_that_stands_nearest(seed):
+    scene = draw(seed)
+    things = {body.name: np.hypot(*body.position[:2]) for body in scene.bodies if body.mass > 0}
+    assert scene.goal.body == min(things, key=things.get)
+
+
 def test_a_rehearsal_in_a_world_of_its_own_leaves_none_behind():
     before = [number for number in range(50) if pybullet.isConnected(number)]
-    done = rehearse(draw(3, benign=True)._replace(bodies=()))
+    scene = draw(3, benign=True)
+    done = rehearse(scene._replace(bodies=(), goal=scene.goal._replace(body='')))
     assert done.failed == 'DETECT_TABLETOP' and not done.success
     assert [number for number in range(50) if pybullet.isConnected(number)] == before
