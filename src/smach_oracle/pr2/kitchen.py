@@ -131,8 +131,12 @@ def shelf_region(kitchen: Kitchen) -> Tuple[np.ndarray, np.ndarray]:
 
 def look_point(kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
     """(3,) in the frame of the base: where to point the camera to see the drinks."""
-    floor = kitchen.shelves[kitchen.drinks_shelf]
-    return apply(base_from_fridge, np.array([0.15, 0.0, floor + 0.05]))
+    return apply(base_from_fridge, shelf_point(kitchen))
+
+
+def shelf_point(kitchen: Kitchen) -> np.ndarray:
+    """(3,) in the fridge's frame: the middle of where drinks stand."""
+    return np.array([0.15, 0.0, kitchen.shelves[kitchen.drinks_shelf] + 0.05])
 
 
 def _placed(base_from_part: np.ndarray, centre: Tuple[float, float, float],

@@ -35,6 +35,7 @@ ODOM = 'odom_combined'
 # the collision map that PICK plans in: the known furniture, and what the camera sees on its shelf
 FRIDGE = 'fridge'
 TORSO_HEIGHT = 0.25  # m
+MIN_HEIGHT = 0.05  # m above the shelf
 # x, y in m, yaw in rad, in odom_combined
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
 OUT_OF_THE_FRIDGE = (0.68, -0.30, 0.0)
@@ -52,7 +53,8 @@ def make_machine() -> smach.StateMachine:
                                {'succeeded': 'MOVE_IN'})
         smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
         smach.StateMachine.add('DETECT_DRINK',
-                               action('detect_drink', DetectDrinkAction, goal=DetectDrinkGoal(0.05),
+                               action('detect_drink', DetectDrinkAction,
+                                      goal=DetectDrinkGoal(min_height=MIN_HEIGHT),
                                       result_slots=['drink', 'size']),
                                {'succeeded': 'PICK_DRINK'})
         smach.StateMachine.add(
@@ -90,7 +92,7 @@ def drive(x_m: float, y_m: float, yaw: float) -> SimpleActionState:
 
 def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
     """Pick the drink with the right arm; the door stands open on the left."""
-    return PickGoal('right', userdata.drink, userdata.size, FRIDGE)
+    return PickGoal(arm='right', object=userdata.drink, size=userdata.size, map_id=FRIDGE)
 
 
 def palm() -> PoseStamped:

@@ -230,20 +230,19 @@ def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeyp
     efforts = []
 
     def slip(*given):
-        efforts.append(given[-1])
+        efforts.append(given[-2])
         raise ObjectSlipped('it slipped')
     monkeypatch.setattr(kitchen_skills, 'pick_from_fridge', slip)
     monkeypatch.setattr(kitchen_skills, 'open_door', lambda *_: 1.6)
     drink = PoseStamped(Header(frame_id='base_link'),
                         Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    goal = PickGoal(arm='right', object=drink, size=Vector3(0.06, 0.06, 0.12), map_id='fridge')
     for _ in range(2):
         with pytest.raises(ObjectSlipped):
-            skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'),
-                        lambda status: None)
+            skills.pick(goal, lambda status: None)
     skills.open_door(OpenDoorGoal('right'), lambda status: None)
     with pytest.raises(ObjectSlipped):
-        skills.pick(PickGoal('right', drink, Vector3(0.06, 0.06, 0.12), 'fridge'),
-                    lambda status: None)
+        skills.pick(goal, lambda status: None)
     assert efforts[0] < efforts[1] and efforts[2] == efforts[0]
     world.close()
 

@@ -20,7 +20,7 @@ from ..skills.fridge_pick import pick_from_fridge
 from ..skills.hand_over import hand_over
 from ..skills.pick import FIRM, HeldObject
 from .frames import box_in_base, pose_in_base, pose_message
-from .manipulation import USUAL, Manipulation
+from .manipulation import USUAL, Manipulation, elsewhere_of
 from .skill_server import ReportStatus
 
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
@@ -56,9 +56,9 @@ class KitchenSkills(Manipulation):
         self.held.pop(arm, None)
         limbs = limbs_of(self._links, encoder_readings(self.context.robot))
         others = things_on_shelf(self.context.robot.see(), self.kitchen, fridge, limbs)
-        with self.firmer_after_slip() as effort:
+        with self.firmer_after_slip(goal.attempt) as effort:
             self.held[arm] = pick_from_fridge(self.context, self.kitchen, fridge, arm, target,
-                                              others, effort)
+                                              others, effort, elsewhere_of(goal.attempt))
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def hand_over(self, goal: HandOverGoal, report: ReportStatus) -> HandOverResult:

@@ -57,9 +57,10 @@ class DrinkRetrievalRehearsal:
         self.robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
 
     def _detect(self) -> None:
-        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT), no_report)
+        found = self.eyes.detect_drink(DetectDrinkGoal(min_height=MIN_HEIGHT), no_report)
         self.data.update(drink=found.drink, size=found.size)
 
     def _pick(self) -> None:
-        goal = PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)
+        goal = PickGoal(arm='right', object=self.data['drink'], size=self.data['size'],
+                        map_id=FRIDGE)
         self.data['grasp'] = self.skills.pick(goal, no_report).grasp
