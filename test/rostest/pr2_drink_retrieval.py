@@ -38,7 +38,7 @@ from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import drink_retrieval
 
 STATES = [
-    'RAISE_TORSO', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
+    'RAISE_TORSO', 'LOCALISE', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
     'CLOSE_FRIDGE', 'MOVE_HOME', 'HAND_OVER'
 ]
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'

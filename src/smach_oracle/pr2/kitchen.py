@@ -92,6 +92,14 @@ def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
                  np.array([out, kitchen.width - kitchen.handle_inset, height]))
 
 
+def door_angle_at(kitchen: Kitchen, handle: np.ndarray) -> float:
+    """How far the door is open, rad, with its handle at a point (3,) of the fridge's frame."""
+    hinge = np.array([0.0, kitchen.width / 2])
+    shut, now = (np.arctan2(*(point[:2] - hinge)[::-1])
+                 for point in (handle_point(kitchen, 0.0, 0.0), handle))
+    return float((shut - now + np.pi) % (2 * np.pi) - np.pi)
+
+
 def fridge_boxes(kitchen: Kitchen, base_from_fridge: np.ndarray, door_angle: float) -> List[MapBox]:
     """The fridge as boxes for a collision map: walls, shelves, the door and, last, its handle.
 

@@ -91,6 +91,14 @@ class Robot(Protocol):
         :raises RobotError: where it ends elsewhere, by its odometry.
         """
 
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """Tell the localisation where the robot stands (4x4, ODOM_FRAME from BASE_FRAME).
+
+        It has found that out by looking at something that it knows.
+
+        :raises RobotError: where the localisation does not take it.
+        """
+
     def see(self) -> CameraImage:
         """A fresh image of the head camera.
 

@@ -8,7 +8,15 @@ import genpy
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Vector3,
+)
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -32,6 +40,7 @@ from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, Gripp
 from .ros_senses import RosSenses
 
 NO_SNAPSHOT = 'none'
+TAKEN = 0.005  # m, or rad, by which the pose in the tree may differ from one that was told
 CONNECTED_S = 60.0  # wall s that a simulated robot may take to be there
 
 
@@ -57,6 +66,8 @@ class RosRobot:
         self._link('head_traj_controller/point_head_action', PointHeadAction)
         self._link('torso_controller/position_joint_action', SingleJointPositionAction)
         self._link('move_base', MoveBaseAction)
+        self._initial_pose = rospy.Publisher('initialpose', PoseWithCovarianceStamped, queue_size=1,
+                                             tcp_nodelay=True)
         self._aborted = threading.Event()
         self._calls = threading.RLock()
 
@@ -174,9 +185,25 @@ class RosRobot:
         """
         if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
             raise RobotError('drive: the goal is no finite 4x4 pose')
-        place = Point(*odom_from_goal[:3, 3].tolist())
-        pose = Pose(place, Quaternion(*quaternion(odom_from_goal).tolist()))
-        self._do('move_base', MoveBaseGoal(PoseStamped(Header(frame_id=ODOM_FRAME), pose)), 'base')
+        target = PoseStamped(Header(frame_id=ODOM_FRAME), _pose_of(odom_from_goal))
+        self._do('move_base', MoveBaseGoal(target), 'base')
+
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """See Robot: published on `initialpose`, and awaited in the tree of frames."""
+        until = time.monotonic() + self._timeout_s
+        while not self._initial_pose.get_num_connections():
+            self._check_allowed()
+            if time.monotonic() > until or rospy.is_shutdown():
+                raise RobotError('nobody listens to {}'.format(self._initial_pose.resolved_name))
+            time.sleep(0.01)
+        message = PoseWithCovarianceStamped(header=Header(frame_id=ODOM_FRAME))
+        message.pose.pose = _pose_of(odom_from_base)
+        self._initial_pose.publish(message)
+        while np.abs(self.odom_from_base() - odom_from_base).max() > TAKEN:
+            if time.monotonic() > until or rospy.is_shutdown():
+                raise RobotError('the localisation did not take the pose on {}'.format(
+                    self._initial_pose.resolved_name))
+            time.sleep(0.01)
 
     def _do(self, name: str, goal: genpy.Message, what: str,
             stalls: bool = False) -> genpy.Message:
@@ -238,6 +265,11 @@ class RosRobot:
                 GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted',
                 GoalStatus.RECALLED: 'preempted'
             }.get(event.status, 'failed'), ': ' + text if text else ''))
+
+
+def _pose_of(pose: np.ndarray) -> Pose:
+    """A 4x4 as a message."""
+    return Pose(Point(*pose[:3, 3].tolist()), Quaternion(*quaternion(pose).tolist()))
 
 
 def _duration(seconds: float) -> rospy.Duration:

@@ -41,7 +41,7 @@ VIEWS = ((0.65, 0.0, 0.75), (0.85, 0.0, 0.75), (0.50, 0.0, 0.75))
 PLACE_TOLERANCE = 0.045  # m, of the area on which the object may stand
 
 
-class TrialMemory:
+class TableMemory:
     """What the script remembers in the course of one trial, and the goals that go by it."""
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class TrialMemory:
 
 def make_machine() -> smach.StateMachine:
     """The state machine of Fig. 5 in the paper, without its oracle."""
-    memory = TrialMemory()
+    memory = TableMemory()
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'],
                             input_keys=['place_pose'])
     sm.register_start_cb(lambda userdata, initial_states: memory.begin())

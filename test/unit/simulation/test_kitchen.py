@@ -10,7 +10,13 @@ from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 
 from smach_oracle.geometry.transforms import apply, from_rpy
-from smach_oracle.msg import CloseDoorGoal, HandOverGoal, OpenDoorGoal, PickGoal
+from smach_oracle.msg import (
+    CloseDoorGoal,
+    HandOverGoal,
+    LocaliseAtFridgeGoal,
+    OpenDoorGoal,
+    PickGoal,
+)
 from smach_oracle.pr2.kitchen import Kitchen, base_from_fridge, handle_point, kitchen_from
 from smach_oracle.pr2.nodes import kitchen_skills
 from smach_oracle.pr2.nodes.kitchen_skills import KitchenSkills
@@ -153,6 +159,7 @@ def test_the_rehearsal_goes_the_way_of_the_script():
         'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE
     }
     assert drink_rehearsal.TORSO_HEIGHT == drink_retrieval.TORSO_HEIGHT
+    assert drink_rehearsal.ORDERED == drink_retrieval.ORDERED
     world = World(draw(1, benign=True))
     states = [name for name, _ in drink_rehearsal.DrinkRetrievalRehearsal(world).states]
     machine = drink_retrieval.make_machine()
@@ -172,10 +179,30 @@ def next_of(machine, label):
 
 def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of_it():
     world = World(draw(3, benign=True))
-    for _, work in drink_rehearsal.DrinkRetrievalRehearsal(world).states[:2]:
+    for _, work in drink_rehearsal.DrinkRetrievalRehearsal(world).states[:3]:
         work()
     assert world.body_joint('fridge', DOOR_JOINT) > np.radians(85.0)
     assert not [contact for contact in world.contacts('fridge') if contact.other == 'robot']
+    world.close()
+
+
+@pytest.mark.parametrize('degrees', [0, 60, 95])
+def test_one_look_at_the_fridge_sets_right_where_the_robot_believes_to_stand(degrees):
+    world = World(door_at(degrees, base=(0.58, -0.05, 0.03)))
+    robot = DirectRobot(world)
+    robot.localise(world.true_base() @ from_rpy((0.05, -0.04, 0.0), yaw=-0.03))  # it is wrong
+    skills = KitchenSkills(SkillContext(robot, installed_model()), Kitchen())
+    skills.localise_at_fridge(LocaliseAtFridgeGoal(), lambda status: None)
+    off = np.linalg.inv(world.true_base()) @ robot.odom_from_base()
+    assert np.hypot(*off[:2, 3]) < 0.006 and abs(off[1, 0]) < 0.006
+    world.close()
+
+
+def test_a_door_that_is_found_half_open_after_the_push_is_a_failure(monkeypatch):
+    world = World(door_at(60, base=(0.4, -0.1, 0.0)))
+    monkeypatch.setattr(door, '_push_open', lambda *_: door.WIDE)  # the arm felt no resistance
+    with pytest.raises(SkillError, match='the door stands open by (59|60|61) degrees only'):
+        door.open_door(SkillContext(DirectRobot(world), installed_model()), Kitchen(), 'right')
     world.close()
 
 

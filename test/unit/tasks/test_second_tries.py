@@ -5,13 +5,21 @@ from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3
 from std_msgs.msg import ColorRGBA, Header
 
 import smach
-from smach_oracle.msg import DetectTabletopGoal, DetectTabletopResult, PickGoal, PointHeadGoal
-from smach_oracle.tasks.pick_and_place import VIEWS, TrialMemory
+from smach_oracle.msg import (
+    DetectDrinkGoal,
+    DetectDrinkResult,
+    DetectTabletopGoal,
+    DetectTabletopResult,
+    PickGoal,
+    PointHeadGoal,
+)
+from smach_oracle.tasks import drink_retrieval
+from smach_oracle.tasks.pick_and_place import VIEWS, TableMemory
 
 
 @pytest.fixture(name='memory')
 def _memory():
-    return TrialMemory()
+    return TableMemory()
 
 
 def looked_at(memory):
@@ -50,3 +58,17 @@ def test_each_pick_of_a_trial_says_how_many_there_were_before(memory):
     userdata = smach.UserData()
     userdata.objects, userdata.sizes, userdata.map_id = [PoseStamped()], [Vector3()], 'map'
     assert [memory.pick_goal(userdata, PickGoal()).attempt for _ in range(3)] == [0, 1, 2]
+
+
+def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_firmer():
+    memory, userdata = drink_retrieval.DrinkMemory(), smach.UserData()
+    for missed in range(3):
+        goal = memory.detect_goal(userdata, DetectDrinkGoal())
+        assert (goal.colour, goal.view) == (drink_retrieval.ORDERED, missed)
+        memory.detected(userdata, GoalStatus.ABORTED, DetectDrinkResult())
+    memory.detected(userdata, GoalStatus.SUCCEEDED, DetectDrinkResult())
+    assert memory.detect_goal(userdata, DetectDrinkGoal()).view == 3, 'that one showed it'
+    userdata.drink, userdata.size = PoseStamped(), Vector3()
+    assert [memory.pick_goal(userdata, PickGoal()).attempt for _ in range(2)] == [0, 1]
+    memory.begin()
+    assert memory.detect_goal(userdata, DetectDrinkGoal()).view == 0

@@ -7,6 +7,7 @@ from typing import Optional
 
 import rosgraph
 import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
@@ -36,6 +37,7 @@ from ..physics.world import World
 from ..scenes.tasks import draw
 from .camera_publisher import CameraPublisher
 from .controllers import Controllers
+from .goals import BadGoal, odom_from_pose
 from .loop import PERIOD_S, WorldLoop, WorldStopped
 from .motion_table import MotionTable
 from .reveal import reveal
@@ -82,6 +84,9 @@ class WorldNode:
         self._published = -1  # the world's periods at the last state that was published
         self._controllers = Controllers(self._world, self._loop, self._motions,
                                         lambda: self._clock.now_ns / 1e9, self._publish_state)
+        rospy.Subscriber('initialpose', PoseWithCovarianceStamped,
+                         lambda message: self._loop.post(lambda: self._localise(message)),
+                         queue_size=10, tcp_nodelay=True)
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/reveal', Reveal, self._answer_reveal),
@@ -131,6 +136,16 @@ class WorldNode:
         self._loop.watch.add_time('camera')
         self._camera.publish(image.colour, image.depth, image.intrinsics, stamp)
         self._loop.watch.add_time('publish')
+
+    def _localise(self, message: PoseWithCovarianceStamped) -> None:
+        """Take the robot's word for where it stands."""
+        target = PoseStamped(message.header, message.pose.pose)
+        try:
+            self._world.localise(odom_from_pose(target, self._world.odom_from_base()))
+        except BadGoal as err:
+            rospy.logwarn('initialpose refused: %s', err)
+            return
+        self._publish_state()
 
     def _snapshot(self, camera: bool) -> rospy.Time:
         if camera:

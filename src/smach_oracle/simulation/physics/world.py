@@ -185,6 +185,10 @@ class World:
         """4x4, where the robot believes to stand: odom_combined, the world's frame, from base."""
         return self._robot.base() @ inverse(self.belief_error)
 
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """Have the robot believe to stand at a pose (4x4), as it has found out by looking."""
+        self.belief_error = inverse(odom_from_base) @ self._robot.base()
+
     def drive_error(self, share: float = 1.0) -> np.ndarray:
         """4x4, by how much the next drive will miss its goal unknown to the robot.
 

@@ -60,6 +60,10 @@ class DirectRobot:
         """See Robot."""
         self._do(lambda: BaseMotion(odom_from_goal))
 
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """See Robot."""
+        self._world.localise(odom_from_base)
+
     def see(self) -> CameraImage:
         """See Robot."""
         return see(self._world)

@@ -52,7 +52,7 @@ def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> Ki
     angle = float(generator.uniform(0.5, 0.9))
     return caused(draft, 'door_swings_back',
                   'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
-                  Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
+                  Disturbance('swing:fridge', 'drive:9', (('angle', angle), ('duration', 1.5))))
 
 
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -70,14 +70,14 @@ def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraf
 
 
 def _glare(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """The camera is dazzled when it turns to the drinks, after it has looked at the door twice."""
+    """The camera is dazzled when it turns to the drinks, after it has looked at the door."""
     dropout = float(generator.uniform(0.93, 0.99))
     frames = 2 if generator.random() < LONG_GLARE else 1
     return caused(
         draft, 'glare',
         'the sun shines into the camera for {} frames: {:.0f}% of the depth is lost'.format(
             frames, 100 * dropout),
-        Disturbance('glare', 'look_at:3', (('dropout', dropout), ('frames', frames))))
+        Disturbance('glare', 'look_at:4', (('dropout', dropout), ('frames', frames))))
 
 
 def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -100,7 +100,7 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
         draft, 'drink_moved',
         'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
             100 * float(np.hypot(dx, dy))),
-        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:3', values))
+        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:4', values))
 
 
 def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
