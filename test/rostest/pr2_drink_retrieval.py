@@ -38,7 +38,7 @@ from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import drink_retrieval
 
 STATES = [
-    'RAISE_TORSO', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
+    'RAISE_TORSO', 'LOCALISE', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
     'CLOSE_FRIDGE', 'MOVE_HOME', 'HAND_OVER'
 ]
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'
@@ -91,10 +91,10 @@ class DrinkRetrievalTest(unittest.TestCase):
              "unknown arm ''"),
             ('hand_over', HandOverAction, HandOverGoal('right',
                                                        NOWHERE), GoalStatus.ABORTED, 'not finite'),
-            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(math.nan), GoalStatus.ABORTED,
-             'min_height is nan'),
-            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(0.05), GoalStatus.ABORTED,
-             'the door hides'),
+            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(min_height=math.nan),
+             GoalStatus.ABORTED, 'min_height is nan'),
+            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(min_height=0.05),
+             GoalStatus.ABORTED, 'the door hides'),
             ('move_base', MoveBaseAction, MoveBaseGoal(NOWHERE), GoalStatus.REJECTED, 'finite'),
             ('torso_controller/position_joint_action', SingleJointPositionAction,
              SingleJointPositionGoal(position=math.nan), GoalStatus.REJECTED, 'nan')

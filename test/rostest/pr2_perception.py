@@ -68,7 +68,8 @@ class Eyes(unittest.TestCase):
         return min(float(np.linalg.norm(place(pose) - place(body.pose))) for body in self.things)
 
     def test_the_table_s_objects_are_where_they_are(self) -> None:
-        handle = self.ended('detect_tabletop', DetectTabletopAction, DetectTabletopGoal(0.02))
+        handle = self.ended('detect_tabletop', DetectTabletopAction,
+                                DetectTabletopGoal(min_height=0.02))
         result = handle.get_result()
         self.assertEqual(handle.get_goal_status(), GoalStatus.SUCCEEDED, result.reason)
         self.assertEqual(len(result.objects), len(result.sizes))
@@ -79,7 +80,8 @@ class Eyes(unittest.TestCase):
 
     def test_a_height_that_is_none_aborts_with_what_is_allowed(self) -> None:
         for height in (float('nan'), -1.0, 7.0):
-            handle = self.ended('detect_tabletop', DetectTabletopAction, DetectTabletopGoal(height))
+            handle = self.ended('detect_tabletop', DetectTabletopAction,
+                                DetectTabletopGoal(min_height=height))
             self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
             self.assertIn('allowed: 0 to 0.3', handle.get_result().reason)
 
@@ -88,7 +90,8 @@ class Eyes(unittest.TestCase):
                                        'there is nothing on the table that stands higher than'),
                                       ((0.5, -1.5, 1.6), 0.02, 'no table in view')):
             self.robot.look_at(target)
-            handle = self.ended('detect_tabletop', DetectTabletopAction, DetectTabletopGoal(height))
+            handle = self.ended('detect_tabletop', DetectTabletopAction,
+                                DetectTabletopGoal(min_height=height))
             self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
             self.assertIn(words, handle.get_result().reason)
             self.assertEqual(handle.get_goal_status_text(), handle.get_result().reason)

@@ -38,6 +38,14 @@ def pose(x, y, z, frame=BASE):
     return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
 
+def picking(target, map_id=''):
+    return PickGoal(arm='right', object=target, size=SIZE, map_id=map_id)
+
+
+def placing(place, grasp, arm='right'):
+    return PlaceGoal(arm=arm, pose=place, grasp=grasp)
+
+
 class PickAndPlaceTest(unittest.TestCase):
 
     @classmethod
@@ -71,14 +79,12 @@ class PickAndPlaceTest(unittest.TestCase):
             ('point_head', PointHeadAction,
              PointHeadGoal(PointStamped(Header(frame_id='moon'),
                                         Point(1, 0, 1))), "frame 'moon'; allowed"),
-            ('pick', PickAction, PickGoal('right', pose(math.nan, 0, 0), SIZE, ''), 'not finite'),
-            ('pick', PickAction, PickGoal('right', good, SIZE,
-                                          'map of the moon'), 'no collision map'),
-            ('pick', PickAction, PickGoal('right', pose(2.5, 0.0, 0.8), SIZE, ''), 'out of reach'),
-            ('place', PlaceAction, PlaceGoal('right', good, good,
-                                             ''), 'there is nothing to stand on'),
-            ('place', PlaceAction, PlaceGoal('right', pose(math.inf, 0, 0), good, ''), 'pose: '),
-            ('place', PlaceAction, PlaceGoal('up', good, good, ''), "unknown arm 'up'")
+            ('pick', PickAction, picking(pose(math.nan, 0, 0)), 'not finite'),
+            ('pick', PickAction, picking(good, 'map of the moon'), 'no collision map'),
+            ('pick', PickAction, picking(pose(2.5, 0.0, 0.8)), 'out of reach'),
+            ('place', PlaceAction, placing(good, good), 'there is nothing to stand on'),
+            ('place', PlaceAction, placing(pose(math.inf, 0, 0), good), 'pose: '),
+            ('place', PlaceAction, placing(good, good, 'up'), "unknown arm 'up'")
         ]:
             status, result = self.ended(self.sent(name, spec, goal))
             self.assertEqual((name, status), (name, GoalStatus.ABORTED))
@@ -87,11 +93,11 @@ class PickAndPlaceTest(unittest.TestCase):
     def test_2_what_is_cancelled_stops_and_what_comes_next_is_done(self):
         self.assertTrue(self.reset(seed=3).ok)
         begun = threading.Event()
-        picking = self.sent('pick', PickAction, PickGoal('right', pose(0.6, -0.1, 0.78), SIZE, ''),
+        client = self.sent('pick', PickAction, picking(pose(0.6, -0.1, 0.78)),
                             feedback_cb=lambda feedback: begun.set())
         self.assertTrue(begun.wait(60.0))
-        picking.cancel_goal()
-        status, result = self.ended(picking)
+        client.cancel_goal()
+        status, result = self.ended(client)
         self.assertEqual(status, GoalStatus.PREEMPTED)
         self.assertTrue(result.reason)
         aside = self.sent('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal())

@@ -92,6 +92,14 @@ def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
                  np.array([out, kitchen.width - kitchen.handle_inset, height]))
 
 
+def door_angle_at(kitchen: Kitchen, handle: np.ndarray) -> float:
+    """How far the door is open, rad, with its handle at a point (3,) of the fridge's frame."""
+    hinge = np.array([0.0, kitchen.width / 2])
+    shut, now = (np.arctan2(*(point[:2] - hinge)[::-1])
+                 for point in (handle_point(kitchen, 0.0, 0.0), handle))
+    return float((shut - now + np.pi) % (2 * np.pi) - np.pi)
+
+
 def fridge_boxes(kitchen: Kitchen, base_from_fridge: np.ndarray, door_angle: float) -> List[MapBox]:
     """The fridge as boxes for a collision map: walls, shelves, the door and, last, its handle.
 
@@ -131,8 +139,12 @@ def shelf_region(kitchen: Kitchen) -> Tuple[np.ndarray, np.ndarray]:
 
 def look_point(kitchen: Kitchen, base_from_fridge: np.ndarray) -> np.ndarray:
     """(3,) in the frame of the base: where to point the camera to see the drinks."""
-    floor = kitchen.shelves[kitchen.drinks_shelf]
-    return apply(base_from_fridge, np.array([0.15, 0.0, floor + 0.05]))
+    return apply(base_from_fridge, shelf_point(kitchen))
+
+
+def shelf_point(kitchen: Kitchen) -> np.ndarray:
+    """(3,) in the fridge's frame: the middle of where drinks stand."""
+    return np.array([0.15, 0.0, kitchen.shelves[kitchen.drinks_shelf] + 0.05])
 
 
 def _placed(base_from_part: np.ndarray, centre: Tuple[float, float, float],

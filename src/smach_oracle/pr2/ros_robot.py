@@ -8,7 +8,14 @@ import genpy
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Vector3,
+)
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -203,9 +210,8 @@ class RosRobot:
         """
         if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
             raise RobotError('drive: the goal is no finite 4x4 pose')
-        place = Point(*odom_from_goal[:3, 3].tolist())
-        pose = Pose(place, Quaternion(*quaternion(odom_from_goal).tolist()))
-        self._do('move_base', MoveBaseGoal(PoseStamped(Header(frame_id=ODOM_FRAME), pose)), 'base')
+        target = PoseStamped(Header(frame_id=ODOM_FRAME), _pose_of(odom_from_goal))
+        self._do('move_base', MoveBaseGoal(target), 'base')
 
     def _do(self, name: str, goal: genpy.Message, what: str,
             stalls: bool = False) -> genpy.Message:
@@ -267,6 +273,11 @@ class RosRobot:
                 GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted',
                 GoalStatus.RECALLED: 'preempted'
             }.get(event.status, 'failed'), ': ' + text if text else ''))
+
+
+def _pose_of(pose: np.ndarray) -> Pose:
+    """A 4x4 as a message."""
+    return Pose(Point(*pose[:3, 3].tolist()), Quaternion(*quaternion(pose).tolist()))
 
 
 def _duration(seconds: float) -> rospy.Duration:

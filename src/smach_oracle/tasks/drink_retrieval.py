@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Fetch a drink out of a refrigerator and hand it over, again and again (the paper's VI-B).
 
-A plain SMACH script over actions. It stops a trial at the first action that fails.
+A plain SMACH script over actions. It stops a trial at the first action that fails. Whoever has a
+state executed again, in the same trial, has it done otherwise: the robot looks into the fridge from
+another head pose, and grips the drink firmer.
 """
 import argparse
 import math
@@ -9,6 +11,7 @@ import sys
 from typing import Any, List, Optional
 
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from std_msgs.msg import Header
@@ -20,8 +23,10 @@ from smach_oracle.msg import (
     CloseDoorGoal,
     DetectDrinkAction,
     DetectDrinkGoal,
+    DetectDrinkResult,
     HandOverAction,
     HandOverGoal,
+    LocaliseAtFridgeAction,
     OpenDoorAction,
     OpenDoorGoal,
     PickAction,
@@ -35,6 +40,7 @@ ODOM = 'odom_combined'
 # the collision map that PICK plans in: the known furniture, and what the camera sees on its shelf
 FRIDGE = 'fridge'
 TORSO_HEIGHT = 0.25  # m
+MIN_HEIGHT = 0.05  # m above the shelf
 ORDERED = 'red'  # the colour of the drink that the person has ordered
 # x, y in m, yaw in rad, in odom_combined
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
@@ -43,23 +49,52 @@ HOME = (0.0, 0.0, math.pi / 2)
 PALM = (0.0, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
 
 
+class DrinkMemory:
+    """What the script remembers in the course of one trial, and the goals that go by it."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the trial before."""
+        self._missed = 0  # looks that did not show the drink
+        self._picks = 0
+
+    def detect_goal(self, userdata: smach.UserData, goal: DetectDrinkGoal) -> DetectDrinkGoal:
+        """Look for the drink; from another head pose after each look that did not show it."""
+        return DetectDrinkGoal(MIN_HEIGHT, ORDERED, self._missed % 256)
+
+    def detected(self, userdata: smach.UserData, status: int, result: DetectDrinkResult) -> None:
+        """Keep whether the drink was seen."""
+        self._missed += status != GoalStatus.SUCCEEDED
+
+    def pick_goal(self, userdata: smach.UserData, goal: PickGoal) -> PickGoal:
+        """Pick the drink with the right arm; the door stands open on the left."""
+        self._picks += 1
+        return PickGoal('right', userdata.drink, userdata.size, FRIDGE, min(self._picks - 1, 255))
+
+
 def make_machine() -> smach.StateMachine:
-    """The state machine of Fig. 7 in the paper, without its oracle."""
+    """The state machine of Fig. 7 in the paper, with a look at where it stands, without oracle."""
+    memory = DrinkMemory()
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    sm.register_start_cb(lambda userdata, initial_states: memory.begin())
     with sm:
-        smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'OPEN_FRIDGE'})
+        smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'LOCALISE'})
+        smach.StateMachine.add('LOCALISE', action('localise_at_fridge', LocaliseAtFridgeAction),
+                               {'succeeded': 'OPEN_FRIDGE'})
         smach.StateMachine.add('OPEN_FRIDGE',
                                action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
                                {'succeeded': 'MOVE_IN'})
         smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
         smach.StateMachine.add('DETECT_DRINK',
                                action('detect_drink', DetectDrinkAction,
-                                      goal=DetectDrinkGoal(min_height=0.05, colour=ORDERED),
+                                      goal_cb=memory.detect_goal, result_cb=memory.detected,
                                       result_slots=['drink', 'size']),
                                {'succeeded': 'PICK_DRINK'})
         smach.StateMachine.add(
             'PICK_DRINK',
-            action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size'],
+            action('pick', PickAction, goal_cb=memory.pick_goal, input_keys=['drink', 'size'],
                    result_slots=['grasp']), {'succeeded': 'MOVE_OUT'})
         smach.StateMachine.add('MOVE_OUT', drive(*OUT_OF_THE_FRIDGE), {'succeeded': 'CLOSE_FRIDGE'})
         smach.StateMachine.add('CLOSE_FRIDGE',
@@ -88,11 +123,6 @@ def drive(x_m: float, y_m: float, yaw: float) -> SimpleActionState:
     heading = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     target = PoseStamped(Header(frame_id=ODOM), Pose(Point(x_m, y_m, 0.0), heading))
     return action('move_base', MoveBaseAction, goal=MoveBaseGoal(target))
-
-
-def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
-    """Pick the drink with the right arm; the door stands open on the left."""
-    return PickGoal('right', userdata.drink, userdata.size, FRIDGE)
 
 
 def palm() -> PoseStamped:

@@ -1,21 +1,26 @@
 #!/usr/bin/env python3
 """Pick an object from a table and place it elsewhere, again and again (the paper's VI-B).
 
-A plain SMACH script over actions. It stops a trial at the first action that fails.
+A plain SMACH script over actions. It stops a trial at the first action that fails. Whoever has a
+state executed again, in the same trial, has it done otherwise: the head looks from elsewhere after
+a look that saw too little, the object is known again by its colour and size, and the gripper holds
+it firmer.
 """
 import argparse
 import sys
 from typing import Any, List, Optional
 
 import rospy
-from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
-from std_msgs.msg import Header
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA, Header
 
 import smach
 from smach_oracle.msg import (
     BuildCollisionMapAction,
     DetectTabletopAction,
     DetectTabletopGoal,
+    DetectTabletopResult,
     MoveArmsAsideAction,
     PickAction,
     PickGoal,
@@ -29,22 +34,68 @@ from smach_ros import SimpleActionState
 
 SERVER_WAIT_S = 20.0
 BASE = 'base_link'
+MIN_HEIGHT = 0.02  # m above the table
+# m in BASE, what the head is pointed at: the middle of the table, then beyond and before it. Each
+# shows all places at which the nearest object can stand
+VIEWS = ((0.65, 0.0, 0.75), (0.85, 0.0, 0.75), (0.50, 0.0, 0.75))
+PLACE_TOLERANCE = 0.045  # m, of the area on which the object may stand
+
+
+class TableMemory:
+    """What the script remembers in the course of one trial, and the goals that go by it."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the trial before."""
+        self._missed = 0  # looks that did not show the object
+        self._look_at: Optional[PointStamped] = None  # where the last one said there is more to see
+        self._picks = 0
+        # what the object looked like when it was first seen; a 0: not seen yet
+        self._colour, self._size = ColorRGBA(), Vector3()
+
+    def head_goal(self, userdata: smach.UserData, goal: PointHeadGoal) -> PointHeadGoal:
+        """Look at the table; from another head pose after each look that showed too little."""
+        view = PointStamped(Header(frame_id=BASE), Point(*VIEWS[self._missed % len(VIEWS)]))
+        return PointHeadGoal(self._look_at or view)
+
+    def detect_goal(self, userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTabletopGoal:
+        """Find the nearest object, and from then on that one."""
+        return DetectTabletopGoal(MIN_HEIGHT, self._colour, self._size)
+
+    def detected(self, userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
+        """Keep what the object looks like, or that it was not seen."""
+        if status != GoalStatus.SUCCEEDED:
+            self._missed += 1
+            known = result is not None and result.look_at.header.frame_id
+            self._look_at = result.look_at if known else None
+        elif not self._colour.a:
+            self._colour, self._size = result.colours[0], result.sizes[0]
+
+    def pick_goal(self, userdata: smach.UserData, goal: PickGoal) -> PickGoal:
+        """Pick the object with the right arm."""
+        self._picks += 1
+        return PickGoal('right', userdata.objects[0], userdata.sizes[0], userdata.map_id,
+                        min(self._picks - 1, 255))
 
 
 def make_machine() -> smach.StateMachine:
     """The state machine of Fig. 5 in the paper, without its oracle."""
+    memory = TableMemory()
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'],
                             input_keys=['place_pose'])
+    sm.register_start_cb(lambda userdata, initial_states: memory.begin())
     with sm:
         smach.StateMachine.add('MOVE_ARMS_ASIDE', action('move_arms_aside', MoveArmsAsideAction),
                                {'succeeded': 'POINT_HEAD'})
         smach.StateMachine.add('POINT_HEAD', action('point_head', PointHeadAction,
-                                                    goal=head_goal()),
+                                                    goal_cb=memory.head_goal),
                                {'succeeded': 'DETECT_TABLETOP'})
         smach.StateMachine.add(
             'DETECT_TABLETOP',
-            action('detect_tabletop', DetectTabletopAction, goal=DetectTabletopGoal(0.02),
-                   result_slots=['table', 'objects', 'sizes']),
+            action('detect_tabletop', DetectTabletopAction, goal_cb=memory.detect_goal,
+                   result_cb=memory.detected, result_slots=['table', 'objects', 'sizes']),
             {'succeeded': 'BUILD_COLLISION_MAP'})
         smach.StateMachine.add(
             'BUILD_COLLISION_MAP',
@@ -53,8 +104,9 @@ def make_machine() -> smach.StateMachine:
             {'succeeded': 'PICK'})
         smach.StateMachine.add(
             'PICK',
-            action('pick', PickAction, goal_cb=pick_goal, input_keys=['objects', 'sizes', 'map_id'],
-                   result_slots=['grasp']), {'succeeded': 'PLACE'})
+            action('pick', PickAction, goal_cb=memory.pick_goal,
+                   input_keys=['objects', 'sizes', 'map_id'], result_slots=['grasp']),
+            {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', action('place', PlaceAction, goal_cb=place_goal,
                                                input_keys=['place_pose', 'grasp', 'map_id']))
     return sm
@@ -66,19 +118,9 @@ def action(name: str, spec: type, **options: Any) -> SimpleActionState:
                              **options)
 
 
-def head_goal() -> PointHeadGoal:
-    """Look at the middle of the table (m, in the robot's base frame)."""
-    return PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75)))
-
-
-def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
-    """Pick the nearest object with the right arm."""
-    return PickGoal('right', userdata.objects[0], userdata.sizes[0], userdata.map_id)
-
-
 def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
-    """Place what the right arm holds."""
-    return PlaceGoal('right', userdata.place_pose, userdata.grasp, userdata.map_id)
+    """Place what the right arm holds, at a free spot near enough."""
+    return PlaceGoal('right', userdata.place_pose, userdata.grasp, userdata.map_id, PLACE_TOLERANCE)
 
 
 def place_pose() -> PoseStamped:

@@ -61,7 +61,7 @@ def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(worl
 def test_a_drink_that_two_fingers_press_on_counts_as_held(world, seed):
     """Though there be a hair's breadth between a finger and the drink, as the solver has it."""
     world.reset(before_the_shelf(seed))
-    pull_out(attempt(world), lambda scene: scene.bodies['drink_0'])
+    pull_out(attempt(world), SeenScene.wanted, SHELF)
     assert world.holding('drink_0') == 'right'
 
 

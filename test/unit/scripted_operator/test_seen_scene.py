@@ -55,9 +55,10 @@ def test_what_stands_close_or_on_the_place_is_in_the_way_and_there_is_room_elsew
     scene = draw(2, benign=True)
     things = {body.name: body for body in scene.bodies}
     target = things['object_0']
-    close = things['object_2']._replace(position=(target.position[0] + 0.055,
-                                                  target.position[1] + 0.045,
-                                                  things['object_2'].position[2]))
+    table = target.position[2] - target.size[2] / 2
+    close = things['object_2']._replace(shape='cylinder', size=(0.03, 0.03, 0.12),
+                                        position=(target.position[0] + 0.055,
+                                                  target.position[1] + 0.045, table + 0.06))
     world.reset(scene._replace(bodies=tuple(
         close if body.name == close.name else body for body in scene.bodies)))
     seen = DirectWatcher(world).look_at(LOOK)

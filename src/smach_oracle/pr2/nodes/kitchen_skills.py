@@ -5,6 +5,8 @@ from smach_oracle.msg import (
     CloseDoorResult,
     HandOverGoal,
     HandOverResult,
+    LocaliseAtFridgeGoal,
+    LocaliseAtFridgeResult,
     OpenDoorGoal,
     OpenDoorResult,
     PickGoal,
@@ -18,9 +20,10 @@ from ..planning.arm import Arm, SkillContext, encoder_readings, known_arm, seed_
 from ..skills.door import close_door, open_door
 from ..skills.fridge_pick import pick_from_fridge
 from ..skills.hand_over import hand_over
+from ..skills.localise import localise_at_fridge
 from ..skills.pick import FIRM, HeldObject
 from .frames import box_in_base, pose_in_base, pose_message
-from .manipulation import USUAL, Manipulation
+from .manipulation import USUAL, Manipulation, elsewhere_of
 from .skill_server import ReportStatus
 
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
@@ -32,6 +35,13 @@ class KitchenSkills(Manipulation):
     def __init__(self, context: SkillContext, kitchen: Kitchen) -> None:
         super().__init__(context)
         self.kitchen = kitchen
+
+    def localise_at_fridge(self, goal: LocaliseAtFridgeGoal,
+                           report: ReportStatus) -> LocaliseAtFridgeResult:
+        """Look at the refrigerator, and set right where the robot believes to stand."""
+        report('looking where the refrigerator stands')
+        found = localise_at_fridge(self.context, self.kitchen)
+        return LocaliseAtFridgeResult(x=found.x, y=found.y, yaw=found.yaw)
 
     def open_door(self, goal: OpenDoorGoal, report: ReportStatus) -> OpenDoorResult:
         """Open the refrigerator; what slipped before that is forgotten."""
@@ -56,9 +66,9 @@ class KitchenSkills(Manipulation):
         self.held.pop(arm, None)
         limbs = limbs_of(self._links, encoder_readings(self.context.robot))
         others = things_on_shelf(self.context.robot.see(), self.kitchen, fridge, limbs)
-        with self.firmer_after_slip() as effort:
+        with self.firmer_after_slip(goal.attempt) as effort:
             self.held[arm] = pick_from_fridge(self.context, self.kitchen, fridge, arm, target,
-                                              others, effort)
+                                              others, effort, elsewhere_of(goal.attempt))
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def hand_over(self, goal: HandOverGoal, report: ReportStatus) -> HandOverResult:

@@ -1,11 +1,12 @@
 """The manipulation skills over messages: goals in, results out. The node gives them servers."""
 import contextlib
-from typing import Dict, Iterator, Optional, Tuple, Type
+from typing import Dict, Iterator, Mapping, Optional, Tuple, Type
 
 import numpy as np
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.joints import read_joints
+from smach_oracle.geometry.links import link_pose
 from smach_oracle.geometry.transforms import inverse, yaw_of
 from smach_oracle.msg import (
     BuildCollisionMapGoal,
@@ -19,11 +20,12 @@ from smach_oracle.msg import (
     PointHeadGoal,
     PointHeadResult,
 )
+from smach_oracle.oracle.number_checks import is_number
 
 from ..kitchen import MapBox
 from ..perception.clusters import NotSeen
 from ..perception.own_limbs import limbs_of
-from ..perception.tabletop import find_tabletop
+from ..perception.tabletop import find_tabletop, things_on_table
 from ..planning.arm import (
     FEEL_EFFORT,
     SkillContext,
@@ -33,6 +35,7 @@ from ..planning.arm import (
     stands_open,
 )
 from ..planning.collision_map import (
+    PADDING,
     CollisionMap,
     CollisionMapStore,
     around,
@@ -40,10 +43,11 @@ from ..planning.collision_map import (
     map_of_image,
     nearest_object,
 )
-from ..robot import ARMS
+from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
 from ..skills.arms_aside import arms_aside, is_aside
 from ..skills.pick import FIRM, HeldObject, ObjectSlipped, pick
 from ..skills.place import ObjectLost, place, put_back, stands_there
+from ..skills.spots import FARTHEST
 from .frames import box_in_base, point_in_base, pose_in_base, pose_message
 from .skill_server import ReportStatus
 
@@ -51,7 +55,17 @@ from .skill_server import ReportStatus
 TABLE_SIZE = np.array([1.4, 0.7, 0.0])
 SAME_GRASP = 0.02  # m between two poses of the tool that are taken for the same grasp
 BESIDE_GRASP = 0.07  # m from the tool to the middle of what it grasped, at most
+ABOUT = 0.25  # m around a place within which what stands there counts
+KNOWN = 0.04  # m between the middles of two boxes that are the same thing
 USUAL = np.array([0.03, 0.03, 0.06])  # m, half extents of a held thing that nothing is known of
+
+
+def elsewhere_of(attempt: int) -> int:
+    """How many ways to grasp a thing have failed: the first is tried twice, firmer the second time.
+
+    :param attempt: of a goal.
+    """
+    return max(0, attempt - 1)
 
 
 class Manipulation:
@@ -114,24 +128,29 @@ class Manipulation:
         self._put_back(arm, boxes)
         report('choosing a grasp')
         with self._withdrawing(arm, boxes):
-            with self.firmer_after_slip() as effort:
-                self.held[arm] = pick(self.context, arm, target, boxes, effort)
+            with self.firmer_after_slip(goal.attempt) as effort:
+                self.held[arm] = pick(self.context, arm, target, boxes, effort,
+                                      elsewhere_of(goal.attempt))
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
-        """Put down what is held, and look whether it stands there.
+        """Look at the place, put down what is held at a free spot, and look whether it stands.
 
-        :raises SkillError: where it does not.
+        :raises SkillError: where it does not, or there is no such spot.
         """
         arm = known_arm(goal.arm)
         robot = self.context.robot
+        if not is_number(goal.tolerance, 0, FARTHEST):
+            raise SkillError('tolerance is {} m; allowed: 0 to {}'.format(goal.tolerance, FARTHEST))
         centre = pose_in_base(goal.pose, robot, 'pose')[:3, 3]
         grasp = pose_in_base(goal.grasp, robot, 'grasp')
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen()
         held, boxes = self._held_object(arm, grasp, made)
+        report('looking at the place')
+        boxes.update(self._standing_at(arm, centre, goal.tolerance, held, boxes))
         report('choosing a way')
-        with self._withdrawing(arm, boxes, ObjectLost):
-            stood = place(self.context, arm, centre, held, boxes)
+        with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
+            stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
         self.held.pop(arm, None)
         report('looking whether it stands there')
         boxes['placed'] = MapBox(stood, held.half, 0.0)
@@ -140,16 +159,39 @@ class Manipulation:
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
 
+    def _standing_at(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
+                     boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:
+        """What stands about a place by now, and is not on the map: boxes by name.
+
+        :param boxes: the map.
+        """
+        robot = self.context.robot
+        robot.look_at(centre)
+        joints = encoder_readings(robot)
+        hand = link_pose(self._links, BASE_FRAME, TOOL_FRAME[arm], joints) @ held.tool_from_object
+        seen = things_on_table(robot.see(), limbs_of(self._links, joints))
+        return {
+            'thing {}'.format(k): MapBox(box.centre, box.size / 2 + PADDING, box.yaw)
+            for k, box in enumerate(seen)
+            if np.hypot(*(box.centre - centre)[:2]) < tolerance + ABOUT
+            and np.hypot(*(box.centre - hand[:3, 3])[:2]) > ABOUT / 2 and all(
+                np.hypot(*(box.centre - other.centre)[:2]) > KNOWN
+                for name, other in boxes.items() if name.startswith('object'))
+        }
+
     def forget_slips(self) -> None:
         """The next grip is as gentle as the first."""
         self._effort = FEEL_EFFORT
 
     @contextlib.contextmanager
-    def firmer_after_slip(self) -> Iterator[float]:
-        """How firmly to grip, N; where it slips all the same, the next grip is the firmest."""
+    def firmer_after_slip(self, attempt: int = 0) -> Iterator[float]:
+        """How firmly to grip, N; where it slips all the same, the next grip is the firmest.
+
+        :param attempt: how often it has been tried before; after the first time, the grip is firm.
+        """
         try:
-            yield self._effort
-        except ObjectSlipped:
+            yield FIRM if attempt else self._effort
+        except (ObjectSlipped, ObjectLost):
             self._effort = FIRM
             raise
 

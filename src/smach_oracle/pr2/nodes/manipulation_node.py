@@ -5,6 +5,7 @@ from smach_oracle.msg import (
     BuildCollisionMapAction,
     CloseDoorAction,
     HandOverAction,
+    LocaliseAtFridgeAction,
     MoveArmsAsideAction,
     OpenDoorAction,
     PickAction,
@@ -38,6 +39,7 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
                  CollisionMapPublisher(skills.build_collision_map, skills.maps))
     server.offer('pick', PickAction, skills.pick)
     server.offer('place', PlaceAction, skills.place)
+    server.offer('localise_at_fridge', LocaliseAtFridgeAction, skills.localise_at_fridge)
     server.offer('open_door', OpenDoorAction, skills.open_door)
     server.offer('close_door', CloseDoorAction, skills.close_door)
     server.offer('hand_over', HandOverAction, skills.hand_over)
@@ -46,9 +48,9 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
 def main() -> None:
     """Entry point of the node."""
     parameters_only(
-        'Node: move_arms_aside, point_head, build_collision_map, pick, place, open_door, '
-        'close_door and '
-        'hand_over as actions. Parameters: ~snapshot, ~pass_time, ~kitchen; see doc/simulation.md.')
+        'Node: move_arms_aside, point_head, build_collision_map, pick, place, localise_at_fridge, '
+        'open_door, close_door and hand_over as actions. Parameters: ~snapshot, ~pass_time, '
+        '~kitchen; see doc/simulation.md.')
     rospy.init_node('pr2_manipulation')
     try:
         kitchen = kitchen_at('~kitchen')

@@ -1,12 +1,17 @@
 """The node of the PR2's perception: objects on the table, a drink in the open refrigerator."""
-from typing import Dict, List, Optional
+import contextlib
+from typing import Dict, Iterator, List, Optional
 
+import numpy as np
 import rospy
 import yaml
+from geometry_msgs.msg import Point, PointStamped
 from rosgraph.names import is_legal_name
+from std_msgs.msg import ColorRGBA, Header
 
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.joints import Joint, read_joints
+from smach_oracle.geometry.transforms import apply
 from smach_oracle.msg import (
     DetectDrinkAction,
     DetectDrinkGoal,
@@ -21,18 +26,21 @@ from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.parameters import name_of
 
-from ..kitchen import Kitchen, base_from_fridge, kitchen_from, look_point
+from ..kitchen import Kitchen, base_from_fridge, kitchen_from, shelf_point
 from ..perception.clusters import Capsule, NotSeen
+from ..perception.colours import name_of as name_of_colour
 from ..perception.drink import find_drink
 from ..perception.own_limbs import limbs_of
-from ..perception.tabletop import find_tabletop
-from ..robot import Robot
+from ..perception.tabletop import Look, find_tabletop
+from ..robot import BASE_FRAME, Robot
 from ..ros_robot import NO_PASS_TIME, NO_SNAPSHOT, RosRobot
 from ..work_costs import Work
 from .frames import box_messages
-from .skill_server import ReportStatus, SkillServer
+from .skill_server import PartResultError, ReportStatus, SkillServer
 
 HIGHEST_LEAST = 0.3  # m: what is asked for as `min_height`
+# m in the fridge's frame, beside the point that the robot looks at by default
+VIEWS = ((0.0, 0.0, 0.0), (0.0, -0.22, 0.0), (0.0, 0.22, 0.0), (0.0, 0.0, 0.22))
 MODEL_WAIT_S = 60.0
 DETECTION = Work(detections=1)
 
@@ -61,15 +69,17 @@ class Perception:
         image = self._robot.see()
         limbs = self._limbs()
         self._robot.spend('perception', DETECTION)
-        found = find_tabletop(image, lowest, limbs)
+        with told_where_to_look(image):
+            found = find_tabletop(image, lowest, limbs, _look(goal))
         report('{} objects'.format(len(found.objects)))
         objects = [box_messages(box, _stamp(image)) for box in found.objects]
         return DetectTabletopResult(table=box_messages(found.table, _stamp(image))[0],
                                     objects=[pose for pose, _ in objects],
-                                    sizes=[size for _, size in objects])
+                                    sizes=[size for _, size in objects],
+                                    colours=[_message_of(each) for each in found.colours])
 
     def detect_drink(self, goal: DetectDrinkGoal, report: ReportStatus) -> DetectDrinkResult:
-        """The foremost drink on the shelf.
+        """The foremost drink on the shelf, or the foremost one of the colour asked for.
 
         :raises NotSeen: where none can be made out.
         :raises RobotError: where the head does not move, or no image comes.
@@ -77,16 +87,49 @@ class Perception:
         lowest = _height(goal.min_height)
         fridge = base_from_fridge(self._kitchen, self._robot.odom_from_base())
         report('looking into the refrigerator')
-        self._robot.look_at(look_point(self._kitchen, fridge))
+        aside = VIEWS[goal.view % len(VIEWS)]
+        self._robot.look_at(apply(fridge, shelf_point(self._kitchen) + aside))
         image = self._robot.see()
         limbs = self._limbs()
         self._robot.spend('perception', DETECTION)
-        pose, size = box_messages(find_drink(image, self._kitchen, fridge, lowest, limbs),
-                                  _stamp(image))
+        pose, size = box_messages(
+            find_drink(image, self._kitchen, fridge, lowest, limbs, goal.colour), _stamp(image))
         return DetectDrinkResult(drink=pose, size=size)
 
     def _limbs(self) -> List[Capsule]:
         return limbs_of(self._links, self._robot.joints())
+
+
+def _look(goal: DetectTabletopGoal) -> Optional[Look]:
+    """What the object that a goal asks for looks like; None where it asks for the nearest one.
+
+    :raises NotSeen: for numbers that are not allowed.
+    """
+    if goal.colour.a == 0:
+        return None
+    colour = (goal.colour.r, goal.colour.g, goal.colour.b)
+    size = (goal.size.x, goal.size.y, goal.size.z)
+    if not all(is_number(each, 0, 1) for each in colour + size):
+        raise NotSeen('colour is {}, size {} m; allowed: 0 to 1'.format(colour, size))
+    return Look(255.0 * np.array(colour), np.array(size))
+
+
+@contextlib.contextmanager
+def told_where_to_look(image: CameraImage) -> Iterator[None]:
+    """Where what fails knows it, the action's result says where to look to see more."""
+    try:
+        yield
+    except NotSeen as err:
+        if err.where is None:
+            raise
+        header = Header(frame_id=BASE_FRAME, stamp=_stamp(image))
+        raise PartResultError(
+            str(err), {'look_at': PointStamped(header, Point(*err.where))}) from err
+
+
+def _message_of(colour: np.ndarray) -> ColorRGBA:
+    """A colour (3,), 0 to 255, as a message; with a 0 where it is too dark to tell."""
+    return ColorRGBA(*(colour / 255.0), 1.0 if name_of_colour(colour) else 0.0)
 
 
 def _height(value: float) -> float:

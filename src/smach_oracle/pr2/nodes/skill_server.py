@@ -1,7 +1,7 @@
 """Skills as actions: one at a time, each failure an aborted action with its reason."""
 import threading
 import traceback
-from typing import Callable, List, Tuple, Type
+from typing import Callable, List, Mapping, Tuple, Type
 
 import actionlib
 import genpy
@@ -13,6 +13,14 @@ from ..robot import RobotError
 
 ReportStatus = Callable[[str], None]
 Handler = Callable[[genpy.Message, ReportStatus], genpy.Message]
+
+
+class PartResultError(SkillError):
+    """A failure that fills some fields of the action's result."""
+
+    def __init__(self, reason: str, fields: Mapping[str, object]) -> None:
+        super().__init__(reason)
+        self.fields = fields
 
 
 class SkillServer:
@@ -72,6 +80,9 @@ class SkillServer:
                 server_result = handler(goal, report)
             except expected as err:
                 result.reason = str(err)
+                if isinstance(err, PartResultError):
+                    for field, value in err.fields.items():
+                        setattr(result, field, value)
                 if server.is_preempt_requested():
                     server.set_preempted(result, result.reason)
                 else:

@@ -17,7 +17,14 @@ MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
 class NotSeen(Exception):
-    """What was looked for cannot be made out in the image; the text is the reason, for people."""
+    """What was looked for cannot be made out in the image; the text is the reason, for people.
+
+    :param where: (3,) m in the frame of the base, at which to look to see more; None: not known.
+    """
+
+    def __init__(self, reason: str, where: Optional[np.ndarray] = None) -> None:
+        super().__init__(reason)
+        self.where = where
 
 
 class Capsule(NamedTuple):

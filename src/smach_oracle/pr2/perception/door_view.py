@@ -9,7 +9,7 @@ from smach_oracle.geometry.transforms import apply, from_rpy, inverse
 
 from ..kitchen import Kitchen, door_frame
 
-COLUMNS = 213  # that are looked at
+COLUMNS = 214  # that are looked at, or all of those of a small image
 MOST_OPEN = np.radians(125.0)
 STEP = np.radians(1.0)
 SLACK = 0.12  # m that the map may be wrong across the door

@@ -11,6 +11,7 @@ from smach_oracle.geometry.plane import Plane, find_plane
 from smach_oracle.geometry.transforms import apply, inverse
 
 from ..kitchen import Kitchen, shelf_region
+from .blind import blind_beside, blind_distance, blind_patches
 from .clusters import (
     Capsule,
     Cluster,
@@ -22,7 +23,8 @@ from .clusters import (
     generator_of,
     limb_beside,
 )
-from .touching import why_several
+from .colours import GREY, NAMES, name_of, names_of
+from .touching import part_of, why_several
 
 SLACK = 0.12  # m that the map may be wrong, horizontally
 SHELF_SLACK = 0.04  # m, vertically
@@ -33,18 +35,26 @@ NARROW = (0.035, 0.085)  # m: a drink's smaller horizontal extent, as far as the
 WIDEST = 0.11  # m
 SHEET = 0.015  # m: what is thinner is a piece of a wall
 HEIGHTS = (0.05, 0.32)  # m
+WHOLE = 0.8  # share of a thing's points that have its colour, at least
+# how a reason ends where a patch of the image has no depth, before the shelf
+BLIND = ': depth is missing in a patch of the image, before the shelf'
 HIDDEN = 0.5  # share of the shelf from which its being hidden is the reason
 
 
 def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
-               min_height: float = 0.03, limbs: Sequence[Capsule] = ()) -> UprightBox:
+               min_height: float = 0.03, limbs: Sequence[Capsule] = (),
+               colour: str = '') -> UprightBox:
     """The foremost thing on the drinks' shelf that can be a drink, in the frame of the base.
 
     :param base_from_fridge: 4x4, where the map has the fridge; right to some 0.1 m.
     :param min_height: m above the shelf; lower clusters are no drinks. 0 or less: 0.03.
     :param limbs: where the robot's own arms are; they are taken out of what is seen.
-    :raises NotSeen: where the shelf is not in view or hidden, or nothing on it can be a drink.
+    :param colour: one of colours.NAMES: a drink of this colour, and no other; '': any.
+    :raises NotSeen: where the shelf is not in view or hidden, nothing on it can be such a drink, or
+        there is no such colour.
     """
+    if colour and colour not in NAMES:
+        raise NotSeen('colour is {!r}; allowed: {}'.format(colour, ', '.join(NAMES)))
     cloud = cloud_of(image, limbs)
     points = _about_shelf(cloud, kitchen, base_from_fridge)
     plane = find_plane(points, generator_of(image), tolerance=OFF_SHELF, least=LEAST_SHELF)
@@ -52,15 +62,42 @@ def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarra
         points[np.abs(plane.height(points)) < OFF_SHELF]) if plane is not None else points[:0]
     if plane is None or len(patch) < LEAST_SHELF:
         raise NotSeen(_no_shelf(image, kitchen, base_from_fridge, cloud))
-    clusters = _in_front(cloud, plane, patch, kitchen, base_from_fridge, min_height)
-    reasons = [_why_no_drink(cloud, each) for each in clusters]
+    seen = _in_front(cloud, plane, patch, kitchen, base_from_fridge, min_height)
+    clusters = _of_colour(cloud, seen, plane, colour) if colour else seen
+    blind = blind_patches(image)
+    reasons = [_why_no_drink(cloud, each, 'the {} thing'.format(colour)
+                             if colour else 'what is foremost', blind) for each in clusters]
     drinks = [each.box for each, reason in zip(clusters, reasons) if not reason]
     if drinks:
         return drinks[0]
     hidden = _share_hidden(image, kitchen, base_from_fridge)[1]
     if hidden > HIDDEN:
         raise NotSeen('no drink in view: the door hides {:.0f}% of the shelf'.format(100 * hidden))
-    raise NotSeen('no drink: ' + (reasons[0] if reasons else 'there is nothing on the shelf'))
+    raise NotSeen('no {}drink: {}'.format(
+        colour and colour + ' ', reasons[0] if reasons else _on_shelf(cloud, seen) +
+        ('' if blind_distance(image, blind, plane, patch) is None else BLIND)))
+
+
+def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
+               colour: str) -> List[Cluster]:
+    """What has a colour: whole things, and parts of things that touch; foremost first."""
+    found = []
+    for cluster in clusters:
+        pixels = cloud.colour[tuple(cluster.pixels.T)]
+        part = part_of(cluster, names_of(pixels) == colour, plane)
+        if part is not None and (colour != GREY or name_of(pixels.mean(axis=0)) == GREY):
+            whole = len(part.points) > WHOLE * len(cluster.points)
+            found.append(cluster if whole else part)
+    return found
+
+
+def _on_shelf(cloud: OrganizedCloud, clusters: Sequence[Cluster]) -> str:
+    """What is on the shelf, for people."""
+    names = [name_of(cloud.colour[tuple(each.pixels.T)].mean(axis=0)) or 'dark'
+             for each in clusters]
+    if not names:
+        return 'there is nothing on the shelf'
+    return 'there are {} things on the shelf: {}'.format(len(names), ', '.join(names))
 
 
 def things_on_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
@@ -100,23 +137,29 @@ def _in_front(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, kitchen: K
     return sorted(things, key=lambda cluster: float(cluster.box.centre @ inwards))
 
 
-def _why_no_drink(cloud: OrganizedCloud, cluster: Cluster) -> str:
-    """Why a cluster cannot be taken for a drink, or ''."""
+def _why_no_drink(cloud: OrganizedCloud, cluster: Cluster, what: str, blind: np.ndarray) -> str:
+    """Why a cluster cannot be taken for a drink, or ''.
+
+    :param what: what it is, for people.
+    :param blind: the patches of the image that have no depth.
+    """
     box = cluster.box
     extent = '{:.0f} x {:.0f} x {:.0f} cm'.format(*(100 * box.size))
     limb = limb_beside(cloud, cluster)
     if limb is not None:
-        return 'the {} hides part of what is foremost on the shelf'.format(limb)
+        return 'the {} hides part of {} on the shelf'.format(limb, what)
     if cut_off(cloud, cluster):
-        return 'what is foremost on the shelf is cut off by the edge of the image'
+        return '{} on the shelf is cut off by the edge of the image'.format(what)
+    if blind_beside(blind, cluster):
+        return '{} on the shelf may be hidden in part'.format(what) + BLIND
     if not HEIGHTS[0] <= box.size[2] <= HEIGHTS[1] or box.narrow < NARROW[0]:
-        return 'what is foremost on the shelf, {}, has not the size of a drink'.format(extent)
+        return '{} on the shelf, {}, has not the size of a drink'.format(what, extent)
     if box.narrow > NARROW[1] or box.wide > WIDEST:
-        return ('what is foremost on the shelf is too large, {}: '
-                'one thing, or several that touch'.format(extent))
+        return '{} on the shelf is too large, {}: one thing, or several that touch'.format(
+            what, extent)
     several = why_several(cloud, cluster)
-    return 'what is foremost on the shelf, {}, seems to be several things that touch: {}'.format(
-        extent, several) if several else ''
+    return '{} on the shelf, {}, seems to be several things that touch: {}'.format(
+        what, extent, several) if several else ''
 
 
 def _no_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,

@@ -1,5 +1,5 @@
 """The table and the objects on it in what the head camera sees: a plane, and clusters above it."""
-from typing import List, NamedTuple, Sequence
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.pieces import largest_patch
 from smach_oracle.geometry.plane import Plane, find_plane
 
+from .blind import blind_beside, blind_distance, blind_patches
 from .clusters import (
     Capsule,
     Cluster,
@@ -19,7 +20,8 @@ from .clusters import (
     generator_of,
     limb_beside,
 )
-from .touching import why_several
+from .colours import SAME, SAME_POINT, name_of, unlikeness
+from .touching import part_of, parts_by_colour, why_several
 
 GRASPABLE = 0.085  # m: what fits between the finger tips
 LARGEST = 0.35  # m: no object to be handled is wider or taller
@@ -27,24 +29,37 @@ TABLE_HEIGHTS = (0.4, 1.2)  # m above the floor
 LEAST_TABLE = 1200  # points
 TALLEST = 0.8  # m above the table up to which points are looked at
 OFF_TABLE = 0.012  # m that a point of the table may seem to lie above or below it
+# how a reason ends where a patch of the image has no depth, before the table
+BLIND = ': depth is missing in a patch of the image, before the table'
+SAME_SIZE = 0.025  # m by which one thing's extents may differ in two images
+
+
+class Look(NamedTuple):
+    """What a thing looked like in an earlier image."""
+
+    colour: np.ndarray  # (3,) red, green and blue, 0 to 255
+    size: np.ndarray  # (3,) m
 
 
 class Tabletop(NamedTuple):
     """What was found, in the frame of the base."""
 
     table: UprightBox  # the part of the table's top that is in view; its height is 0
-    objects: List[UprightBox]  # nearest first; the first one is fit for the gripper
+    # the one that was asked for, then nearest first; the first one is fit for the gripper
+    objects: List[UprightBox]
+    colours: List[np.ndarray]  # (3,) each, of the objects, 0 to 255
 
 
 def find_tabletop(image: CameraImage, min_height: float = 0.02,
-                  limbs: Sequence[Capsule] = ()) -> Tabletop:
+                  limbs: Sequence[Capsule] = (), like: Optional[Look] = None) -> Tabletop:
     """The table and what stands on it.
 
     :param min_height: m above the table; lower clusters are no objects. 0 or less: 0.02.
     :param limbs: where the robot's own arms are, by its encoders; they are taken out of what is
         seen.
-    :raises NotSeen: where there is no table, no object, or the nearest one cannot be told well
-        enough to be grasped.
+    :param like: what the object that is looked for looked like; None: it is the nearest one.
+    :raises NotSeen: where there is no table, no object, or the one that is looked for cannot be
+        told well enough to be grasped.
     """
     cloud = cloud_of(image, limbs)
     points = cloud.points[np.isfinite(cloud.points[..., 2])]
@@ -56,13 +71,41 @@ def find_tabletop(image: CameraImage, min_height: float = 0.02,
     if len(patch) < LEAST_TABLE:
         raise NotSeen(_no_table(cloud))
     lowest = max(OFF_TABLE, min_height if min_height > 0 else 0.02)
-    clusters = sorted(clusters_on(cloud, plane, patch, lowest, TALLEST), key=_distance)
+    clusters = sorted((part for each in clusters_on(cloud, plane, patch, lowest, TALLEST)
+                       for part in parts_by_colour(cloud, each, plane)), key=_distance)
+    blind = blind_patches(image)
+    hidden = blind_distance(image, blind, plane, patch)
     if not clusters:
-        raise NotSeen('there is nothing on the table that stands higher than {:.0f} cm{}'.format(
-            100 * lowest, _hidden_by(cloud)))
-    _check_nearest(cloud, clusters[0])
-    objects = [each.box for each in clusters if max(each.box.wide, each.box.size[2]) <= LARGEST]
-    return Tabletop(_top(patch, plane), objects)
+        raise NotSeen('there is nothing on the table that stands higher than {:.0f} cm{}{}'.format(
+            100 * lowest, _hidden_by(cloud), '' if hidden is None else BLIND))
+    if like is None:
+        target, what = clusters[0], 'the nearest object'
+    else:
+        target, what = _like(cloud, clusters, plane, like, hidden is not None), 'the object'
+    _check(cloud, target, what)
+    if blind_beside(blind, target) or (like is None and hidden is not None
+                                       and hidden < _distance(target) + target.box.wide):
+        raise NotSeen('{} may be hidden in part, or something nearer{}'.format(what, BLIND))
+    order = [target] + [each for each in clusters if not _overlap(each, target)]
+    objects = [each for each in order if max(each.box.wide, each.box.size[2]) <= LARGEST]
+    return Tabletop(_top(patch, plane), [each.box for each in objects],
+                    [_colour(cloud, each) for each in objects])
+
+
+def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
+    """All that stands on the table, whatever it is, in no order; [] where no table is seen.
+
+    Parameters and boxes are as in find_tabletop().
+    """
+    cloud = cloud_of(image, limbs)
+    points = cloud.points[np.isfinite(cloud.points[..., 2])]
+    at_table = points[(points[:, 2] > TABLE_HEIGHTS[0]) & (points[:, 2] < TABLE_HEIGHTS[1])]
+    plane = find_plane(at_table, generator_of(image), tolerance=OFF_TABLE, least=LEAST_TABLE)
+    if plane is None:
+        return []
+    patch = largest_patch(at_table[np.abs(plane.height(at_table)) < OFF_TABLE])
+    return [each.box for each in clusters_on(cloud, plane, patch, 0.02, TALLEST)
+            if max(each.box.wide, each.box.size[2]) <= LARGEST]
 
 
 def _top(patch: np.ndarray, plane: Plane) -> UprightBox:
@@ -77,15 +120,63 @@ def _distance(cluster: Cluster) -> float:
     return float(np.hypot(*cluster.box.centre[:2]))
 
 
-def _check_nearest(cloud: OrganizedCloud, cluster: Cluster) -> None:
-    """Raise NotSeen where the nearest cluster is not one object that the gripper can take."""
+def _colour(cloud: OrganizedCloud, cluster: Cluster) -> np.ndarray:
+    return np.asarray(cloud.colour[tuple(cluster.pixels.T)].mean(axis=0))
+
+
+def _overlap(one: Cluster, other: Cluster) -> bool:
+    """Whether two clusters have their middles within each other: one is part of the other."""
+    away = float(np.hypot(*(one.box.centre - other.box.centre)[:2]))
+    return one is other or away < min(one.box.narrow, other.box.narrow) / 2
+
+
+def _like(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane, like: Look,
+          blind: bool) -> Cluster:
+    """The cluster, or part of one, that looks as the object did.
+
+    :param blind: whether part of the table cannot be seen.
+    :raises NotSeen: where none does.
+    """
+    alike: List[Tuple[float, int, Cluster]] = []
+    for cluster in clusters:
+        near = unlikeness(cloud.colour[tuple(cluster.pixels.T)], like.colour) < SAME_POINT
+        for part in (cluster, part_of(cluster, near, plane)):
+            if part is None:
+                continue
+            off = _extents(part.box.size) - _extents(like.size)
+            differs = float(unlikeness(_colour(cloud, part), like.colour))
+            if differs < SAME and np.abs(off).max() < SAME_SIZE:
+                alike.append((differs / SAME + np.abs(off).max() / SAME_SIZE, len(alike), part))
+    if not alike:
+        raise NotSeen(
+            'what was seen first, {} and {}, is not among the {} things on the table: '
+            '{}{}{}'.format(
+                name_of(like.colour) or 'dark', _in_cm(like.size), len(clusters), ', '.join(
+                    name_of(_colour(cloud, each)) or 'dark' for each in clusters),
+                _hidden_by(cloud), BLIND if blind else ''))
+    return min(alike)[2]
+
+
+def _in_cm(size: np.ndarray) -> str:
+    return '{:.0f} x {:.0f} x {:.0f} cm'.format(*(100 * size))
+
+
+def _extents(size: np.ndarray) -> np.ndarray:
+    return np.array([max(size[:2]), min(size[:2]), size[2]])
+
+
+def _check(cloud: OrganizedCloud, cluster: Cluster, what: str) -> None:
+    """Raise NotSeen where a cluster is not one object that the gripper can take.
+
+    :param what: the object that it should be, for people.
+    """
     box = cluster.box
     limb = limb_beside(cloud, cluster)
     if limb is not None:
-        raise NotSeen('the {} hides part of the nearest object'.format(limb))
+        raise NotSeen('the {} hides part of {}'.format(limb, what))
     if cut_off(cloud, cluster):
-        raise NotSeen('the nearest object is cut off by the edge of the image')
-    extent = '{:.0f} x {:.0f} x {:.0f} cm'.format(*(100 * box.size))
+        raise NotSeen('{} is cut off by the edge of the image'.format(what), box.centre)
+    extent = _in_cm(box.size)
     if max(box.wide, box.size[2]) > LARGEST:
         raise NotSeen(
             'what is nearest is no object: it is too large, {}; is an arm in the view?'.format(

@@ -1,13 +1,53 @@
 """Whether a cluster of points is one thing or several that touch: by a waist, or two colours."""
+from typing import List, Optional, Tuple
+
 import numpy as np
 
+from smach_oracle.geometry.box import upright_box
+from smach_oracle.geometry.pieces import LEAST_POINTS, largest_piece
+from smach_oracle.geometry.plane import Plane
+
 from .clusters import Cluster, OrganizedCloud
+from .colours import unlikeness
 
 SLICE = 0.006  # m along the longer side
 WAIST = 0.65  # a slice in the middle narrower than this share of both its sides is a waist
 # difference of the shares of red, green and blue from which two sides have two colours
 CHROMA = 0.06
 LEAST_LENGTH = 0.06  # m: shorter things are one
+CELL = 0.012  # m: points of one colour that are closer than this belong together
+
+
+def parts_by_colour(cloud: OrganizedCloud, cluster: Cluster, plane: Plane) -> List[Cluster]:
+    """A cluster as the things of two colours that it is made of, or as it is where it has one.
+
+    :param plane: of the surface on which it stands.
+    """
+    box = cluster.box
+    ends = None if box.wide < LEAST_LENGTH else _end_shares(
+        _along(cluster)[:, 0], cloud.colour[tuple(cluster.pixels.T)].astype(float))
+    if ends is None or np.abs(ends[0] - ends[1]).max() <= CHROMA:
+        return [cluster]
+    colours = cloud.colour[tuple(cluster.pixels.T)]
+    second = unlikeness(colours, ends[1]) < unlikeness(colours, ends[0])
+    parts = [part_of(cluster, chosen, plane) for chosen in (~second, second)]
+    found = [part for part in parts if part is not None]
+    return found if len(found) == len(parts) else [cluster]
+
+
+def part_of(cluster: Cluster, chosen: np.ndarray, plane: Plane) -> Optional[Cluster]:
+    """What some points of a cluster make by themselves; None where they are too few.
+
+    :param chosen: (n,) bool. Those that lie apart from most of them are left out.
+    """
+    if chosen.sum() < LEAST_POINTS:
+        return None
+    points, pixels = cluster.points[chosen], cluster.pixels[chosen]
+    together = largest_piece(points, CELL)
+    if together.sum() < LEAST_POINTS:
+        return None
+    points, pixels = points[together], pixels[together]
+    return Cluster(points, pixels, upright_box(points, plane.z_at(*points[:, :2].mean(axis=0))))
 
 
 def why_several(cloud: OrganizedCloud, cluster: Cluster) -> str:
@@ -15,13 +55,19 @@ def why_several(cloud: OrganizedCloud, cluster: Cluster) -> str:
     box = cluster.box
     if box.wide < LEAST_LENGTH:
         return ''
-    along = (cluster.points[:, :2] - box.centre[:2]) @ box.matrix[:2, :2]
-    if box.size[1] > box.size[0]:  # round things have no heading, their longer side may be y
-        along = along[:, ::-1]
+    along = _along(cluster)
     if _has_waist(along):
         return 'it has a waist'
     colours = cloud.colour[tuple(cluster.pixels.T)].astype(float)
     return 'it has two colours, side by side' if _two_colours(along[:, 0], colours) else ''
+
+
+def _along(cluster: Cluster) -> np.ndarray:
+    """(n, 2) m: the footprint, along its length and across."""
+    box = cluster.box
+    along = (cluster.points[:, :2] - box.centre[:2]) @ box.matrix[:2, :2]
+    # round things have no heading, their longer side may be y
+    return np.asarray(along[:, ::-1] if box.size[1] > box.size[0] else along)
 
 
 def _has_waist(flat: np.ndarray) -> bool:
@@ -43,8 +89,14 @@ def _two_colours(along: np.ndarray, colours: np.ndarray) -> bool:
     :param along: (n,) place along the length.
     :param colours: (n, 3).
     """
+    ends = _end_shares(along, colours)
+    return float(np.abs(ends[0] - ends[1]).max()) > CHROMA
+
+
+def _end_shares(along: np.ndarray, colours: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """The shares of red, green and blue at the two ends of a footprint, (3,) each."""
     order = np.argsort(along)
     quarter = max(1, len(order) // 4)
     ends = [colours[order[:quarter]].mean(axis=0), colours[order[-quarter:]].mean(axis=0)]
-    shares = [end / max(1.0, end.sum()) for end in ends]
-    return float(np.abs(shares[0] - shares[1]).max()) > CHROMA
+    first, last = (end / max(1.0, end.sum()) for end in ends)
+    return first, last

@@ -33,6 +33,26 @@ def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
     return [grasp for _, _, grasp in sorted(found, key=lambda item: item[:2])]
 
 
+def others_first(found: List[np.ndarray], failed: int) -> List[np.ndarray]:
+    """The same grasps, with those last that are like the first ones.
+
+    :param found: as from grasps().
+    :param failed: how many kinds of grasp have failed: as many inclinations of the hand come last.
+    """
+    kinds: List[float] = []
+    for grasp in found:
+        if _inclination(grasp) not in kinds:
+            kinds.append(_inclination(grasp))
+    rank = {kind: number for number, kind in enumerate(kinds[failed % max(1, len(kinds)):] +
+                                                       kinds[:failed % max(1, len(kinds))])}
+    return sorted(found, key=lambda grasp: rank[_inclination(grasp)]) if failed else list(found)
+
+
+def _inclination(grasp: np.ndarray) -> float:
+    """rad to two digits, of a hand (4x4) downwards."""
+    return round(float(np.arcsin(np.clip(-grasp[2, 0], -1.0, 1.0))), 2)
+
+
 def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
     for pitch in PITCHES:
         for turn in HEADINGS:

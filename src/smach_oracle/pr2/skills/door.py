@@ -1,7 +1,8 @@
 """Open and close the refrigerator by contact: by the handle, or with the hand against the door.
 
-Opening does not verify the final angle: where the arm did not get far enough, the door stands half
-open, and the failure surfaces in a later state.
+Many a door falls shut unless it is open past a stop. So the hand holds the handle until the door is
+wide open: where the arm gets no farther, the base takes it along. In the end the camera looks
+whether the door stays open.
 """
 from contextlib import contextmanager
 from typing import Callable, Dict, Iterator, Optional, Tuple
@@ -14,6 +15,7 @@ from ..kitchen import (
     Kitchen,
     MapBox,
     base_from_fridge,
+    door_angle_at,
     door_frame,
     fridge_boxes,
     handle_point,
@@ -45,10 +47,15 @@ STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 # m ahead at least, m to its side at most: a hand there is in the other arm's way
 BEFORE_CHEST = (0.30, 0.20)
-AWAY = 0.16  # m that the base takes the hand back from the bar
+OFF = 0.10  # m that the base takes the hand back from the bar
 AWAY_FOR_GOOD = 0.40  # m, after a failure
+DRAWN = np.radians(92.0)  # as far as the base takes the handle from there
+DRAWS = 4  # drives in which it does
+LEAST_OPEN = np.radians(82.0)  # the robot gets in, and sees the shelf
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
+DOOR_LOOK = np.array([-0.15, 0.05, GRASP_HEIGHT])  # m, in the fridge's frame
+OPEN_LOOK = np.array([-0.30, 0.25, GRASP_HEIGHT])  # m: at the face of an open door
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
 BEFORE = 0.10  # m that the hand comes straight
 PUSHES = 2  # until the door is shut
@@ -67,7 +74,7 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     """Open the fridge, from wherever the base stands before it; leave the base ready to drive in.
 
     :param arm: 'left' or 'right'.
-    :returns: rad, the opening that the arm's motion should have brought about.
+    :returns: rad, the opening that the camera sees in the end.
     :raises SkillError: with the reason.
     :raises PlanningError: where no path is found.
     :raises RobotError: where arm, head or gripper do not get somewhere.
@@ -78,16 +85,26 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
 
 
 def _open(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
-    view = _stand_before(context, kitchen)
+    view = _look_from_before(context, kitchen)
     if view.angle < AJAR:
         angle = _pull(context, kitchen, arm, view)
-        _step_back(context, AWAY)
+        _take_hand_off(context)
         _stow_beside(context, kitchen, angle)
-        view = _stand_before(context, kitchen)
+        view = _look_from_before(context, kitchen)
+        if view.angle < AJAR:
+            raise SkillError('the door fell shut again, to {:.0f} degrees, when the hand let go '
+                             'of its handle at {:.0f}'.format(*np.degrees([view.angle, angle])))
     if view.angle < WIDE - STEP:
-        view = view._replace(angle=_push_open(context, kitchen, arm, view))
-        _stow_beside(context, kitchen, view.angle)
-    drive(context, odom_from_pose(kitchen, *CLEAR))
+        angle = _push_open(context, kitchen, arm, view)
+        _stow_beside(context, kitchen, angle)
+        drive(context, odom_from_pose(kitchen, *CLEAR))
+        view = look(context.robot, kitchen, OPEN_LOOK)
+        if view.angle < LEAST_OPEN:
+            raise SkillError('the door stands open by {:.0f} degrees only, and not by {:.0f}: '
+                             'something is in its way, or it fell back'.format(
+                                 *np.degrees([view.angle, angle])))
+    else:
+        drive(context, odom_from_pose(kitchen, *CLEAR))
     return view.angle
 
 
@@ -133,14 +150,22 @@ def _driving_back_on_failure(context: SkillContext) -> Iterator[None]:
         raise
 
 
-def _stand_before(context: SkillContext, kitchen: Kitchen) -> DoorView:
-    """Drive to where the door is opened, with the arms out of the way, and look at it."""
+def stand_before(context: SkillContext, kitchen: Kitchen) -> None:
+    """Drive to where the door is opened, with the arms out of the way.
+
+    :raises SkillError: where an arm or the base does not get there.
+    """
     here = inverse(base_from_fridge(kitchen, context.robot.odom_from_base()))
     if here[0, 3] > CLEAR[0] + 0.05:  # within the door's swing
         _step_back(context, here[0, 3] - CLEAR[0])
     _stow_beside(context, kitchen, WIDE)
     drive(context, odom_from_pose(kitchen, *OPENING))
-    return look(context.robot, kitchen, np.array([-0.15, 0.05, GRASP_HEIGHT]))
+
+
+def _look_from_before(context: SkillContext, kitchen: Kitchen) -> DoorView:
+    """Drive to where the door is opened, and look at it."""
+    stand_before(context, kitchen)
+    return look(context.robot, kitchen, DOOR_LOOK)
 
 
 def _clear_of_door(context: SkillContext, arm: str) -> None:
@@ -211,8 +236,39 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
         _strain(limb, swing, PULL_SPEED)
         if sum(encoder_readings(context.robot)[name] for name in FINGER_JOINTS[arm]) < LEAST_GAP:
             raise SkillError('the handle slipped out of the {} hand'.format(arm))
+        # an arm that pulls against a hinge does not get as far as it was sent
+        bar = apply(limb.pose(), np.array([-BEYOND, 0.0, 0.0]))
+        reached = _draw_along(context, kitchen, fridge,
+                              door_angle_at(kitchen, apply(inverse(fridge), bar)))
         context.robot.gripper(arm, RELEASE)
-    return float(swing.angles[-1])
+    return reached
+
+
+def _draw_along(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray, angle: float) -> float:
+    """Take the handle farther around the hinge with the base, the arm being held as it is.
+
+    :param fridge: 4x4, where it is, in base_footprint.
+    :param angle: rad, how far the arm has opened the door.
+    :returns: rad, how far it should be open now.
+    """
+    start = context.robot.odom_from_base()
+    first = apply(fridge, handle_point(kitchen, angle, GRASP_HEIGHT))
+    for further in np.linspace(angle, DRAWN, DRAWS + 1)[1:]:
+        way = apply(fridge, handle_point(kitchen, float(further), GRASP_HEIGHT)) - first
+        try:
+            drive(context, start @ from_rpy((float(way[0]), float(way[1]), 0.0)))
+        except SkillError:
+            break  # the door is at its end, or something is in its way: the camera will tell
+        angle = float(further)
+    return angle
+
+
+def _take_hand_off(context: SkillContext) -> None:
+    """Drive the open hand straight back from the bar; no farther, for there may be somebody."""
+    try:
+        _step_back(context, OFF)
+    except SkillError:
+        pass  # the hand rubs against the door: it is off the bar, or the camera will tell
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:

@@ -21,12 +21,13 @@ SAME = 0.03  # m between the middles of two boxes that are the same thing
 
 def pick_from_fridge(context: SkillContext, kitchen: Kitchen, base_from_fridge: np.ndarray,
                      arm: str, target: UprightBox, others: Sequence[UprightBox],
-                     effort: float = FEEL_EFFORT) -> HeldObject:
+                     effort: float = FEEL_EFFORT, elsewhere: int = 0) -> HeldObject:
     """Pick a drink and take it out, upright; where that fails, the hand leaves the fridge empty.
 
     :param base_from_fridge: 4x4, where the fridge is.
     :param others: what else stands on the shelf; the drink itself may be among it.
     :param effort: N, of the grip.
+    :param elsewhere: as in pick().
     :raises SkillError: with the reason; ObjectSlipped where the drink did not come along.
     """
     boxes = {
@@ -38,7 +39,7 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, base_from_fridge: 
         for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
     })
     try:
-        held = pick(context, arm, target, boxes, effort)
+        held = pick(context, arm, target, boxes, effort, elsewhere)
         _draw_out(context)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
             hand.space.attach(held.half, held.tool_from_object)

@@ -20,7 +20,7 @@ from ..planning.arm import (
     seed_of,
     summary,
 )
-from ..planning.grasps import grasps
+from ..planning.grasps import grasps, others_first
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
 
@@ -31,6 +31,7 @@ FIRM = 100.0
 MISSES = 2  # grasps that may close on nothing before the skill fails
 EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 TARGET = 'the object'
+WIDTH_ERROR = 0.015  # m by which the camera may mistake a width, and fingers may give way
 
 
 class ObjectSlipped(SkillError):
@@ -54,16 +55,17 @@ class _GraspPath(NamedTuple):
 
 
 def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
-         effort: float = FEEL_EFFORT) -> HeldObject:
+         effort: float = FEEL_EFFORT, elsewhere: int = 0) -> HeldObject:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
     :param target: the object.
     :param boxes: obstacles without the object, in base_footprint.
     :param effort: N, of the grip.
+    :param elsewhere: how many of the ways to grasp it have failed: they come last.
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
-    candidates = grasps(target, arm) if arm in ('left', 'right') else []
+    candidates = others_first(grasps(target, arm), elsewhere) if arm in ('left', 'right') else []
     obstacles = dict(boxes)
     obstacles[TARGET] = MapBox(target.centre, target.size / 2, target.yaw)
     with Arm(context, arm, obstacles,
@@ -85,7 +87,9 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: f
             continue
         hand.follow(path.there, FAST)
         hand.follow(path.approach, SLOW)
-        if hand.close(effort) > 0:
+        gap = hand.close(effort)
+        if gap > 0:
+            _check_width(hand, target, gap)
             return _lift(hand, target, effort)
         missed += 1
         hand.open()
@@ -95,6 +99,21 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: f
     if missed:
         raise SkillError('the gripper closed on nothing, and there is no other grasp')
     raise SkillError('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
+
+
+def _check_width(hand: Arm, target: UprightBox, gap: float) -> None:
+    """Let go of what is not as wide, between the fingers, as the object is from any side.
+
+    :raises SkillError: where it is not.
+    """
+    narrow, wide = target.narrow - WIDTH_ERROR, float(np.hypot(*target.size[:2])) + WIDTH_ERROR
+    if narrow <= gap <= wide:
+        return
+    hand.open()
+    raise SkillError(
+        'the gripper closed on something {:.1f} cm wide, and the object is {:.1f} x {:.1f} cm: it '
+        'holds another thing, or a corner'.format(100 * gap, 100 * target.size[0],
+                                                 100 * target.size[1]))
 
 
 def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_GraspPath]:

@@ -1,5 +1,5 @@
 """Put down what a hand holds: go above the place, lower, let go, back off, and look."""
-from typing import Iterator, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ..planning.arm import (
 )
 from ..planning.planner import PlanningError
 from .pick import HeldObject
+from .spots import USUAL, free_spots
 
 EFFORT = 40000  # collision checks for the choice of a path, about 3 s
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
@@ -29,8 +30,6 @@ DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
 # rad, of the object about the vertical, against how it stood
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
-# m beside the place: near enough
-SHIFTS = ((0.0, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.0))
 SLACK = 0.10  # m that the height asked for may differ from the one at which the object stands
 
 NEAR = 0.05  # m around the place, within which an image must show the object
@@ -52,12 +51,14 @@ class ObjectLost(SkillError):
 
 
 def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
-          boxes: Mapping[str, MapBox], support: str = 'table') -> np.ndarray:
-    """Put the held object down upright.
+          boxes: Mapping[str, MapBox], support: str = 'table',
+          tolerance: float = 0.0) -> np.ndarray:
+    """Put the held object down upright, at the free spot nearest to its place.
 
     :param centre: (3,) m, where its centre shall be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it shall stand.
+    :param tolerance: m that it may stand beside its place; 0: 2 cm.
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
@@ -69,7 +70,12 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
             raise ObjectLost('the {} hand holds nothing'.format(arm))
         centre = _on_support(centre, held, boxes[support])
         hand.space.attach(held.half - 0.004, held.tool_from_object)
-        centre, path = _find_path(hand, centre, held, support)
+        spots, taken = free_spots(centre, tolerance, held.half, boxes, support)
+        if not spots:
+            raise SkillError('no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} '
+                             'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
+                                            _who_stands(taken)))
+        centre, path = _find_path(hand, spots, held, support)
         hand.follow(path.there, FAST)
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
@@ -132,22 +138,26 @@ def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.nda
     return np.array([x, y, height + DROP])
 
 
-def _poses(centre: np.ndarray, held: HeldObject) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
-    """Places near enough, with poses of the tool that bring the object there, best first."""
+def _who_stands(taken: Sequence[str]) -> str:
+    return '{} {}'.format(' and '.join(taken), 'stand' if len(taken) > 1 else 'stands')
+
+
+def _poses(spots: Sequence[np.ndarray],
+           held: HeldObject) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """Free spots, with poses of the tool that bring the object there, best first."""
     stood = held.grasp @ held.tool_from_object
     object_from_tool = inverse(held.tool_from_object)
-    for shift in SHIFTS:
-        there = centre + [shift[0], shift[1], 0.0]
+    for there in spots:
         for turn in sorted(TURNS, key=abs):
             rotation = from_rpy((0, 0, 0), yaw=turn)[:3, :3] @ stood[:3, :3]
             yield there, transform(there, rotation) @ object_from_tool
 
 
-def _find_path(hand: Arm, centre: np.ndarray, held: HeldObject,
+def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
                support: str) -> Tuple[np.ndarray, _PlacePath]:
     reasons: List[str] = []
     start = hand.now()
-    for there, pose in _poses(centre, held):
+    for there, pose in _poses(spots, held):
         if hand.space.checks > EFFORT:
             break
         try:
@@ -172,7 +182,7 @@ def _find_path(hand: Arm, centre: np.ndarray, held: HeldObject,
             except PlanningError as err:
                 reasons.append(str(err))
     raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
-        centre[0], centre[1], summary(reasons)))
+        spots[0][0], spots[0][1], summary(reasons)))
 
 
 def _path_back(hand: Arm, start: np.ndarray, pose: np.ndarray,

@@ -219,7 +219,8 @@ class World:
 
     def localise(self, odom_from_base: np.ndarray) -> None:
         """Tell the robot where it stands (4x4), as somebody or something has found out."""
-        self.map_error = odom_from_base @ self.belief_error @ inverse(self._robot.base())
+        self.map_error = odom_from_base @ inverse(self._robot.base())
+        self.belief_error = np.eye(4)
 
     def drive_error(self, share: float = 1.0) -> np.ndarray:
         """4x4, by how much the next drive will miss its goal unknown to the robot.

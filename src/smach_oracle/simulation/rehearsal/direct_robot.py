@@ -37,10 +37,6 @@ class DirectRobot:
         """See Robot."""
         return self._world.odom_from_base()
 
-    def localise(self, odom_from_base: np.ndarray) -> None:
-        """See Robot."""
-        self._world.localise(odom_from_base)
-
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
         """See Robot."""
         self._do(lambda: Trajectory(joints, positions, times))
@@ -66,6 +62,10 @@ class DirectRobot:
     def drive(self, odom_from_goal: np.ndarray) -> None:
         """See Robot."""
         self._do(lambda: BaseMotion(odom_from_goal))
+
+    def localise(self, odom_from_base: np.ndarray) -> None:
+        """See Robot."""
+        self._world.localise(odom_from_base)
 
     def see(self) -> CameraImage:
         """See Robot."""

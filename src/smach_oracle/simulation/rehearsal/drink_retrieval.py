@@ -10,7 +10,14 @@ from std_msgs.msg import Header
 
 from smach_oracle.geometry.joints import read_joints
 from smach_oracle.geometry.transforms import from_rpy
-from smach_oracle.msg import CloseDoorGoal, DetectDrinkGoal, HandOverGoal, OpenDoorGoal, PickGoal
+from smach_oracle.msg import (
+    CloseDoorGoal,
+    DetectDrinkGoal,
+    HandOverGoal,
+    LocaliseAtFridgeGoal,
+    OpenDoorGoal,
+    PickGoal,
+)
 from smach_oracle.pr2.kitchen import Kitchen
 from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE, KitchenSkills
 from smach_oracle.pr2.nodes.perception_node import Perception
@@ -24,6 +31,7 @@ from .direct_robot import DirectRobot, no_report
 
 TORSO_HEIGHT = 0.25  # m
 MIN_HEIGHT = 0.05  # m
+ORDERED = 'red'
 DRIVES = {
     'MOVE_IN': (1.00, -0.20, 0.0), 'MOVE_OUT': (0.68, -0.30, 0.0),
     'MOVE_HOME': (0.0, 0.0, math.pi / 2)
@@ -43,6 +51,7 @@ class DrinkRetrievalRehearsal:
                            Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('RAISE_TORSO', lambda: self.robot.torso(TORSO_HEIGHT)),
+            ('LOCALISE', lambda: self.skills.localise_at_fridge(LocaliseAtFridgeGoal(), no_report)),
             ('OPEN_FRIDGE', lambda: self.skills.open_door(OpenDoorGoal('right'), no_report)),
             ('MOVE_IN', lambda: self._drive('MOVE_IN')),
             ('DETECT_DRINK', self._detect),
@@ -57,9 +66,10 @@ class DrinkRetrievalRehearsal:
         self.robot.drive(from_rpy((x, y, 0.0), yaw=yaw))
 
     def _detect(self) -> None:
-        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT), no_report)
+        found = self.eyes.detect_drink(DetectDrinkGoal(MIN_HEIGHT, ORDERED, 0), no_report)
         self.data.update(drink=found.drink, size=found.size)
 
     def _pick(self) -> None:
-        goal = PickGoal('right', self.data['drink'], self.data['size'], FRIDGE)
+        goal = PickGoal(arm='right', object=self.data['drink'], size=self.data['size'],
+                        map_id=FRIDGE)
         self.data['grasp'] = self.skills.pick(goal, no_report).grasp

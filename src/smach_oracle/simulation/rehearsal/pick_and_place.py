@@ -11,17 +11,16 @@ from std_msgs.msg import Header
 from smach_oracle.geometry.joints import read_joints
 from smach_oracle.msg import (
     BuildCollisionMapGoal,
+    DetectTabletopGoal,
     MoveArmsAsideGoal,
     PickGoal,
     PlaceGoal,
     PointHeadGoal,
 )
-from smach_oracle.pr2.nodes.frames import box_messages
+from smach_oracle.pr2.kitchen import Kitchen
 from smach_oracle.pr2.nodes.manipulation import Manipulation
-from smach_oracle.pr2.nodes.perception_node import DETECTION
+from smach_oracle.pr2.nodes.perception_node import Perception
 from smach_oracle.pr2.perception.clusters import NotSeen
-from smach_oracle.pr2.perception.own_limbs import limbs_of
-from smach_oracle.pr2.perception.tabletop import find_tabletop
 from smach_oracle.pr2.planning.arm import SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import installed_model
 from smach_oracle.pr2.planning.planner import PlanningError
@@ -36,6 +35,7 @@ BASE = 'base_link'
 HEAD = PointStamped(Header(frame_id=BASE), Point(0.65, 0.0, 0.75))
 PLACE = PoseStamped(Header(frame_id=BASE),
                     Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+MIN_HEIGHT, TOLERANCE = 0.02, 0.045  # m
 FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
 
 
@@ -66,7 +66,7 @@ class PickAndPlaceRehearsal:
     def __init__(self, world: World) -> None:
         self.robot = DirectRobot(world)
         self.skills = Manipulation(SkillContext(self.robot, installed_model()))
-        self._links = read_joints(self.skills.context.model.urdf)
+        self.eyes = Perception(self.robot, read_joints(self.skills.context.model.urdf), Kitchen())
         self.data: Dict[str, Any] = {}
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('MOVE_ARMS_ASIDE', lambda: self.skills.move_arms_aside(
@@ -77,25 +77,20 @@ class PickAndPlaceRehearsal:
         ]
 
     def _detect(self) -> None:
-        limbs = limbs_of(self._links, self.robot.joints())
-        image = self.robot.see()
-        self.robot.spend('perception', DETECTION)
-        found = find_tabletop(image, limbs=limbs)
-        messages = [box_messages(box) for box in found.objects]
-        self.data.update(table=box_messages(found.table)[0], objects=[pose for pose, _ in messages],
-                         sizes=[size for _, size in messages])
+        found = self.eyes.detect_tabletop(DetectTabletopGoal(min_height=MIN_HEIGHT), no_report)
+        self.data.update(table=found.table, objects=found.objects, sizes=found.sizes)
 
     def _map(self) -> None:
         goal = BuildCollisionMapGoal(self.data['table'], self.data['objects'], self.data['sizes'])
         self.data['map_id'] = self.skills.build_collision_map(goal, no_report).map_id
 
     def _pick(self) -> None:
-        goal = PickGoal('right', self.data['objects'][0], self.data['sizes'][0],
-                        self.data['map_id'])
+        goal = PickGoal(arm='right', object=self.data['objects'][0], size=self.data['sizes'][0],
+                        map_id=self.data['map_id'])
         self.data['grasp'] = self.skills.pick(goal, no_report).grasp
 
     def _place(self) -> None:
-        goal = PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'])
+        goal = PlaceGoal('right', PLACE, self.data['grasp'], self.data['map_id'], TOLERANCE)
         self.skills.place(goal, no_report)
 
 

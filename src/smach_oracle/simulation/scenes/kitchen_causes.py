@@ -27,7 +27,7 @@ KINDS_OF = {
     PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
 }
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
-IN_FRIDGE = 'look_at:3'  # the first two are at the door
+IN_FRIDGE = 'look_at:4'  # the first three are at the door
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
 TARGET = 0  # the drink that stands nearest to the front
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
@@ -79,7 +79,7 @@ def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> Ki
     angle = float(generator.uniform(0.5, 0.9))
     return caused(draft, 'door_swings_back',
                   'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
-                  Disturbance('swing:fridge', 'drive:4', (('angle', angle), ('duration', 1.5))))
+                  Disturbance('swing:fridge', 'drive:9', (('angle', angle), ('duration', 1.5))))
 
 
 def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -165,7 +165,7 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
         draft, 'drink_moved',
         'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
             100 * float(np.hypot(dx, dy))),
-        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:3', values))
+        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:4', values))
 
 
 def _room_at(draft: KitchenDraft, x: float, y: float) -> float:

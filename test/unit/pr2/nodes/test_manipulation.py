@@ -18,10 +18,10 @@ from smach_oracle.msg import (
     PlaceGoal,
     PointHeadGoal,
 )
-from smach_oracle.pr2.nodes.manipulation import Manipulation
+from smach_oracle.pr2.nodes.manipulation import Manipulation, elsewhere_of
 from smach_oracle.pr2.planning.arm import FEEL_EFFORT, SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import installed_model
-from smach_oracle.pr2.planning.grasps import grasps
+from smach_oracle.pr2.planning.grasps import grasps, others_first
 from smach_oracle.pr2.robot import ARM_JOINTS, RobotError
 from smach_oracle.pr2.skills.arms_aside import ASIDE, is_aside
 from smach_oracle.simulation.physics.world import World
@@ -40,6 +40,14 @@ def pose(x, y, z, frame=BASE, w=1.0):
     return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0.0, 0.0, 0.0, w)))
 
 
+def picking(arm, target, size, map_id):
+    return PickGoal(arm=arm, object=target, size=size, map_id=map_id)
+
+
+def placing(arm, place, grasp, map_id, tolerance=0.0):
+    return PlaceGoal(arm=arm, pose=place, grasp=grasp, map_id=map_id, tolerance=tolerance)
+
+
 class Bench:
     """A world and the skills in it, with a map of what stands on the table."""
 
@@ -56,7 +64,7 @@ class Bench:
         return self.skills.build_collision_map(goal, say)
 
     def pick(self, map_id, arm='right'):
-        return self.skills.pick(PickGoal(arm, pose(*CAN.position), CAN_SIZE, map_id), say).grasp
+        return self.skills.pick(picking(arm, pose(*CAN.position), CAN_SIZE, map_id), say).grasp
 
 
 @pytest.fixture(name='bench')
@@ -74,7 +82,7 @@ def test_a_grasp_survives_a_shake_and_the_object_then_stands_where_it_was_to_be(
     shake(bench)
     assert bench.world.holding('can') == 'right'
     bench.robot.look_at((0.6, -0.2, 0.8))
-    bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
+    bench.skills.place(placing('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
     there = bench.world.body_pose('can')
     assert np.hypot(there[0, 3] - 0.6, there[1, 3] + 0.35) < 0.03
     assert there[2, 2] > 0.99 and abs(there[2, 3] - 0.78) < 0.01
@@ -89,11 +97,43 @@ def test_what_cannot_be_put_down_there_stays_in_the_hand_and_the_reason_is_told(
                               0.79), 'there is nothing to stand on at x 2.50.* beyond its edge'),
                         (pose(1.1, 0.55,
                               0.79), 'no way to put the object down at x 1.10.*out of reach'),
-                        (pose(*CARTON.position), 'no way to put the object down')):
+                        (pose(*CARTON.position),
+                         'no free spot within 2 cm of x 0.75.*: object 1 stands there')):
         with pytest.raises(SkillError, match=text):
-            bench.skills.place(PlaceGoal('right', place, grasp, made.map_id), say)
+            bench.skills.place(placing('right', place, grasp, made.map_id), say)
         assert bench.world.holding('can') == 'right'
     assert np.hypot(*(bench.world.body_pose('carton')[:2, 3] - CARTON.position[:2])) < 0.01
+
+
+def test_what_has_come_to_stand_at_the_place_is_seen_and_a_spot_beside_it_taken():
+    """The map was made before that; the place is 4.5 cm wide."""
+    box = CARTON._replace(name='late', size=(0.05, 0.05, 0.1), position=(0.665, -0.35, 0.77))
+    bench = Bench(TABLE, CAN, CARTON, box)
+    made = bench.map()
+    grasp = bench.pick(made.map_id)
+    bench.skills.place(placing('right', pose(0.6, -0.35, 0.79), grasp, made.map_id, 0.045), say)
+    there = bench.world.body_pose('can')[:2, 3]
+    assert 0.01 < np.hypot(there[0] - 0.6, there[1] + 0.35) < 0.06
+    assert np.hypot(*(bench.world.body_pose('late')[:2, 3] - box.position[:2])) < 0.005
+    with pytest.raises(SkillError, match='tolerance is 7'):
+        bench.skills.place(placing('right', pose(0.6, -0.35, 0.79), grasp, made.map_id, 7.0), say)
+    bench.world.close()
+
+
+def test_a_thing_of_another_width_is_let_go_where_it_stands():
+    bench = Bench(TABLE, CARTON, CAN._replace(size=(0.012, 0.012, 0.12)))
+    with pytest.raises(SkillError, match='closed on something 2.[0-9] cm wide'):
+        bench.pick(bench.map().map_id)
+    assert bench.world.holding('can') == ''
+    bench.world.close()
+
+
+def test_the_third_try_takes_another_kind_of_grasp():
+    can = UprightBox(np.array(CAN.position), np.array([0.062, 0.062, 0.12]), 0.0)
+    found = grasps(can, 'right')
+    later = others_first(found, elsewhere_of(2))
+    assert others_first(found, elsewhere_of(1)) == found and len(later) == len(found)
+    assert abs(later[0][2, 0] - found[0][2, 0]) > 0.2, 'the hand is inclined otherwise'
 
 
 def shake(bench):
@@ -124,13 +164,13 @@ def test_an_arm_that_is_held_is_noticed(bench, monkeypatch):
 
 def test_nothing_in_the_hand_is_felt(bench):
     made = bench.map()
-    goal = PickGoal('right', pose(0.62, -0.35, 0.78), CAN_SIZE, made.map_id)
+    goal = picking('right', pose(0.62, -0.35, 0.78), CAN_SIZE, made.map_id)
     with pytest.raises(SkillError, match='closed on nothing, 2 times'):
         bench.skills.pick(goal, say)
     assert is_aside(bench.robot.joints(), 'right')
     with pytest.raises(SkillError, match='the right hand holds nothing'):
         bench.skills.place(
-            PlaceGoal('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
+            placing('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
 
 
 def test_what_slipped_is_gripped_firmer_until_the_arms_go_aside_again():
@@ -142,7 +182,7 @@ def test_what_slipped_is_gripped_firmer_until_the_arms_go_aside_again():
     grasp = bench.pick(made.map_id)
     assert bench.world.holding('can') == 'right'
     bench.robot.look_at((0.6, -0.2, 0.8))
-    bench.skills.place(PlaceGoal('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
+    bench.skills.place(placing('right', pose(0.6, -0.35, 0.79), grasp, made.map_id), say)
     assert np.hypot(*(bench.world.body_pose('can')[:2, 3] - (0.6, -0.35))) < 0.03
     bench.skills.move_arms_aside(MoveArmsAsideGoal(), say)
     with bench.skills.firmer_after_slip() as effort:
@@ -156,14 +196,14 @@ def test_what_a_hand_held_in_another_trial_does_not_count(bench):
     made, before = bench.map(), bench.world.periods
     with pytest.raises(SkillError, match='too wide for the gripper'):
         bench.skills.pick(
-            PickGoal('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
     fresh = bench.world.periods - before
     bench.skills.held.clear()
     bench.world.reset(bench.world.scene)
     before = bench.world.periods
     with pytest.raises(SkillError, match='too wide for the gripper'):
         bench.skills.pick(
-            PickGoal('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
     assert bench.world.periods - before == fresh  # as in a process that has run no trial before
 
 
@@ -209,7 +249,7 @@ def _still():
 @pytest.mark.parametrize('text, change', [(text, change) for _, text, change in BAD],
                          ids=[name for name, _, _ in BAD])
 def test_goals_that_cannot_be_are_refused_and_say_why(still, text, change):
-    goal = PickGoal('right', pose(*CAN.position), CAN_SIZE, still.map_id)
+    goal = picking('right', pose(*CAN.position), CAN_SIZE, still.map_id)
     for name, value in change.items():
         setattr(goal, name, value)
     before = still.robot.joints()

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from ray_camera import camera_at, see
 
+from smach_oracle.geometry.depth import pixels_of
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.pr2.kitchen import Kitchen, fridge_boxes, look_point
 from smach_oracle.pr2.perception.clusters import NotSeen
+from smach_oracle.pr2.perception.colours import name_of
 from smach_oracle.pr2.perception.drink import find_drink
 from smach_oracle.simulation.scenes.scene import Body
 
@@ -90,3 +92,40 @@ def test_missing_depth_is_the_reason():
     image = image_of([drink(0.08, 0.0)])
     assert 'depth is missing for 100%' in reason(
         image._replace(depth=np.full_like(image.depth, np.nan)))
+
+
+def test_the_drink_of_the_colour_is_found_and_no_other():
+    red, green = drink(0.08, -0.1), drink(0.18, 0.05, colour=(0.12, 0.45, 0.2))
+    image = image_of([red, green])
+    for each, colour in ((red, 'red'), (green, 'green')):
+        found = find_drink(image, KITCHEN, FRIDGE, colour=colour)
+        assert np.allclose(found.centre, each.position, atol=0.015)
+    for colour, words in (('blue', 'no blue drink: there are 2 things on the shelf: red, green'),
+                          ('pink', "colour is 'pink'; allowed: blue, ")):
+        with pytest.raises(NotSeen) as error:
+            find_drink(image, KITCHEN, FRIDGE, colour=colour)
+        assert words in str(error.value)
+
+
+def test_its_colour_parts_a_drink_from_one_that_it_touches():
+    red, green = drink(0.1, -0.03), drink(0.1, 0.035, colour=(0.12, 0.45, 0.2))
+    found = find_drink(image_of([red, green]), KITCHEN, FRIDGE, colour='green')
+    assert np.allclose(found.centre, green.position, atol=0.015)
+
+
+def test_a_drink_that_glare_hides_in_part_is_not_measured():
+    image = image_of([drink(0.1, 0.0)])
+    place = np.array([drink(0.1, 0.0).position])
+    column, row, _ = pixels_of(place, image.intrinsics, image.base_from_camera)[0]
+    rows, columns = np.indices(image.depth.shape)
+    scale = image.depth.shape[1] / 320
+    image.depth[np.hypot(columns - column - 20 * scale, rows - row) < 25 * scale] = np.nan
+    assert 'depth is missing in a patch' in reason(image)
+
+
+def test_colours_have_the_names_that_people_use():
+    named = {'red': (0.80, 0.15, 0.12), 'green': (0.12, 0.45, 0.20), 'orange': (0.90, 0.60, 0.10),
+             'blue': (0.15, 0.30, 0.70), 'purple': (0.60, 0.20, 0.55), 'yellow': (0.90, 0.75, 0.15),
+             'turquoise': (0.10, 0.55, 0.60), 'grey': (0.92, 0.92, 0.90), '': (0.05, 0.01, 0.0)}
+    for name, colour in named.items():
+        assert name_of(255 * np.array(colour)) == name

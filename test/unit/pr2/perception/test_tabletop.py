@@ -8,7 +8,7 @@ from ray_camera import INTRINSICS, WIDTH, camera_at, see
 
 from smach_oracle.geometry.depth import pixels_of
 from smach_oracle.pr2.perception.clusters import Capsule, NotSeen
-from smach_oracle.pr2.perception.tabletop import find_tabletop
+from smach_oracle.pr2.perception.tabletop import Look, find_tabletop
 from smach_oracle.simulation.scenes.scene import Body
 
 CAMERA = camera_at((0.05, 0.03, 1.38), (0.75, 0.0, 0.75))
@@ -114,7 +114,45 @@ def test_neighbours_that_merge_are_not_taken_for_one_object(gap, colours):
 def test_boxes_side_by_side_are_told_by_their_colours():
     bricks = [Body('brick', 'box', (0.05, 0.05, 0.1), (0.7, y, 0.77), colour=colour)
               for y, colour in ((0.0, (0.8, 0.2, 0.2)), (0.05, (0.2, 0.3, 0.8)))]
-    assert 'two colours' in reason(image_of([TABLE] + bricks))
+    found = find_tabletop(image_of([TABLE] + bricks)).objects
+    for box, y in zip(sorted(found, key=lambda each: each.centre[1]), (0.0, 0.05)):
+        assert np.allclose(box.centre[:2], (0.7, y), atol=0.008)
+
+
+def test_what_was_seen_first_is_found_again_though_another_thing_is_nearer_by_now():
+    first = find_tabletop(image_of([TABLE, can(0.65, 0.0), can(0.8, 0.2, colour=(0.8, 0.2, 0.1))]))
+    seen = Look(first.colours[0], first.objects[0].size)
+    swapped = [TABLE, can(0.8, 0.2), can(0.65, 0.0, colour=(0.8, 0.2, 0.1))]
+    found = find_tabletop(image_of(swapped, 1), like=seen)
+    assert np.allclose(found.objects[0].centre, (0.8, 0.2, 0.78), atol=0.01)
+    assert len(found.objects) == 2
+    assert re.match('what was seen first, blue and .* x 12 cm, is not among the 1 things on the '
+                    'table: red$', reason(image_of([TABLE, swapped[2]]), like=seen))
+
+
+def test_its_colour_parts_it_from_what_it_touches():
+    first = find_tabletop(image_of([TABLE, can(0.65, 0.0)]))
+    seen = Look(first.colours[0], first.objects[0].size)
+    beside = can(0.7, 0.06, colour=(0.8, 0.2, 0.1))
+    found = find_tabletop(image_of([TABLE, can(0.7, 0.0), beside], 2), like=seen)
+    assert np.allclose(found.objects[0].centre, (0.7, 0.0, 0.78), atol=0.012)
+
+
+@pytest.mark.parametrize('beside', [0, 18])
+def test_a_thing_that_a_patch_without_depth_hides_in_part_is_not_measured(beside):
+    image = image_of([TABLE, can(0.65, 0.0), can(0.9, 0.2)])
+    column, row, _ = pixels_of(np.array([[0.65, 0.0, 0.78]]), image.intrinsics, CAMERA)[0]
+    rows, columns = np.indices(image.depth.shape)
+    scale = WIDTH / 320
+    image.depth[np.hypot(columns - column - beside * scale, rows - row) < 25 * scale] = np.nan
+    assert 'depth is missing in a patch of the image, before the table' in reason(image)
+
+
+def test_what_is_cut_off_says_where_to_look():
+    camera = camera_at((0.05, 0.03, 1.38), (0.75, 0.0, 0.75))
+    with pytest.raises(NotSeen, match='cut off') as error:
+        find_tabletop(image_of([TABLE, can(0.6, 0.42), can(0.9, 0.0)], camera=camera))
+    assert error.value.where[1] > 0.3
 
 
 def test_what_is_too_large_for_the_gripper_is_said_with_its_size():

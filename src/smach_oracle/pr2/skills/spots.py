@@ -1,0 +1,49 @@
+"""Where something may be put down: the place itself, and free spots beside it."""
+from typing import Iterator, List, Mapping, Tuple
+
+import numpy as np
+
+from ..kitchen import MapBox
+
+GRID = 0.02  # m between spots
+USUAL = 0.02  # m beside the place that is near enough, where nothing else is said
+ROOM = 0.004  # m that must be left around what is put down
+FARTHEST = 0.5  # m, of a tolerance
+
+
+def spots(centre: np.ndarray, tolerance: float) -> Iterator[np.ndarray]:
+    """Places (3,) within `tolerance` m of a place, the nearest first; 0: within USUAL."""
+    reach = tolerance if tolerance > 0 else USUAL
+    steps = int(np.floor(reach / GRID + 1e-9))
+    beside = [(GRID * i, GRID * j) for i in range(-steps, steps + 1)
+              for j in range(-steps, steps + 1) if np.hypot(i, j) * GRID <= reach + 1e-9]
+    for x, y in sorted(beside, key=lambda each: (round(float(np.hypot(*each)), 6), each)):
+        yield centre + [x, y, 0.0]
+
+
+def free_spots(centre: np.ndarray, tolerance: float, half: np.ndarray,
+               boxes: Mapping[str, MapBox], support: str) -> Tuple[List[np.ndarray], List[str]]:
+    """The spots on which nothing stands, nearest first, and the names of what stands on others.
+
+    :param centre: (3,) m in base_footprint, of what is put down.
+    :param half: (3,) m, its half extents.
+    :param boxes: what stands there, and the support.
+    """
+    found, taken = [], []
+    for spot in spots(centre, tolerance):
+        inside = [name for name, box in sorted(boxes.items())
+                  if name != support and _overlaps(spot, half, box)]
+        taken += inside
+        if not inside:
+            found.append(spot)
+    return found, sorted(set(taken))
+
+
+def _overlaps(spot: np.ndarray, half: np.ndarray, box: MapBox) -> bool:
+    """Whether something round that stands at a spot meets a box."""
+    if abs(spot[2] - box.centre[2]) > half[2] + box.half[2]:
+        return False
+    turn = np.array([[np.cos(box.yaw), np.sin(box.yaw)], [-np.sin(box.yaw), np.cos(box.yaw)]])
+    beyond = np.abs(turn @ (spot - box.centre)[:2]) - box.half[:2]
+    # m; the narrower side, for what is long may be turned
+    return float(np.hypot(*np.maximum(beyond, 0.0))) < min(half[:2]) + ROOM
