@@ -90,8 +90,6 @@ class Settings:
 
     defaults: StateSettings = StateSettings()
     policy: str = 'prose'
-    # those that are not the policy's defaults
-    policy_parameters: Mapping[str, float] = field(default_factory=dict)
     failing_outcomes: Tuple[str, ...] = DEFAULT_FAILING_OUTCOMES
     userdata: str = 'restore'
     deep_copy_keys: Tuple[str, ...] = ()
@@ -118,6 +116,8 @@ class Settings:
     still_running_factor: float = 10.0
     # whether a step back may lead to what ran before in the container above
     step_back_across: bool = False
+    # those that are not the policy's defaults
+    policy_parameters: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],
