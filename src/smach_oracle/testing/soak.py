@@ -55,10 +55,12 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     :param overrun_s: seconds of wall time that an OVERRUN takes.
     :param expert: who answers, such as `expert(function)`; None: as with `Bench`.
     :param limit_s: seconds of wall time after which a trial counts as not recovered.
-    :raises FaultError: for a state that is not there, or where nothing can fail.
+    :raises FaultError: for a state that is not there, where nothing can fail, and for a number
+        below 1.
     :raises SettingsError: naming key, value and what is allowed.
     :raises AssertionError: where the machine does not end well without a fault.
     """
+    _check_count('trials', trials)
     plan = SoakPlan(machine, seed, tuple(FaultKind(kind) for kind in kinds), tuple(states),
                     most_in_row, overrun_s, expert, settings, preconditions, limit_s)
     runner = _SoakRunner(plan)
@@ -76,7 +78,8 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
                preconditions: PreconditionLists = None, limit_s: float = LIMIT_S) -> ObservedTrial:
     """Run one trial of a soak alone, by its number from 1; the arguments are those of `soak`.
 
-    :raises FaultError: for a state that is not there, or where nothing can fail.
+    :raises FaultError: for a state that is not there, where nothing can fail, and for a number
+        below 1.
     :raises SettingsError: naming key, value and what is allowed.
     :raises ScriptError: where a question did not go with the script of the expert.
     :raises TrialLimitError: where the trial did not end in time.
@@ -88,6 +91,7 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
 
 
 def _alone(plan: SoakPlan, number: int) -> ObservedTrial:
+    _check_count('number', number)
     runner = _SoakRunner(plan)
     with runner.unchanged():
         runner.draw_candidates()
@@ -112,6 +116,8 @@ class _SoakRunner:
     """Runs the trials of a plan."""
 
     def __init__(self, plan: SoakPlan) -> None:
+        if plan.most_in_row is not None:
+            _check_count('most_in_row', plan.most_in_row)
         self._plan = plan
         self._candidates: List[_Candidate] = []
         self._fresh: Callable[[], None] = _nothing
@@ -231,6 +237,11 @@ class _SoakRunner:
             raise FaultError('a soak: {!r} is no StateMachine, nor a function that builds '
                              'one'.format(made))
         return made
+
+
+def _check_count(name: str, count: object) -> None:
+    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+        raise FaultError('a soak: {} is {!r}; give a whole number from 1'.format(name, count))
 
 
 def _nothing() -> None:

@@ -104,6 +104,16 @@ def test_a_preempt_ends_a_wait_for_a_confirmation() -> None:
         assert (held.end(), first.runs) == ('preempted', 0)
 
 
+def test_a_preempt_while_nothing_runs_leaves_the_next_trial_to_be_confirmed() -> None:
+    held = Held(chain_of(Scripted(), Scripted()), settings={'states': {'B': {
+        'autonomy': 'confirm'}}})
+    assert held.hand.preempt() == 'SM_ROOT does not run'
+    with held.begin():
+        held.waits_before('SM_ROOT/B')
+        held.hand.confirm()
+        assert held.end() == 'done'
+
+
 def test_a_state_to_which_the_oracle_goes_is_confirmed_again() -> None:
     first = Scripted('aborted')
     held = Held(chain_of(first), settings={'autonomy': 'confirm'})

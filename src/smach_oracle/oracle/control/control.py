@@ -70,6 +70,7 @@ class Control:
         with self._changed:
             self._jumps.clear()
             self._moving.clear()
+            self._stopping = False  # of a stop that came between two trials
             self.in_trial = True
             self._note_change()
 
