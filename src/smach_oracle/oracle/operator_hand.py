@@ -84,6 +84,8 @@ class OperatorHand:
                 top.machine.request_preempt()
             else:
                 text = '{} does not run'.format(top.path)
+                if top.tree.control.paused:
+                    text += '; its pause is lifted'
         except Exception as err:  # it is the user's
             text += ', and its request_preempt failed: {!r}'.format(err)
         finally:

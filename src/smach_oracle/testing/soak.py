@@ -3,7 +3,7 @@ import contextlib
 import os
 import random
 import tempfile
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, TypeVar, Union
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -19,6 +19,7 @@ from .places import StatePlace, find_place, places_of
 from .soak_report import SoakReport, SoakTrial
 
 MachineOrFactory = Union[smach.StateMachine, Callable[[], smach.StateMachine]]
+Name = TypeVar('Name', str, FaultKind)
 KINDS = (FaultKind.OUTCOME, FaultKind.EXCEPTION)
 
 
@@ -61,7 +62,7 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     :raises AssertionError: where the machine does not end well without a fault.
     """
     _check_count('trials', trials)
-    plan = SoakPlan(machine, seed, tuple(FaultKind(kind) for kind in kinds), tuple(states),
+    plan = SoakPlan(machine, seed, _kinds(kinds), _names(states),
                     most_in_row, overrun_s, expert, settings, preconditions, limit_s)
     runner = _SoakRunner(plan)
     told = []
@@ -85,7 +86,7 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
     :raises TrialLimitError: where the trial did not end in time.
     :raises AssertionError: where the machine does not end well without a fault.
     """
-    return _alone(SoakPlan(machine, seed, tuple(FaultKind(kind) for kind in kinds), tuple(states),
+    return _alone(SoakPlan(machine, seed, _kinds(kinds), _names(states),
                            most_in_row, overrun_s, expert, settings, preconditions, limit_s),
                   number)
 
@@ -96,6 +97,19 @@ def _alone(plan: SoakPlan, number: int) -> ObservedTrial:
     with runner.unchanged():
         runner.draw_candidates()
         return runner.run([runner.fault(number)])
+
+
+def _kinds(given: Iterable[FaultKind]) -> Tuple[FaultKind, ...]:
+    allowed = ', '.join(kind.value for kind in FaultKind)
+    try:
+        return tuple(FaultKind(kind) for kind in _names(given))
+    except ValueError as err:
+        raise FaultError('kinds: {}; allowed is a list of {}'.format(err, allowed)) from err
+
+
+def _names(given: Iterable[Name]) -> Tuple[Name, ...]:
+    """Return what was given as a list; a single text is one name, and not its letters."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 class _Candidate(NamedTuple):

@@ -165,3 +165,8 @@ def test_a_soak_that_would_show_nothing_is_refused(given):
 def test_a_trial_of_a_soak_has_a_number_from_1():
     with pytest.raises(FaultError, match='number is 0'):
         soak_trial(fetch_machine, 0)
+
+
+def test_one_name_is_not_read_letter_by_letter():
+    with pytest.raises(FaultError, match="kinds: 'none' .*; allowed is a list of outcome"):
+        soak(machine_with_one_cup, trials=1, kinds='none')
