@@ -2,10 +2,12 @@
 
 Also what one execution of any container begins and ends.
 """
+import time
 from typing import Any, Callable, Dict, Optional
 
 import smach
 
+from ..checkpoint.storing import Storing, begin_storing
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.repeats import begin_watching
@@ -37,10 +39,12 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
             each.begin_trial(node.tree.trial_id)
     begin_watching(node)
     node.tree.budget.begin(node.settings.budget)
-    return _run_trial(node, execute)
+    storing = begin_storing(node, time.time())
+    return _run_trial(node, execute, storing)
 
 
-def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
+def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
+               storing: Optional[Storing]) -> Optional[str]:
     node.emit(EventKind.TRIAL_START, data={
         'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
         'settings': _settings(node)})
@@ -55,9 +59,12 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional
         raise
     finally:
         node.tree.control.end_trial()
+        why = _trial_end(node, outcome, error)
         node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
-                  data={ENDED_BY: _trial_end(node, outcome, error).value, **_learned(node)})
+                  data={ENDED_BY: why.value, **_learned(node)})
         save_rates(node)
+        if storing is not None:
+            storing.end(why, outcome or '', time.time())
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:

@@ -111,6 +111,11 @@ class EventSource:
             self._seq = 0
             self._over = False
 
+    @property
+    def last_seq(self) -> int:
+        """Number of the last event; -1 before the first."""
+        return self._seq - 1
+
     def emit(self, kind: EventKind, path: str, of_trial: Optional[str] = None,
              **fields: Any) -> None:
         """Tell every observer; costs nothing to speak of where there is none.

@@ -74,6 +74,9 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY),
                                    _MAX_HISTORY),
     'rates_file': values.file,
+    'checkpoint': values.file,
+    'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
+    'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
     'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
@@ -99,6 +102,9 @@ class Settings:
     watch_preconditions: bool = True
     history_length: int = 50  # visits
     rates_file: str = ''
+    checkpoint: str = ''  # the store of the trials; '': nothing is stored
+    checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
+    checkpoint_synchronous: str = 'FULL'
     oracle_label: str = 'ORACLE'
     # whether, or at which paths (patterns), containers and branches have oracles of their own
     nested: Nested = True

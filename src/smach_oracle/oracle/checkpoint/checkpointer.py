@@ -1,0 +1,164 @@
+"""Stores where every container of a tree stands, before each state begins."""
+import time
+from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Set, Tuple
+
+import smach
+from smach_oracle.store.codecs import Codecs
+from smach_oracle.store.rows import Fact, NewMoment
+from smach_oracle.store.store_writer import StoreWriter
+
+from ..machine.nesting import borders_below, nodes_of
+from ..machine.tree_node import TreeNode
+from ..records.events import Event, EventKind
+from .container_facts import AT, ContainerFacts, fact_of
+from .userdata_facts import KeptOut, UserdataFacts, keys_of
+
+# after these the machine waits until the disk has it
+_COMMITTED = frozenset((
+    EventKind.TRIAL_START, EventKind.STATE_START, EventKind.FAILURE, EventKind.PRECONDITION_START,
+    EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
+    EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
+    EventKind.HOLD_START, EventKind.SENT))
+# phases of a container: of its state at, or of itself
+BEFORE, IN, FAILED, ASKED, ENDED = 'before', 'in', 'failed', 'asked', 'ended'
+BUDGET = 'budget'
+_Events = FrozenSet[EventKind]
+
+
+class Checkpointer:
+    """An observer of a tree's events that commits a moment to a store where it is due.
+
+    It is called by the thread in which the step happens, before the machine goes on.
+    """
+
+    def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs) -> None:
+        self._top, self._writer, self._codecs = top, writer, codecs
+        self._nodes: Dict[str, TreeNode] = {}
+        self._facts: Dict[str, ContainerFacts] = {}
+        self._userdata: Dict[str, UserdataFacts] = {}
+        self._pending: List[Fact] = []
+        self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        self._told: Set[Tuple[str, str]] = set()
+
+    def __call__(self, event: Event) -> None:
+        """Take one event; see EventSource."""
+        if event.kind is EventKind.TRIAL_START:
+            self._begin_trial()
+        node = self._node_of(event)
+        if node is None:
+            return
+        self._pending += self._where(event, node)
+        if event.state:
+            self._ran.setdefault(node.key, set()).add(event.state)
+        if event.kind is EventKind.CONTAINER_START:
+            self._pending += self._facts_of(node).begin_execution()
+        if event.kind is EventKind.CONTAINER_END:
+            self._pending += self._collected(node, all_keys=True)
+            self._pending += self._around(node)
+        if event.kind in _COMMITTED:
+            self._commit(event, node)
+
+    def last_words(self) -> None:
+        """Store what has not been stored of the trial, which has ended."""
+        facts = tuple(self._pending) + tuple(
+            fact for node in self._nodes.values() for fact in self._facts_of(node).all_states())
+        self._pending = []
+        self._writer.commit(NewMoment(time.time(), self._top.events.last_seq, 'TRIAL_END',
+                                   self._top.key, '', facts))
+
+    def _begin_trial(self) -> None:
+        self._nodes = {node.key: node for node in nodes_of(self._top.machine)}
+        for node in self._nodes.values():
+            self._pending += self._facts_of(node).all_states()
+        self._pending += self._collected(self._top, all_keys=True)
+
+    def _node_of(self, event: Event) -> Optional[TreeNode]:
+        """Return the container that an event is of: that of a branch goes by its label as well."""
+        for key in ('{}/{}'.format(event.path, event.state), event.path):
+            node = self._nodes.get(key)
+            if node is not None and node.path == event.path:
+                return node
+        found = {node.key: node for node in nodes_of(self._top.machine)}
+        if found.keys() == self._nodes.keys():
+            return None
+        self._nodes = found
+        return self._node_of(event)
+
+    def _facts_of(self, node: TreeNode) -> ContainerFacts:
+        facts = self._facts.get(node.key)
+        if facts is None:
+            facts = self._facts[node.key] = ContainerFacts(node)
+        return facts
+
+    # -- what a moment has
+
+    def _where(self, event: Event, node: TreeNode) -> Iterator[Fact]:
+        """Yield where the container stands after an event."""
+        kind, label = event.kind, event.state
+        if kind is EventKind.STATE_START:
+            yield fact_of(node.key, AT, [label, IN])
+            yield from self._not_begun_below(node, label)
+        elif kind is EventKind.CONTAINER_START:
+            yield fact_of(node.key, AT, [label, BEFORE])
+        elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
+                event.target in node.machine._states and not node.is_oracle(event.target)):
+            yield fact_of(node.key, AT, [event.target, BEFORE])
+        elif kind is EventKind.FAILURE:
+            yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
+                                         event.text])
+        elif kind is EventKind.QUERY_OPENED:
+            yield fact_of(node.key, AT, [label, ASKED, event.query_id])
+        elif kind is EventKind.CONTAINER_END:
+            yield fact_of(node.key, AT, [event.outcome, ENDED])
+
+    def _not_begun_below(self, node: TreeNode, label: str) -> Iterator[Fact]:
+        """Yield that what is in a state has not begun in this visit of it."""
+        if isinstance(node.machine._states.get(label), smach.Container):
+            prefix = '{}/{}/'.format(node.key, label)
+            yield from (Fact(key, AT, None) for key in list(self._nodes)
+                        if (key + '/').startswith(prefix))
+
+    def _commit(self, event: Event, node: TreeNode) -> None:
+        facts = self._pending + list(self._collected(node))
+        self._pending = []
+        self._writer.commit(
+            NewMoment(event.wall_time, event.seq, event.kind.name, node.key, event.state,
+                   tuple(facts)), lambda: _must_stop(node))
+
+    def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
+        """Yield what is new of a container."""
+        labels = self._ran.pop(node.key, set())
+        yield from self._facts_of(node).changed(list(labels))
+        reached = None if all_keys else frozenset().union(
+            *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
+        yield from self._keys(node.path if node.branch is not None else node.key,
+                              node.machine.userdata._data, reached)
+
+    def _keys(self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
+              ) -> Iterator[Fact]:
+        userdata = self._userdata.get(path)
+        if userdata is None:
+            userdata = self._userdata[path] = UserdataFacts(
+                self._codecs, path, lambda out: self._tell(path, out))
+        yield from userdata.changed(data, reached)
+
+    def _around(self, node: TreeNode) -> Iterator[Fact]:
+        """Yield what is new of the Concurrences and Iterators around a container that has ended."""
+        parent = node.parent
+        if parent is None or len(node.below) < 2:
+            return
+        for below, container in borders_below(parent.machine):
+            if node.below[:len(below)] == below:
+                path = '/'.join((parent.key,) + below)
+                yield from self._keys(path, container.userdata._data, None)
+
+    def _tell(self, path: str, out: KeptOut) -> None:
+        if (path, out.key) in self._told:
+            return
+        self._told.add((path, out.key))
+        smach.logwarn('{}: userdata key {!r} ({}) cannot be stored: {}. It will be missing where '
+                      'the machine is resumed'.format(path, out.key, out.kind, out.why))
+
+
+def _must_stop(node: TreeNode) -> bool:
+    return node.machine.preempt_requested() or bool(smach.is_shutdown())

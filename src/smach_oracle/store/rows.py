@@ -1,0 +1,69 @@
+"""What is written to a store, and what is read from it, as plain tuples."""
+from typing import Mapping, NamedTuple, Optional, Tuple
+
+from .codecs import Encoded
+
+
+class Fact(NamedTuple):
+    """One thing that has a new value: `name` of the container at `path`; None: it is gone."""
+
+    path: str
+    name: str
+    value: Optional[Encoded]
+
+
+class NewMoment(NamedTuple):
+    """What is committed at once.
+
+    `seq`: number of the trial's last event. `kind`: its name. `label`: a state of `path`.
+    """
+
+    at: float  # s since the epoch
+    seq: int
+    kind: str
+    path: str
+    label: str
+    facts: Tuple[Fact, ...]
+
+
+class StoredTrial(NamedTuple):
+    """One trial of a machine; `moments` is the number of its moments."""
+
+    number: int  # in the store
+    machine: str
+    trial_id: str
+    structure: str  # id
+    begun: float  # s since the epoch
+    ended: Optional[float]  # None: it has not ended
+    outcome: str
+    moments: int
+
+
+class StoredMoment(NamedTuple):
+    """One moment as a list shows it."""
+
+    number: int  # in the store
+    at: float  # s since the epoch
+    seq: int
+    kind: str
+    path: str
+    label: str
+
+
+class StoredValue(NamedTuple):
+    """A value, as it is stored, and the moment of it."""
+
+    text: Optional[str]
+    whole: Optional[bytes]
+    moment: int
+
+
+Facts = Mapping[Tuple[str, str], StoredValue]  # by (path, name)
+
+
+class LogLine(NamedTuple):
+    """One change that somebody has made to a store by hand."""
+
+    at: float  # s since the epoch
+    who: str
+    what: str
