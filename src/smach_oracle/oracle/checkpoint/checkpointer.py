@@ -11,18 +11,19 @@ from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
 from .container_facts import AT, ContainerFacts, fact_of
+from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, keys_of
 
 # after these the machine waits until the disk has it
 _COMMITTED = frozenset((
-    EventKind.TRIAL_START, EventKind.STATE_START, EventKind.FAILURE, EventKind.PRECONDITION_START,
+    EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.FAILURE,
+    EventKind.PRECONDITION_START,
     EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
     EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
     EventKind.HOLD_START, EventKind.SENT))
 # phases of a container: of its state at, or of itself
-BEFORE, IN, FAILED, ASKED, ENDED = 'before', 'in', 'failed', 'asked', 'ended'
-BUDGET = 'budget'
-_Events = FrozenSet[EventKind]
+BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
+ASKED = 'asked'  # name of the fact which question is open
 
 
 class Checkpointer:
@@ -31,7 +32,10 @@ class Checkpointer:
     It is called by the thread in which the step happens, before the machine goes on.
     """
 
-    def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs) -> None:
+    def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
+                 before: Optional[StoredTree] = None) -> None:
+        """`before`: what is stored of the trial, where it is resumed."""
+        self._before = before
         self._top, self._writer, self._codecs = top, writer, codecs
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
@@ -42,7 +46,7 @@ class Checkpointer:
 
     def __call__(self, event: Event) -> None:
         """Take one event; see EventSource."""
-        if event.kind is EventKind.TRIAL_START:
+        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
             self._begin_trial()
         node = self._node_of(event)
         if node is None:
@@ -50,7 +54,7 @@ class Checkpointer:
         self._pending += self._where(event, node)
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
-        if event.kind is EventKind.CONTAINER_START:
+        if event.kind is EventKind.CONTAINER_START and node.resuming is None:
             self._pending += self._facts_of(node).begin_execution()
         if event.kind is EventKind.CONTAINER_END:
             self._pending += self._collected(node, all_keys=True)
@@ -87,7 +91,8 @@ class Checkpointer:
     def _facts_of(self, node: TreeNode) -> ContainerFacts:
         facts = self._facts.get(node.key)
         if facts is None:
-            facts = self._facts[node.key] = ContainerFacts(node)
+            facts = self._facts[node.key] = ContainerFacts(node, None if self._before is None else
+                                                           self._before.container(node.key))
         return facts
 
     # -- what a moment has
@@ -98,7 +103,7 @@ class Checkpointer:
         if kind is EventKind.STATE_START:
             yield fact_of(node.key, AT, [label, IN])
             yield from self._not_begun_below(node, label)
-        elif kind is EventKind.CONTAINER_START:
+        elif kind is EventKind.CONTAINER_START and node.resuming is None:
             yield fact_of(node.key, AT, [label, BEFORE])
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
                 event.target in node.machine._states and not node.is_oracle(event.target)):
@@ -107,7 +112,7 @@ class Checkpointer:
             yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
                                          event.text])
         elif kind is EventKind.QUERY_OPENED:
-            yield fact_of(node.key, AT, [label, ASKED, event.query_id])
+            yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind is EventKind.CONTAINER_END:
             yield fact_of(node.key, AT, [event.outcome, ENDED])
 
@@ -120,6 +125,7 @@ class Checkpointer:
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending + list(self._collected(node))
+        facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
         self._pending = []
         self._writer.commit(
             NewMoment(event.wall_time, event.seq, event.kind.name, node.key, event.state,

@@ -1,6 +1,6 @@
 """What is to be stored of one container, and what of that is new."""
 import json
-from typing import Any, Dict, Iterator, List, Union
+from typing import Any, Dict, Iterator, List, Optional, Union
 
 from smach_oracle.store.codecs import Encoded
 from smach_oracle.store.rows import Fact
@@ -8,6 +8,7 @@ from smach_oracle.store.rows import Fact
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.state_record import StateRecord
+from .stored_container import StoredContainer
 
 AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
 VISIT, STATE = 'visit:', 'state:'  # how the names of such facts begin
@@ -22,12 +23,14 @@ def fact_of(path: str, name: str, plain: Plain) -> Fact:
 class ContainerFacts:
     """Tells what of a container's records differs from what is stored."""
 
-    def __init__(self, node: TreeNode) -> None:
+    def __init__(self, node: TreeNode, before: Optional[StoredContainer] = None) -> None:
+        """`before`: what is stored of it, where the trial is resumed."""
         self._node = node
         self._path = node.key
-        self._execution = 0  # number of the present one, in this trial
+        self._execution = 0 if before is None else before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
-        self._visits = 0  # stored ones of this execution
+        # stored ones of this execution
+        self._visits = 0 if before is None else before.visits_of_execution
 
     def begin_execution(self) -> Iterator[Fact]:
         """Yield what is new where the container begins to execute."""

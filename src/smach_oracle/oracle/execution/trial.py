@@ -7,7 +7,8 @@ from typing import Any, Callable, Dict, Optional
 
 import smach
 
-from ..checkpoint.storing import Storing, begin_storing
+from ..checkpoint.resuming import Resumption, tell_resumed
+from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.repeats import begin_watching
@@ -32,22 +33,28 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         bring_up_to_date(each)
     if node.tree.recover:
         node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
-    node.tree.begin_trial(machine.new_trial_id())
+    store = open_store(node)
+    resumed = None if store is None else store.to_resume()
+    node.tree.begin_trial(machine.new_trial_id() if resumed is None else resumed.trial.trial_id)
     for each in nodes_of(machine):
         # one that still runs was abandoned in an earlier trial, and is left there
         if not each.machine.is_running():
             each.begin_trial(node.tree.trial_id)
     begin_watching(node)
     node.tree.budget.begin(node.settings.budget)
-    storing = begin_storing(node, time.time())
-    return _run_trial(node, execute, storing)
+    if store is not None:
+        store.begin_trial(resumed)
+    return _run_trial(node, execute, store, resumed)
 
 
 def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
-               storing: Optional[Storing]) -> Optional[str]:
-    node.emit(EventKind.TRIAL_START, data={
-        'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
-        'settings': _settings(node)})
+               store: Optional[TrialStore], resumed: Optional[Resumption]) -> Optional[str]:
+    if resumed is None:
+        node.emit(EventKind.TRIAL_START, data={
+            'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
+            'settings': _settings(node)})
+    else:
+        tell_resumed(node, resumed)
     node.tree.control.begin_trial()
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
@@ -63,8 +70,8 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
         node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
                   data={ENDED_BY: why.value, **_learned(node)})
         save_rates(node)
-        if storing is not None:
-            storing.end(why, outcome or '', time.time())
+        if store is not None:
+            store.end(why, outcome or '', time.time())
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
@@ -98,7 +105,8 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
 def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     machine = node.machine
     node.begin_execution()
-    node.emit(EventKind.CONTAINER_START, state=node.entry or machine._initial_state_label or '')
+    begins_in = (node.entry if node.resuming is None else node.resuming.label)
+    node.emit(EventKind.CONTAINER_START, state=begins_in or machine._initial_state_label or '')
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
     try:

@@ -72,6 +72,20 @@ class BranchPort(Protocol):
         """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
 
 
+class EntryPort(Protocol):
+    """Where a container goes on whose program was stopped (`checkpoint.resuming`)."""
+
+    @property
+    def label(self) -> str:
+        """The state in which it goes on."""
+
+    def take_over_records(self, node: 'TreeNode') -> None:
+        """Have the visits of the execution that was stopped."""
+
+    def enter(self, node: 'TreeNode') -> None:
+        """Have the userdata as it was, and the state in which it goes on as the current one."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -101,6 +115,7 @@ class TreeNode:
         # where a verdict from below or here ends the present state (execution.departure)
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
+        self.resuming: Optional[EntryPort] = None  # at the next execution
         self.gave_up = False  # the latest execution ended so
         # a state that is executed as a precondition now
         self.as_precondition: Optional[smach.State] = None
@@ -270,6 +285,8 @@ class TreeNode:
         self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()
+        if self.resuming is not None:
+            self.resuming.take_over_records(self)
 
     def begin_stepping(self) -> None:
         """At the first state of an execution, look at what the engine is like."""

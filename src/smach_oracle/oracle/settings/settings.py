@@ -16,6 +16,7 @@ from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
+from .on_resume import checked_on_resume
 from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 
@@ -76,6 +77,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'rates_file': values.file,
     'checkpoint': values.file,
     'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
+    'on_resume': checked_on_resume,
     'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
@@ -105,6 +107,8 @@ class Settings:
     checkpoint: str = ''  # the store of the trials; '': nothing is stored
     checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
     checkpoint_synchronous: str = 'FULL'
+    # what is done about a stored trial that was not finished, and for STATE the path of a state
+    on_resume: Tuple[str, str] = ('ask', '')
     oracle_label: str = 'ORACLE'
     # whether, or at which paths (patterns), containers and branches have oracles of their own
     nested: Nested = True
