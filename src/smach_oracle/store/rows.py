@@ -1,5 +1,5 @@
 """What is written to a store, and what is read from it, as plain tuples."""
-from typing import Mapping, NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple
 
 from .codecs import Encoded
 
@@ -51,14 +51,27 @@ class StoredMoment(NamedTuple):
 
 
 class StoredValue(NamedTuple):
-    """A value, as it is stored, and the moment of it."""
+    """A value as it is stored; both are None where the fact is gone."""
 
     text: Optional[str]
     whole: Optional[bytes]
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is a value."""
+        return self.text is not None or self.whole is not None
+
+
+class StoredFact(NamedTuple):
+    """One fact, with the moment in which it was written."""
+
     moment: int
-
-
-Facts = Mapping[Tuple[str, str], StoredValue]  # by (path, name)
+    kind: str  # of the moment, as its next two
+    moment_path: str
+    label: str
+    path: str
+    name: str
+    value: StoredValue
 
 
 class LogLine(NamedTuple):

@@ -8,7 +8,7 @@ import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from .errors import StoreDamaged, StoreError
-from .rows import Facts, LogLine, NewMoment, StoredMoment, StoredTrial, StoredValue
+from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
 
 FORMAT = 1
 MAGIC = 0x534D4F53  # "SMOS": which program's file it is, where SQLite keeps that
@@ -194,22 +194,22 @@ class StoreFile:
             'SELECT number, at, seq, kind, path, label FROM moments WHERE trial = ? '
             'ORDER BY number', (trial,))]
 
-    def facts(self, trial: int, until: Optional[int] = None) -> Facts:
-        """Return what held at a moment of a trial, by default the last one.
+    def facts(self, trial: int, until: Optional[int] = None) -> Iterator[StoredFact]:
+        """Yield the facts of a trial in the order in which they were written.
+
+        `until`: the last moment that counts; by default the last one of all. A moment without any
+        fact is yielded once, with an empty name.
 
         :raises StoreDamaged: where it cannot be read.
         """
-        latest: Dict[Tuple[str, str], StoredValue] = {}
-        for number, path, name, text, whole in self._read(
-                'SELECT moments.number, facts.path, name, text, whole FROM moments '
-                'JOIN facts ON facts.moment = moments.number WHERE trial = ? '
-                'AND moments.number <= ? ORDER BY moments.number, facts.rowid',
+        for row in self._read(
+                'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
+                'name, text, whole FROM moments LEFT JOIN facts ON facts.moment = moments.number '
+                'WHERE trial = ? AND moments.number <= ? ORDER BY moments.number, facts.rowid',
                 (trial, 1 << 62 if until is None else until)):
-            if text is None and whole is None:
-                latest.pop((path, name), None)
-            else:
-                latest[path, name] = StoredValue(text, whole, number)
-        return latest
+            number, kind, path, label, of, name, text, whole = row
+            yield StoredFact(number, kind, path, label, of or '', name or '',
+                             StoredValue(text, whole))
 
     def part(self, digest: bytes) -> bytes:
         """Return bytes by their digest.

@@ -7,10 +7,11 @@ from smach_oracle.store.codecs import Codecs
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..machine.nesting import borders_below, nodes_of
+from ..branches.around import borders_around
+from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
-from .container_facts import AT, ContainerFacts, fact_of
+from .container_facts import ASKED, AT, ITEMS, ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, keys_of
 
@@ -21,9 +22,9 @@ _COMMITTED = frozenset((
     EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
     EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
     EventKind.HOLD_START, EventKind.SENT))
+_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 # phases of a container: of its state at, or of itself
 BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
-ASKED = 'asked'  # name of the fact which question is open
 
 
 class Checkpointer:
@@ -41,6 +42,7 @@ class Checkpointer:
         self._facts: Dict[str, ContainerFacts] = {}
         self._userdata: Dict[str, UserdataFacts] = {}
         self._pending: List[Fact] = []
+        self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._told: Set[Tuple[str, str]] = set()
 
@@ -51,6 +53,7 @@ class Checkpointer:
         node = self._node_of(event)
         if node is None:
             return
+        self._pending += self._items_around(node)
         self._pending += self._where(event, node)
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
@@ -59,7 +62,7 @@ class Checkpointer:
         if event.kind is EventKind.CONTAINER_END:
             self._pending += self._collected(node, all_keys=True)
             self._pending += self._around(node)
-        if event.kind in _COMMITTED:
+        if event.kind in _COMMITTED or self._ends_branch(event, node):
             self._commit(event, node)
 
     def last_words(self) -> None:
@@ -102,7 +105,8 @@ class Checkpointer:
         kind, label = event.kind, event.state
         if kind is EventKind.STATE_START:
             yield fact_of(node.key, AT, [label, IN])
-            yield from self._not_begun_below(node, label)
+            if isinstance(node.machine._states.get(label), smach.Container):
+                yield from self._not_begun_below('{}/{}'.format(node.key, label))
         elif kind is EventKind.CONTAINER_START and node.resuming is None:
             yield fact_of(node.key, AT, [label, BEFORE])
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
@@ -113,22 +117,39 @@ class Checkpointer:
                                          event.text])
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
-        elif kind is EventKind.CONTAINER_END:
+        elif kind is EventKind.CONTAINER_END and node.branch is None:
             yield fact_of(node.key, AT, [event.outcome, ENDED])
+        elif node.branch is not None and kind in _LEAVES:
+            outcome = event.outcome if kind is EventKind.GIVE_UP else event.target
+            if outcome and not node.is_oracle(outcome) and outcome not in node.machine._states:
+                yield fact_of(node.key, AT, [outcome, ENDED])
 
-    def _not_begun_below(self, node: TreeNode, label: str) -> Iterator[Fact]:
-        """Yield that what is in a state has not begun in this visit of it."""
-        if isinstance(node.machine._states.get(label), smach.Container):
-            prefix = '{}/{}/'.format(node.key, label)
-            yield from (Fact(key, AT, None) for key in list(self._nodes)
-                        if (key + '/').startswith(prefix))
+    def _not_begun_below(self, path: str) -> Iterator[Fact]:
+        """Yield that what is in a container or state has not begun in this visit of it."""
+        yield from (Fact(key, AT, None) for key in list(self._nodes)
+                    if (key + '/').startswith(path + '/'))
+
+    def _ends_branch(self, event: Event, node: TreeNode) -> bool:
+        """Whether a branch has ended, or a machine in a Concurrence: no state follows it."""
+        if node.branch is not None:
+            return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
+        return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
+
+    def _items_around(self, node: TreeNode) -> Iterator[Fact]:
+        """Yield which items the Iterators around a container have come to."""
+        for path, border in borders_around(node):
+            number = getattr(border, 'item_number', 0)
+            if number and self._items.get(path) != number:
+                self._items[path] = number
+                yield fact_of(path, ITEMS, number)
+                yield from self._not_begun_below(path)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending + list(self._collected(node))
         facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
         self._pending = []
         self._writer.commit(
-            NewMoment(event.wall_time, event.seq, event.kind.name, node.key, event.state,
+            NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
                    tuple(facts)), lambda: _must_stop(node))
 
     def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
@@ -149,14 +170,11 @@ class Checkpointer:
         yield from userdata.changed(data, reached)
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
-        """Yield what is new of the Concurrences and Iterators around a container that has ended."""
-        parent = node.parent
-        if parent is None or len(node.below) < 2:
-            return
-        for below, container in borders_below(parent.machine):
-            if node.below[:len(below)] == below:
-                path = '/'.join((parent.key,) + below)
-                yield from self._keys(path, container.userdata._data, None)
+        """Yield what is new of the userdata into which the outputs of a container have gone."""
+        for path, border in borders_around(node):
+            yield from self._keys(path, border.container.userdata._data, None)
+        if node.parent is not None and len(node.below) == 1:
+            yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         if (path, out.key) in self._told:

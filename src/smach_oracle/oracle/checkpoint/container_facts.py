@@ -11,6 +11,7 @@ from ..records.state_record import StateRecord
 from .stored_container import StoredContainer
 
 AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
+ASKED, ITEMS = 'asked', 'items'
 VISIT, STATE = 'visit:', 'state:'  # how the names of such facts begin
 Plain = Union[Dict[str, Any], List[Any], str, int]
 

@@ -5,11 +5,14 @@ from typing import Any, List, Mapping, NamedTuple, Optional
 import smach
 from smach_oracle.store.rows import StoredTrial
 
+from ..branches.around import borders_in
+from ..branches.border import border_of
+from ..branches.items import can_be_indexed
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord, Unfinished
-from .checkpointer import BEFORE, ENDED, FAILED
+from .checkpointer import ENDED, FAILED, IN
 from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 
@@ -75,6 +78,9 @@ class EntryPoint:
             node.warn('userdata key {!r} {}'.format(key, 'has the value that the script gives it, '
                                                     'as {}'.format(why) if key in data
                                                     else 'is missing, as ' + why))
+        for label, snapshot in stored.snapshots.items():
+            if label in machine._states and not node.is_oracle(label):
+                node.record(label).snapshot = snapshot
         machine._set_current_state(stored.label)
 
 
@@ -91,7 +97,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
             node.records.history.take_over([], 0, stored.history)
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
-    _activate(top, resumption, nodes)
+    _Setting(resumption, nodes).activate(top)
 
 
 def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
@@ -103,28 +109,75 @@ def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> in
     return int(mark.reached)
 
 
-def _activate(node: TreeNode, resumption: Resumption, nodes: List[TreeNode]) -> None:
-    stored = resumption.tree.container(node.key)
-    if stored.phase in ('', ENDED):
-        return
-    node.resuming = EntryPoint(stored)
-    record = node.record(stored.label)
-    inner = _below(node, stored.label, nodes)
-    if stored.phase == BEFORE or (stored.phase != FAILED and inner is not None):
-        if inner is not None and resumption.tree.container(inner.key).phase not in ('', ENDED):
-            _activate(inner, resumption, nodes)
-        elif resumption.asks:
-            record.resume(Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(resumption)))
-        return
-    record.resume(_unfinished(stored, resumption))
+class _Setting:
+    """Sets the containers that ran to where they were."""
+
+    def __init__(self, resumption: Resumption, nodes: List[TreeNode]) -> None:
+        self._resumption, self._nodes = resumption, nodes
+
+    def activate(self, node: TreeNode) -> None:
+        """Set a container that was under way, and what is in its state."""
+        stored = self._resumption.tree.container(node.key)
+        if node.branch is None:
+            node.resuming = EntryPoint(stored)
+        record = node.record(stored.label)
+        if stored.phase != IN:
+            if stored.phase == FAILED:
+                record.resume(self._unfinished(node, stored))
+            else:
+                self._ask_before(node, stored.label)
+            return
+        inside = self._inside(node, stored.label)
+        if inside is None:
+            record.resume(self._unfinished(node, stored))
+            return
+        for path, border in borders_in(node, stored.label):
+            told = self._resumption.tree.container(path)
+            border.resume(told.keys, told.gone, told.item)
+        for each in inside:
+            self._set(each)
+
+    def _set(self, node: TreeNode) -> None:
+        """Set a container in a state that was under way."""
+        stored = self._resumption.tree.container(node.key)
+        if stored.phase == ENDED:
+            node.ended_before = stored.label
+        elif stored.phase:
+            self.activate(node)
+        else:
+            self._ask_before(node, node.machine._initial_state_label or '')
+
+    def _ask_before(self, node: TreeNode, label: str) -> None:
+        """Have a person asked before a state that had not begun, where nothing is to move."""
+        if self._resumption.asks and label in node.machine._states:
+            node.record(label).resume(
+                Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption)))
+
+    def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
+        why = _why(self._resumption) if self._resumption.asks else ''
+        # a branch has the userdata of the Concurrence or Iterator that holds it
+        snapshots = self._resumption.tree.container(node.path).snapshots
+        if stored.phase == FAILED:
+            kind, outcome, text = stored.at[2:5]
+            return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label))
+        return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label))
+
+    def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
+        """Return the containers directly in a state; None where it can only go on as a whole."""
+        inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
+        state = node.machine._states.get(label)
+        return inside if inside and _is_wrapped_through(state) else None
 
 
-def _unfinished(stored: StoredContainer, resumption: Resumption) -> Unfinished:
-    why = _why(resumption) if resumption.asks else ''
-    if stored.phase == FAILED:
-        kind, outcome, text = stored.at[2:5]
-        return Unfinished(FailureKind(kind), outcome, text, why)
-    return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why)
+def _is_wrapped_through(state: object) -> bool:
+    """Whether each plain state in it has an oracle of its own, so that each is told of."""
+    if isinstance(state, smach.StateMachine):
+        return hasattr(state, '_oracle')
+    border = border_of(state)
+    return border is not None and all(
+        label in border.machines or _is_wrapped_through(inner)
+        for label, inner in border.states()) and (
+            not isinstance(state, smach.Iterator) or can_be_indexed(state))
 
 
 def _why(resumption: Resumption) -> str:
@@ -132,11 +185,3 @@ def _why(resumption: Resumption) -> str:
     if resumption.changes:
         told += ', and the script has changed since: ' + '; '.join(resumption.changes)
     return told
-
-
-def _below(node: TreeNode, label: str, nodes: List[TreeNode]) -> Optional[TreeNode]:
-    """Return the node of a state that is a wrapped machine, None for any other state."""
-    state = node.machine._states.get(label)
-    if not isinstance(state, smach.StateMachine):
-        return None
-    return next((each for each in nodes if each.machine is state), None)

@@ -10,7 +10,9 @@ class StoredContainer:
     `at`: label (or, where it has ended, its outcome), phase, and what belongs to that; empty where
     it has not begun in the present visit of the state that holds it. `keys`: userdata.
     `missing`: why a key that was there is not. `gone`: keys that were deleted. `visits`: of its
-    latest execution, oldest first.
+    latest execution, oldest first. `snapshots`: userdata with which its states began, by label.
+    `asked`: label and id of the open question. `item`: of an Iterator, the number of the one under
+    way.
     """
 
     def __init__(self) -> None:
@@ -22,6 +24,9 @@ class StoredContainer:
         self.states: Dict[str, Mapping[str, Any]] = {}
         self.keys: Dict[str, Any] = {}
         self.missing: Dict[str, str] = {}
+        self.snapshots: Dict[str, Dict[str, Any]] = {}
+        self.asked: List[str] = []
+        self.item = 0
         self.gone: List[str] = []
 
     @property

@@ -1,16 +1,19 @@
-"""What a store says of the containers of a tree at one moment."""
+"""Reads what a store says of the containers of a tree at one moment."""
 import json
-from typing import Any, Dict, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from smach_oracle.store.codecs import Codecs, NotReadable
 from smach_oracle.store.errors import StoreDamaged
-from smach_oracle.store.rows import Facts
+from smach_oracle.store.rows import StoredFact, StoredValue
 from smach_oracle.store.store_file import StoreFile
 
+from ..records.events import EventKind
 from ..records.visits import Visit, VisitResult
-from .container_facts import AT, EXECUTION, HISTORY, STATE, VISIT
+from .container_facts import ASKED, AT, EXECUTION, HISTORY, ITEMS, STATE, VISIT
 from .stored_container import StoredContainer
 from .userdata_facts import KEPT_OUT, KEY
+
+_Values = Dict[str, StoredValue]  # by key
 
 
 class StoredTree(NamedTuple):
@@ -30,70 +33,112 @@ def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int]
 
     :raises StoreDamaged: where the store cannot be read.
     """
-    tree = StoredTree({}, {})
-    facts = store.facts(trial, until)
-    visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
-    for (path, name), value in facts.items():
+    return _Reading(store, codecs).read(trial, until)
+
+
+class _Reading:
+    """One pass over the facts of a trial."""
+
+    def __init__(self, store: StoreFile, codecs: Codecs) -> None:
+        self._store, self._codecs = store, codecs
+        self._tree = StoredTree({}, {})
+        self._keys: Dict[str, _Values] = {}  # by path
+        self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
+        self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
+        self._decoded: Dict[StoredValue, Any] = {}
+
+    def read(self, trial: int, until: Optional[int]) -> StoredTree:
+        before: Optional[StoredFact] = None
+        for fact in self._store.facts(trial, until):
+            if before is not None and before.moment != fact.moment:
+                self._note_entry(before)
+            before = fact
+            if fact.name:
+                self._take(fact)
+        if before is not None:
+            self._note_entry(before)
+        for path, container in self._tree.containers.items():
+            self._put_together(path, container)
+        return self._tree
+
+    def _note_entry(self, fact: StoredFact) -> None:
+        """Keep the userdata with which a state began, as its snapshot."""
+        if fact.kind == EventKind.STATE_START.name:
+            path = fact.moment_path
+            self._at_entry.setdefault(path, {})[fact.label] = dict(self._keys.get(path, {}))
+
+    def _take(self, fact: StoredFact) -> None:
+        path, name, value = fact.path, fact.name, fact.value
         if not path:
-            tree.whole[name] = _plain(value.text)
-            continue
-        container = tree.containers.setdefault(path, StoredContainer())
-        if name.startswith(VISIT):
-            execution, number = map(int, name[len(VISIT):].split(':'))
-            state, outcome, result = _plain(value.text)
-            visits.setdefault(path, {})[execution, number] = Visit(
-                state, outcome, VisitResult(result))
-        elif not name.startswith((KEY, KEPT_OUT)):
-            _take(container, name, value.text)
-    for path, by_number in visits.items():
-        _take_visits(tree.containers[path], by_number)
-    _take_userdata(tree, facts, store, codecs)
-    return tree
-
-
-def _take(container: StoredContainer, name: str, text: Optional[str]) -> None:
-    if text is None:
-        return
-    plain = _plain(text)
-    if name == AT:
-        container.at = plain
-    elif name == EXECUTION:
-        container.execution = plain
-    elif name == HISTORY:
-        container.history = plain
-    elif name.startswith(STATE):
-        container.states[name[len(STATE):]] = plain
-
-
-def _take_visits(container: StoredContainer, visits: Mapping[Tuple[int, int], Visit]) -> None:
-    present = sorted(number for execution, number in visits if execution == container.execution)
-    container.visits = [visits[container.execution, number] for number in present]
-    container.visits_of_execution = present[-1] + 1 if present else 0
-
-
-def _take_userdata(tree: StoredTree, facts: Facts, store: StoreFile, codecs: Codecs) -> None:
-    for (path, name), value in facts.items():
-        if not path or not name.startswith((KEY, KEPT_OUT)):
-            continue
-        container = tree.containers[path]
-        is_there = value.text is not None or value.whole is not None
-        if name.startswith(KEPT_OUT):
-            if is_there:
-                kind, why = _plain(value.text)
+            self._tree.whole[name] = _plain(value)
+            return
+        container = self._tree.containers.setdefault(path, StoredContainer())
+        if name.startswith(KEY):
+            self._keys.setdefault(path, {})[name[len(KEY):]] = value
+        elif name.startswith(KEPT_OUT):
+            container.missing.pop(name[len(KEPT_OUT):], None)
+            if value.is_there:
+                kind, why = _plain(value)
                 container.missing[name[len(KEPT_OUT):]] = '{} was not stored: {}'.format(kind, why)
-            continue
-        key = name[len(KEY):]
-        if not is_there:
-            container.gone.append(key)
-            continue
-        try:
-            container.keys[key] = codecs.decode(value.text, value.whole, store.part)
-        except NotReadable as err:
-            container.missing[key] = str(err)
+        elif name.startswith(VISIT):
+            execution, number = map(int, name[len(VISIT):].split(':'))
+            state, outcome, result = _plain(value)
+            self._visits.setdefault(path, {})[execution, number] = Visit(
+                state, outcome, VisitResult(result))
+        elif name.startswith(STATE):
+            container.states[name[len(STATE):]] = _plain(value)
+        else:
+            self._take_named(container, path, name, _plain(value))
+
+    def _take_named(self, container: StoredContainer, path: str, name: str, plain: Any) -> None:
+        if name == AT:
+            container.at = plain or []
+        elif name == HISTORY:
+            container.history = plain
+        elif name == ASKED:
+            container.asked = plain or []
+        elif name == ITEMS:
+            container.item = plain or 0
+        elif name == EXECUTION:
+            container.execution = plain
+            self._at_entry.pop(path, None)
+
+    def _put_together(self, path: str, container: StoredContainer) -> None:
+        visits = self._visits.get(path, {})
+        present = sorted(number for execution, number in visits
+                         if execution == container.execution)
+        container.visits = [visits[container.execution, number] for number in present]
+        container.visits_of_execution = present[-1] + 1 if present else 0
+        for key, value in self._keys.get(path, {}).items():
+            if not value.is_there:
+                container.gone.append(key)
+                continue
+            try:
+                container.keys[key] = self._value(value)
+            except NotReadable as err:
+                container.missing[key] = str(err)
+        for label, values in self._at_entry.get(path, {}).items():
+            container.snapshots[label] = self._readable(values)
+
+    def _readable(self, values: _Values) -> Dict[str, Any]:
+        found = {}
+        for key, value in values.items():
+            try:
+                if value.is_there:
+                    found[key] = self._value(value)
+            except NotReadable:
+                pass  # said of the present value, or not needed any more
+        return found
+
+    def _value(self, value: StoredValue) -> Any:
+        """Return a value; the same object where the same one is meant."""
+        if value not in self._decoded:
+            self._decoded[value] = self._codecs.decode(value.text, value.whole, self._store.part)
+        return self._decoded[value]
 
 
-def _plain(text: Optional[str]) -> Any:
+def _plain(value: StoredValue) -> Any:
     try:
-        return json.loads(text or 'null')
+        return json.loads(value.text or 'null')
     except ValueError as err:
         raise StoreDamaged('a stored fact cannot be read: {}'.format(err)) from err

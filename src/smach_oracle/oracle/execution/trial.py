@@ -27,7 +27,8 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         smach.logwarn('{}: does not begin, as the state around it was abandoned'.format(node.path))
         return None
     if node.has_running_ancestor():
-        return _run(node, execute)
+        outcome, node.ended_before = node.ended_before, None
+        return _run(node, execute) if outcome is None else outcome
     adopt(machine)
     for each in nodes_of(machine):
         bring_up_to_date(each)

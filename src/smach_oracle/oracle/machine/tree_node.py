@@ -116,6 +116,8 @@ class TreeNode:
         self.departure: object = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
         self.resuming: Optional[EntryPort] = None  # at the next execution
+        # outcome of the next execution, which was over before the program was stopped
+        self.ended_before: Optional[str] = None
         self.gave_up = False  # the latest execution ended so
         # a state that is executed as a precondition now
         self.as_precondition: Optional[smach.State] = None

@@ -15,6 +15,7 @@ class Unfinished(NamedTuple):
     outcome: str
     text: str
     asks: str  # why a person is asked at once, '' where nobody is
+    snapshot: Optional[Mapping[str, Any]] = None  # userdata with which it began
 
 
 class FastEdge:
@@ -144,6 +145,8 @@ class StateRecord:
     def take_unfinished(self) -> Optional[Unfinished]:
         """Return what stands in place of the coming visit, once."""
         unfinished, self.unfinished = self.unfinished, None
+        if unfinished is not None and unfinished.snapshot is not None:
+            self.snapshot = dict(unfinished.snapshot)
         self.be_special(self._is_special)
         return unfinished
 
