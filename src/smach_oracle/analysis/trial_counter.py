@@ -6,7 +6,7 @@ from collections import Counter
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Set, Tuple
 
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by
 from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
 
@@ -122,7 +122,8 @@ class TrialCounter:
         elif event.kind == EventKind.STATE_START:
             self._state_seen = True
         elif event.kind == EventKind.FAILURE:
-            self._failures['{}/{}'.format(event.path, event.state)] += 1
+            if event.failure_kind != FailureKind.INTERRUPTED:
+                self._failures['{}/{}'.format(event.path, event.state)] += 1
         elif event.kind in (EventKind.HEALTH_WAIT_START, EventKind.HEALTH_WAIT_END):
             self._count_wait(event)
         elif event.kind == EventKind.QUERY_OPENED:

@@ -86,6 +86,8 @@ def event_words(event: Event) -> str:
     by = ' by ' + event.by if event.by else ''
     sentence = {
         EventKind.TRIAL_START: lambda: 'The trial of {} began.'.format(event.path),
+        EventKind.RESUMED: lambda: 'The trial of {} goes on after its program was stopped.'.format(
+            event.path),
         EventKind.CONTAINER_START: lambda: '{} began in {}.'.format(event.path, event.state),
         EventKind.CONTAINER_END: lambda: '{} ended{}.'.format(event.path, _with(event.outcome)),
         EventKind.TRANSITION: lambda: '{} ended{}; next: {}.'.format(

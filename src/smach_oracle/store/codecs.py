@@ -11,7 +11,18 @@ import json
 import math
 import sys
 from collections import OrderedDict
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Type
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Tuple,
+    Type,
+)
 
 Encode = Callable[[Any], Any]
 Decode = Callable[[Any], Any]
@@ -177,7 +188,7 @@ class _Writer:
             return {'$tuple': self._list(value)}
         return self._other(value, kind)
 
-    def _list(self, values: Any) -> List[Any]:
+    def _list(self, values: Iterable[object]) -> List[Any]:
         plain = self.plain
         return [plain(each) for each in list(values)]
 
@@ -210,9 +221,9 @@ class _Writer:
             return {'$named': [_name_of(kind), self._list(value)]}
         raise NotStorable('no codec is registered for {}'.format(_name_of(kind)))
 
-    def _bytes(self, value: bytes, kind: type) -> Any:
+    def _bytes(self, value: bytes, kind: type) -> object:
         if len(value) > SHORT:
-            plain: Any = {'$part': self.part(value).hex()}
+            plain: object = {'$part': self.part(value).hex()}
         else:
             plain = {'$bytes': base64.b64encode(value).decode('ascii')}
         return plain if kind is bytes else {'$bytearray': plain}
@@ -233,35 +244,37 @@ def _class_named(name: str, wanted: Callable[[type], bool]) -> type:
     return found
 
 
-def _enum(name: str, member: Any) -> Any:
+def _enum(name: str, member: object) -> object:
     kind: Any = _class_named(name, lambda found: issubclass(found, enum.Enum))
     if member not in kind.__members__:
         raise NotReadable('{} has no {!r} any more'.format(name, member))
-    return kind[member]
+    found: object = kind[member]
+    return found
 
 
-def _data(name: str, values: Any) -> Any:
+def _data(name: str, values: Mapping[str, object]) -> object:
     kind: Any = _class_named(name, dataclasses.is_dataclass)
     known = {each.name for each in dataclasses.fields(kind)}
     if known != set(values):
         raise NotReadable('{} has other fields now: {}'.format(
             name, ', '.join(sorted(known.symmetric_difference(values)))))
-    made = object.__new__(kind)  # without its __init__, which may do anything
+    made: object = object.__new__(kind)  # without its __init__, which may do anything
     for key, value in values.items():
         object.__setattr__(made, key, value)
     return made
 
 
-def _named(name: str, values: Any) -> Any:
+def _named(name: str, values: List[object]) -> object:
     kind: Any = _class_named(name, lambda found: issubclass(found, tuple)
                              and hasattr(found, '_fields'))
     if len(values) != len(kind._fields):
         raise NotReadable('{} has {} fields now, not {}'.format(
             name, len(kind._fields), len(values)))
-    return tuple.__new__(kind, values)
+    made: object = tuple.__new__(kind, values)
+    return made
 
 
-_CLASSES: Dict[str, Callable[[str, Any], Any]] = {'$enum': _enum, '$data': _data, '$named': _named}
+_CLASSES: Dict[str, Callable[[str, Any], object]] = {'$enum': _enum, '$data': _data, '$named': _named}
 _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),

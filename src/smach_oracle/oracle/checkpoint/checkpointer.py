@@ -11,10 +11,12 @@ from ..branches.around import borders_around
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
+from ..records.facts import JUMPED_TO
 from .container_facts import ASKED, AT, ITEMS, ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, keys_of
 
+SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
 _COMMITTED = frozenset((
     EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.FAILURE,
@@ -22,6 +24,8 @@ _COMMITTED = frozenset((
     EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
     EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
     EventKind.HOLD_START, EventKind.SENT))
+_CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
+                     EventKind.QUERY_CANCELLED))
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 # phases of a container: of its state at, or of itself
 BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
@@ -44,6 +48,7 @@ class Checkpointer:
         self._pending: List[Fact] = []
         self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        self._seq_stored = -1
         self._told: Set[Tuple[str, str]] = set()
 
     def __call__(self, event: Event) -> None:
@@ -62,7 +67,8 @@ class Checkpointer:
         if event.kind is EventKind.CONTAINER_END:
             self._pending += self._collected(node, all_keys=True)
             self._pending += self._around(node)
-        if event.kind in _COMMITTED or self._ends_branch(event, node):
+        if (event.kind in _COMMITTED or self._ends_branch(event, node)
+                or event.seq >= self._seq_stored + SEQ_RESERVE - 1):
             self._commit(event, node)
 
     def last_words(self) -> None:
@@ -111,12 +117,14 @@ class Checkpointer:
             yield fact_of(node.key, AT, [label, BEFORE])
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
                 event.target in node.machine._states and not node.is_oracle(event.target)):
-            yield fact_of(node.key, AT, [event.target, BEFORE])
+            yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
         elif kind is EventKind.FAILURE:
             yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
                                          event.text])
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
+        elif kind in _CLOSES:
+            yield Fact(node.key, ASKED, None)
         elif kind is EventKind.CONTAINER_END and node.branch is None:
             yield fact_of(node.key, AT, [event.outcome, ENDED])
         elif node.branch is not None and kind in _LEAVES:
@@ -148,6 +156,7 @@ class Checkpointer:
         facts = self._pending + list(self._collected(node))
         facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
         self._pending = []
+        self._seq_stored = event.seq
         self._writer.commit(
             NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
                    tuple(facts)), lambda: _must_stop(node))

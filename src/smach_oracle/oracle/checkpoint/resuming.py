@@ -1,6 +1,6 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 import time
-from typing import Any, List, Mapping, NamedTuple, Optional
+from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
 
 import smach
 from smach_oracle.store.rows import StoredTrial
@@ -8,15 +8,17 @@ from smach_oracle.store.rows import StoredTrial
 from ..branches.around import borders_in
 from ..branches.border import border_of
 from ..branches.items import can_be_indexed
+from ..errors import SettingsError
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
+from ..places.place import Place, place_named, places_of
+from ..places.way import way_to
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord, Unfinished
-from .checkpointer import ENDED, FAILED, IN
+from .checkpointer import BEFORE, ENDED, FAILED, IN, SEQ_RESERVE
 from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 
-SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
 NOT_BEGUN = 'the program was stopped before it began'
 
@@ -31,6 +33,7 @@ class Resumption(NamedTuple):
     at: float  # s since the epoch, when that was
     asks: bool  # a person is asked before anything moves
     changes: List[str]  # how the script differs from the one that was stopped
+    begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
 
     @property
     def age_s(self) -> float:
@@ -52,8 +55,9 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
 class EntryPoint:
     """Where one container goes on; it is used up when that begins to execute."""
 
-    def __init__(self, stored: StoredContainer) -> None:
-        self._stored = stored
+    def __init__(self, stored: StoredContainer, down: Sequence[Place] = ()) -> None:
+        """`down`: the states in which the containers below begin, where it is sent to one."""
+        self._stored, self._down = stored, tuple(down)
 
     @property
     def label(self) -> str:
@@ -82,6 +86,15 @@ class EntryPoint:
             if label in machine._states and not node.is_oracle(label):
                 node.record(label).snapshot = snapshot
         machine._set_current_state(stored.label)
+        if self._down:
+            node.record(stored.label).go_down(self._down)
+
+
+def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
+    """Return the way down from a container to a place to which a jump was under way."""
+    place = next((each for each in places_of(node) if each.path == path), None)
+    way = None if place is None else way_to(node, place)
+    return way.down[1:] if way is not None and way.meets is node else ()
 
 
 def go_on(top: TreeNode, resumption: Resumption) -> None:
@@ -97,7 +110,26 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
             node.records.history.take_over([], 0, stored.history)
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
-    _Setting(resumption, nodes).activate(top)
+    if resumption.begins_at:
+        _begin_at(top, resumption)
+    else:
+        _Setting(resumption, nodes).activate(top)
+
+
+def _begin_at(top: TreeNode, resumption: Resumption) -> None:
+    """Let the machine begin at the state that the settings name, with what was stored.
+
+    :raises SettingsError: where there is no such state.
+    """
+    place = place_named(top, resumption.begins_at)
+    way = None if place is None else way_to(top, place)
+    if way is None:
+        raise SettingsError('on_resume', 'state:' + resumption.begins_at,
+                            'the label of a state of {}, or the path of one below it'.format(
+                                top.path))
+    stored = resumption.tree.container(top.key)
+    stored.at = [way.first, BEFORE]
+    top.resuming = EntryPoint(stored, way.down[1:])
 
 
 def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
@@ -119,14 +151,19 @@ class _Setting:
         """Set a container that was under way, and what is in its state."""
         stored = self._resumption.tree.container(node.key)
         if node.branch is None:
-            node.resuming = EntryPoint(stored)
+            node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
         record = node.record(stored.label)
-        if stored.phase != IN:
-            if stored.phase == FAILED:
-                record.resume(self._unfinished(node, stored))
-            else:
-                self._ask_before(node, stored.label)
-            return
+        if stored.asked and stored.asked[0] == stored.label:
+            record.open_question = stored.asked[1]
+        if stored.phase == FAILED or record.open_question:
+            record.resume(self._unfinished(node, stored))
+        elif stored.phase == IN:
+            self._go_on_in(node, stored, record)
+        elif self._resumption.asks:
+            self._ask_before(node, stored.label)
+
+    def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
+        """Set what is in a state that was under way, or say that it is in doubt."""
         inside = self._inside(node, stored.label)
         if inside is None:
             record.resume(self._unfinished(node, stored))
@@ -154,7 +191,8 @@ class _Setting:
                 Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption)))
 
     def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
-        why = _why(self._resumption) if self._resumption.asks else ''
+        is_open = node.record(stored.label).open_question
+        why = _why(self._resumption) if self._resumption.asks or is_open else ''
         # a branch has the userdata of the Concurrence or Iterator that holds it
         snapshots = self._resumption.tree.container(node.path).snapshots
         if stored.phase == FAILED:

@@ -35,6 +35,11 @@ class StoredContainer:
         return str(self.at[1]) if self.at else ''
 
     @property
+    def jumped_to(self) -> str:
+        """Path of the place to which a jump was under way, '' for none."""
+        return str(self.at[2] or '') if self.phase == 'before' and len(self.at) > 2 else ''
+
+    @property
     def label(self) -> str:
         """The state where it stands, '' where it has not begun."""
         return str(self.at[0]) if self.at else ''

@@ -3,7 +3,6 @@ import time
 from typing import Optional
 
 import smach
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.holding import MachineLock
 from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
@@ -14,6 +13,7 @@ from ..records.facts import TrialEnd
 from ..settings.on_resume import ASK, RESTART
 from .checkpointer import ENDED, Checkpointer
 from .resuming import Resumption, go_on
+from .storable import CODECS
 from .stored_tree import read_tree
 from .structure import differences, structure_of
 
@@ -56,12 +56,12 @@ class TrialStore:
             return None
         tree = read_tree(self._store, last.number, CODECS)
         top = tree.container(self._top.key)
-        word, _ = self._top.settings.on_resume
+        word, path = self._top.settings.on_resume
         if top.phase in ('', ENDED) or word == RESTART:
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None
-        return self._resumption(last, word == ASK)
+        return self._resumption(last, word == ASK)._replace(begins_at=path)
 
     def _resumption(self, trial: StoredTrial, asks: bool) -> Resumption:
         changes = []

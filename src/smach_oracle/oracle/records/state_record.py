@@ -79,7 +79,8 @@ class StateRecord:
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
                  'unwell_repeats',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
-                 'way_down', 'unfinished', '_is_special', '_estimator', '_lock', '_learned',
+                 'way_down', 'unfinished', 'open_question', '_is_special', '_estimator', '_lock',
+                 '_learned',
                  '_retired',
                  '_edges', '_visits', '_visits_before')
 
@@ -100,6 +101,7 @@ class StateRecord:
         # at the coming visit: the state in which each container below it begins
         self.way_down: Tuple[Any, ...] = ()
         self.unfinished: Optional[Unfinished] = None  # in place of the coming visit
+        self.open_question = ''  # id of one that was open when the program was stopped
         self._learned = 0  # successes by way of edges that the estimator knows
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
@@ -141,6 +143,11 @@ class StateRecord:
     def resume(self, unfinished: Unfinished) -> None:
         """Note that the coming visit is one that was begun before the program was stopped."""
         self.unfinished, self.special = unfinished, True
+
+    def take_question(self) -> str:
+        """Return the id of the question that is open again, once; '' where none is."""
+        question, self.open_question = self.open_question, ''
+        return question
 
     def take_unfinished(self) -> Optional[Unfinished]:
         """Return what stands in place of the coming visit, once."""

@@ -104,11 +104,6 @@ class Settings:
     watch_preconditions: bool = True
     history_length: int = 50  # visits
     rates_file: str = ''
-    checkpoint: str = ''  # the store of the trials; '': nothing is stored
-    checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
-    checkpoint_synchronous: str = 'FULL'
-    # what is done about a stored trial that was not finished, and for STATE the path of a state
-    on_resume: Tuple[str, str] = ('ask', '')
     oracle_label: str = 'ORACLE'
     # whether, or at which paths (patterns), containers and branches have oracles of their own
     nested: Nested = True
@@ -123,6 +118,11 @@ class Settings:
     # long as ever before; 0 s: never
     still_running_s: float = 60.0
     still_running_factor: float = 10.0
+    checkpoint: str = ''  # the store of the trials; '': nothing is stored
+    checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
+    checkpoint_synchronous: str = 'FULL'
+    # what is done about a stored trial that was not finished, and for STATE the path of a state
+    on_resume: Tuple[str, str] = ('ask', '')
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],
