@@ -274,7 +274,8 @@ def _named(name: str, values: List[object]) -> object:
     return made
 
 
-_CLASSES: Dict[str, Callable[[str, Any], object]] = {'$enum': _enum, '$data': _data, '$named': _named}
+_CLASSES: Dict[str, Callable[[str, Any], object]] = {
+    '$enum': _enum, '$data': _data, '$named': _named}
 _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),
@@ -292,7 +293,8 @@ _TAGS: Dict[str, Callable[[Any], Any]] = {
     '$complex': lambda parts: complex(*parts),
     '$ordered': lambda items: OrderedDict((key, value) for key, value in items),
 }
-CODECS = Codecs()
+OFFERED = Codecs()  # by other rooms; what the user registers goes before
+CODECS = Codecs(OFFERED)
 
 
 def register_codec(of: Type[Any], encode: Encode, decode: Decode, name: str = '') -> None:

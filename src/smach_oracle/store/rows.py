@@ -16,6 +16,7 @@ class NewMoment(NamedTuple):
     """What is committed at once.
 
     `seq`: number of the trial's last event. `kind`: its name. `label`: a state of `path`.
+    `after`: number of the moment that it follows, where that is not the latest one of its trial.
     """
 
     at: float  # s since the epoch
@@ -24,6 +25,7 @@ class NewMoment(NamedTuple):
     path: str
     label: str
     facts: Tuple[Fact, ...]
+    after: Optional[int] = None
 
 
 class StoredTrial(NamedTuple):
@@ -48,6 +50,7 @@ class StoredMoment(NamedTuple):
     kind: str
     path: str
     label: str
+    after: Optional[int] = None  # the one that it follows, where that is not the one before it
 
 
 class StoredValue(NamedTuple):

@@ -1,7 +1,8 @@
 """One store: an SQLite database for any number of machines and trials.
 
-Every moment of a trial stays, so that each can be resumed from. A moment has the facts that changed
-with it. What is large is kept once, by its content.
+Every moment of a trial stays, so that each can be resumed from. Where the trial has gone on from an
+earlier one, those between stay, too, and count for nothing that follows. A moment has the facts
+that changed with it. What is large is kept once, by its content.
 """
 import os
 import sqlite3
@@ -13,6 +14,7 @@ from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, Sto
 FORMAT = 1
 MAGIC = 0x534D4F53  # "SMOS": which program's file it is, where SQLite keeps that
 SYNCHRONOUS = ('FULL', 'NORMAL', 'OFF')
+LAST = 1 << 62  # behind the number of any moment
 BUSY_S = 5.0  # how long one process waits for another that writes
 _SCHEMA = '''
 CREATE TABLE IF NOT EXISTS structures (id TEXT PRIMARY KEY, description TEXT NOT NULL);
@@ -22,7 +24,7 @@ CREATE TABLE IF NOT EXISTS trials (number INTEGER PRIMARY KEY, machine TEXT NOT 
 CREATE INDEX IF NOT EXISTS trials_of ON trials (machine, number);
 CREATE TABLE IF NOT EXISTS moments (number INTEGER PRIMARY KEY, trial INTEGER NOT NULL,
     at REAL NOT NULL, seq INTEGER NOT NULL, kind TEXT NOT NULL, path TEXT NOT NULL,
-    label TEXT NOT NULL);
+    label TEXT NOT NULL, after INTEGER);
 CREATE INDEX IF NOT EXISTS moments_of ON moments (trial, number);
 CREATE TABLE IF NOT EXISTS facts (moment INTEGER NOT NULL, path TEXT NOT NULL, name TEXT NOT NULL,
     text TEXT, whole BLOB);
@@ -129,8 +131,8 @@ class StoreFile:
         with _Transaction(database):
             for moment in moments:
                 number = database.execute(
-                    'INSERT INTO moments (trial, at, seq, kind, path, label) '
-                    'VALUES (?, ?, ?, ?, ?, ?)', (trial, *moment[:5])).lastrowid
+                    'INSERT INTO moments (trial, at, seq, kind, path, label, after) VALUES '
+                    '(?, ?, ?, ?, ?, ?, ?)', (trial, *moment[:5], moment.after)).lastrowid
                 parts: Dict[bytes, bytes] = {}
                 rows = []
                 for path, name, value in moment.facts:
@@ -191,25 +193,45 @@ class StoreFile:
     def moments(self, trial: int) -> List[StoredMoment]:
         """Return the moments of a trial, oldest first."""
         return [StoredMoment(*row) for row in self._read(
-            'SELECT number, at, seq, kind, path, label FROM moments WHERE trial = ? '
+            'SELECT number, at, seq, kind, path, label, after FROM moments WHERE trial = ? '
             'ORDER BY number', (trial,))]
+
+    def trial_of(self, moment: int) -> Optional[StoredTrial]:
+        """Return the trial of a moment, None where there is no such moment."""
+        for number, in self._read('SELECT trial FROM moments WHERE number = ?', (moment,)):
+            return next(each for each in self.trials() if each.number == number)
+        return None
 
     def facts(self, trial: int, until: Optional[int] = None) -> Iterator[StoredFact]:
         """Yield the facts of a trial in the order in which they were written.
 
-        `until`: the last moment that counts; by default the last one of all. A moment without any
-        fact is yielded once, with an empty name.
+        `until`: the last moment that counts; by default the last one of all. Of those before it
+        the ones count that it has followed. A moment without any fact is yielded once, with an
+        empty name.
 
         :raises StoreDamaged: where it cannot be read.
         """
-        for row in self._read(
-                'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
-                'name, text, whole FROM moments LEFT JOIN facts ON facts.moment = moments.number '
-                'WHERE trial = ? AND moments.number <= ? ORDER BY moments.number, facts.rowid',
-                (trial, 1 << 62 if until is None else until)):
-            number, kind, path, label, of, name, text, whole = row
-            yield StoredFact(number, kind, path, label, of or '', name or '',
-                             StoredValue(text, whole))
+        for first, last in self._stretches(trial, LAST if until is None else until):
+            for row in self._read(
+                    'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
+                    'name, text, whole FROM moments LEFT JOIN facts '
+                    'ON facts.moment = moments.number WHERE trial = ? '
+                    'AND moments.number BETWEEN ? AND ? ORDER BY moments.number, facts.rowid',
+                    (trial, first, last)):
+                number, kind, path, label, of, name, text, whole = row
+                yield StoredFact(number, kind, path, label, of or '', name or '',
+                                 StoredValue(text, whole))
+
+    def _stretches(self, trial: int, until: int) -> List[Tuple[int, int]]:
+        """Return the first and last numbers of the moments that lead to `until`, oldest first."""
+        found = []
+        for number, after in self._read(
+                'SELECT number, after FROM moments WHERE trial = ? AND after IS NOT NULL '
+                'ORDER BY number DESC', (trial,)):
+            if number <= until:
+                found.append((number, until))
+                until = after
+        return [(0, until)] + found[::-1]
 
     def part(self, digest: bytes) -> bytes:
         """Return bytes by their digest.

@@ -145,4 +145,4 @@ class StoreWriter:
 def merged(moments: List[NewMoment]) -> NewMoment:
     """Return one moment that leaves the store as all of these do; those between are lost."""
     latest = {(fact.path, fact.name): fact for moment in moments for fact in moment.facts}
-    return moments[-1]._replace(facts=tuple(latest.values()))
+    return moments[-1]._replace(facts=tuple(latest.values()), after=moments[0].after)

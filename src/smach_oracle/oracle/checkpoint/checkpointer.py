@@ -12,7 +12,8 @@ from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
 from ..records.facts import JUMPED_TO
-from .container_facts import ASKED, AT, ITEMS, ContainerFacts, fact_of
+from ..records.running_goals import GOALS
+from .container_facts import ASKED, AT, GOAL, ITEMS, ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, keys_of
 
@@ -38,9 +39,12 @@ class Checkpointer:
     """
 
     def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
-                 before: Optional[StoredTree] = None) -> None:
-        """`before`: what is stored of the trial, where it is resumed."""
-        self._before = before
+                 before: Optional[StoredTree] = None, behind: Optional[int] = None) -> None:
+        """`before`: what is stored of the trial, where it is resumed.
+
+        `behind`: the moment that it goes on from, where that is not the last one.
+        """
+        self._before, self._behind = before, behind
         self._top, self._writer, self._codecs = top, writer, codecs
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
@@ -50,6 +54,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._seq_stored = -1
         self._told: Set[Tuple[str, str]] = set()
+        self._goals = set(() if before is None else before.goals)  # ids of stored ones
 
     def __call__(self, event: Event) -> None:
         """Take one event; see EventSource."""
@@ -71,19 +76,39 @@ class Checkpointer:
                 or event.seq >= self._seq_stored + SEQ_RESERVE - 1):
             self._commit(event, node)
 
+    def goal_begins(self, goal_id: str, server: str) -> None:
+        """Store a goal that is about to be sent."""
+        self._goals.add(goal_id)
+        self._commit_by_hand('GOAL', (fact_of('', GOAL + goal_id, server),))
+
     def last_words(self) -> None:
         """Store what has not been stored of the trial, which has ended."""
         facts = tuple(self._pending) + tuple(
             fact for node in self._nodes.values() for fact in self._facts_of(node).all_states())
         self._pending = []
-        self._writer.commit(NewMoment(time.time(), self._top.events.last_seq, 'TRIAL_END',
-                                   self._top.key, '', facts))
+        self._commit_by_hand('TRIAL_END', facts + tuple(self._ended_goals()))
+
+    def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
+        """Commit a moment that belongs to no event."""
+        top = self._top
+        self._writer.commit(NewMoment(time.time(), top.events.last_seq, kind, top.key, '', facts),
+                            lambda: must_stop(top))
+
+    def _ended_goals(self) -> Iterator[Fact]:
+        """Yield that goals do not run any more."""
+        if self._goals:
+            for goal_id in self._goals.difference(GOALS.running()):
+                self._goals.discard(goal_id)
+                yield Fact('', GOAL + goal_id, None)
 
     def _begin_trial(self) -> None:
         self._nodes = {node.key: node for node in nodes_of(self._top.machine)}
         for node in self._nodes.values():
             self._pending += self._facts_of(node).all_states()
         self._pending += self._collected(self._top, all_keys=True)
+        for goal_id, server in GOALS.running().items():
+            self._goals.add(goal_id)
+            self._pending.append(fact_of('', GOAL + goal_id, server))
 
     def _node_of(self, event: Event) -> Optional[TreeNode]:
         """Return the container that an event is of: that of a branch goes by its label as well."""
@@ -153,13 +178,14 @@ class Checkpointer:
                 yield from self._not_begun_below(path)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
-        facts = self._pending + list(self._collected(node))
+        facts = self._pending + list(self._collected(node)) + list(self._ended_goals())
         facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
         self._pending = []
         self._seq_stored = event.seq
+        behind, self._behind = self._behind, None
         self._writer.commit(
             NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
-                   tuple(facts)), lambda: _must_stop(node))
+                      tuple(facts), behind), lambda: must_stop(node))
 
     def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
         """Yield what is new of a container."""
@@ -193,5 +219,6 @@ class Checkpointer:
                       'the machine is resumed'.format(path, out.key, out.kind, out.why))
 
 
-def _must_stop(node: TreeNode) -> bool:
+def must_stop(node: TreeNode) -> bool:
+    """Whether nobody may wait any longer."""
     return node.machine.preempt_requested() or bool(smach.is_shutdown())

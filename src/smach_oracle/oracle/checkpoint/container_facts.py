@@ -12,6 +12,7 @@ from .stored_container import StoredContainer
 
 AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
 ASKED, ITEMS = 'asked', 'items'
+GOAL = 'goal:'  # how the name of a fact of the whole tree begins that has a goal's server
 VISIT, STATE = 'visit:', 'state:'  # how the names of such facts begin
 Plain = Union[Dict[str, Any], List[Any], str, int]
 

@@ -14,8 +14,9 @@ from ..machine.tree_node import TreeNode
 from ..places.place import Place, place_named, places_of
 from ..places.way import way_to
 from ..records.events import EventKind, FailureKind
+from ..records.running_goals import GOALS
 from ..records.state_record import StateRecord, Unfinished
-from .checkpointer import BEFORE, ENDED, FAILED, IN, SEQ_RESERVE
+from .checkpointer import BEFORE, ENDED, FAILED, IN, SEQ_RESERVE, must_stop
 from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 
@@ -34,6 +35,7 @@ class Resumption(NamedTuple):
     asks: bool  # a person is asked before anything moves
     changes: List[str]  # how the script differs from the one that was stopped
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
+    is_earlier: bool = False  # whether later moments of the trial are stored
 
     @property
     def age_s(self) -> float:
@@ -43,13 +45,27 @@ class Resumption(NamedTuple):
 
 def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
     """Say that a trial goes on."""
-    smach.logwarn('{}: trial {} goes on; its program was stopped {:.0f} s ago'.format(
-        top.path, resumption.trial.trial_id, resumption.age_s))
+    smach.logwarn('{}: trial {} goes on{}; its program was stopped {:.0f} s ago'.format(
+        top.path, resumption.trial.trial_id, ' from moment {}'.format(
+            resumption.moment) if resumption.is_earlier else '', resumption.age_s))
     for change in resumption.changes:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
+    _end_goals(top, resumption)
     top.emit(EventKind.RESUMED, data={
         'last_seq': resumption.seq, 'moment': resumption.moment,
         'stopped_s': round(resumption.age_s, 3), 'changes': resumption.changes})
+
+
+def _end_goals(top: TreeNode, resumption: Resumption) -> None:
+    """End what the program that was killed has left running, before anything is sent."""
+    goals = resumption.tree.goals
+    if not goals:
+        return
+    smach.logwarn('{}: the program was killed while {} ran: cancelled, and waited for'.format(
+        top.path, ', '.join('a goal of {}'.format(server) for server in sorted(goals.values()))))
+    for goal_id, server in GOALS.end_goals(goals, lambda: must_stop(top)).items():
+        smach.logwarn('{}: a goal of {} may still run'.format(top.path, server))
+        GOALS.keep(goal_id, server)
 
 
 class EntryPoint:
@@ -153,7 +169,8 @@ class _Setting:
         if node.branch is None:
             node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
         record = node.record(stored.label)
-        if stored.asked and stored.asked[0] == stored.label:
+        # a question of an earlier moment may have been answered since: it is asked anew
+        if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
             record.open_question = stored.asked[1]
         if stored.phase == FAILED or record.open_question:
             record.resume(self._unfinished(node, stored))

@@ -9,7 +9,7 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..records.events import EventKind
 from ..records.visits import Visit, VisitResult
-from .container_facts import ASKED, AT, EXECUTION, HISTORY, ITEMS, STATE, VISIT
+from .container_facts import ASKED, AT, EXECUTION, GOAL, HISTORY, ITEMS, STATE, VISIT
 from .stored_container import StoredContainer
 from .userdata_facts import KEPT_OUT, KEY
 
@@ -21,6 +21,12 @@ class StoredTree(NamedTuple):
 
     containers: Dict[str, StoredContainer]
     whole: Dict[str, Any]
+
+    @property
+    def goals(self) -> Dict[str, str]:
+        """Servers of the goals that ran, by goal id."""
+        return {name[len(GOAL):]: str(server) for name, server in self.whole.items()
+                if name.startswith(GOAL) and server}
 
     def container(self, key: str) -> StoredContainer:
         """Return what is stored of a container, nothing where nothing is."""

@@ -78,6 +78,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'checkpoint': values.file,
     'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
     'on_resume': checked_on_resume,
+    'resume_from': values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62),
     'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
@@ -123,6 +124,7 @@ class Settings:
     checkpoint_synchronous: str = 'FULL'
     # what is done about a stored trial that was not finished, and for STATE the path of a state
     on_resume: Tuple[str, str] = ('ask', '')
+    resume_from: int = 0  # number of the stored moment, 0: the last one of a trial
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

@@ -5,6 +5,7 @@ import pytest
 from killed_machines import KilledMachine, Noted
 
 import smach
+from smach_oracle.store.store_file import StoreFile
 
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
 ALL = ['A', 'X', 'Y', 'LEFT', 'M1', 'M2', 'I0', 'I1', 'I2', 'J1', 'K1', 'J2', 'K2', 'B']
@@ -194,3 +195,44 @@ def test_a_changed_script_is_not_guessed_about(tmp_path):
 def test_what_on_resume_may_be_is_said(tmp_path, value):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     assert 'ask, recover, restart or state:LABEL' in killed.run(on_resume=value)['error']
+
+
+def moments_of(killed):
+    store = StoreFile(killed.store, read_only=True)
+    return [each for trial in store.trials() for each in store.moments(trial.number)]
+
+
+def test_it_goes_on_from_an_earlier_moment(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=20)
+    assert killed.diary.count('begins')['B'] == 2  # it had failed once
+    before = moments_of(killed)
+    first = next(each for each in before if each.label == 'B' and each.kind == 'STATE_START')
+    told = killed.run(resume_from=first.number)
+    assert told['done'] == ['A', 'B', 'C']
+    assert killed.diary.count('begins')['A'] == 1
+    after = moments_of(killed)
+    assert after[:len(before)] == before  # those behind it stay
+    assert after[len(before)].after == first.number
+    assert min(seq for _, seq, _ in told['events']) > max(each.seq for each in before)
+
+
+def test_killed_once_more_it_goes_on_behind_the_moment_that_it_was_sent_to(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=20)
+    first = next(each for each in moments_of(killed) if each.kind == 'STATE_START')
+    killed.run(kill_at=1, resume_from=first.number)  # at its RESUMED event
+    assert moments_of(killed)[-1].kind == 'RESUMED'
+    assert killed.run()['done'] == ['A', 'B', 'C']
+    assert killed.diary.count('begins')['A'] == 2
+
+
+def test_a_moment_that_is_not_there_is_refused(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=12)
+    begun = killed.diary.count('begins')
+    assert 'resume_from: 999' in killed.run(resume_from=999)['error']
+    assert killed.diary.count('begins') == begun
+    assert killed.run()['outcome'] == 'succeeded'
+    ended = moments_of(killed)[2].number
+    assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
