@@ -43,7 +43,7 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('LOOK', Look(), {'succeeded': 'MOVE'})
     smach.StateMachine.add('MOVE', smach_ros.SimpleActionState(
-        'work', TestAction, goal=TestGoal(int(sys.argv[1]))), {'succeeded': 'TELL'})
+        'arm', TestAction, goal=TestGoal(int(sys.argv[1]))), {'succeeded': 'TELL'})
     smach.StateMachine.add('TELL', Tell())
 print('OUTCOME', sm.execute(), flush=True)
 '''
@@ -60,7 +60,7 @@ class Traffic:
         self.active = set()  # ids of all that ever were
         for end, kind, note in (('status', GoalStatusArray, self._status),
                                 ('result', TestActionResult, self.results.append)):
-            subscriber = rospy.Subscriber('/work/' + end, kind, note, queue_size=10)
+            subscriber = rospy.Subscriber('/arm/' + end, kind, note, queue_size=10)
             test.addCleanup(subscriber.unregister)
             test.assertTrue(wait_for(subscriber.get_num_connections))
 
@@ -72,7 +72,7 @@ class Traffic:
 class KilledTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.server = ActionNodeProcess('work').start()
+        cls.server = ActionNodeProcess('arm').start()
         cls.experts = ExpertQueryServer(EXPERTS)
 
     @classmethod

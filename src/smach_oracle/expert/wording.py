@@ -28,6 +28,7 @@ def still_runs(goal: ExpertQueryGoal) -> bool:
 def standing_words(goal: ExpertQueryGoal) -> str:
     """How the state of a question stands, to follow its name."""
     return {ExpertQueryGoal.STILL_RUNNING: 'still runs',
+            OracleEvent.INTERRUPTED: 'was interrupted',
             ExpertQueryGoal.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
 
 
@@ -44,6 +45,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
             outcome or 'nothing'),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
         ExpertQueryGoal.HELD_BACK: 'was not executed',
+        OracleEvent.INTERRUPTED: 'ran when the program was stopped, or was about to begin',
     }.get(goal.failure_kind, 'failed')
 
 
