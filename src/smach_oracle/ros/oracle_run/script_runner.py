@@ -105,7 +105,7 @@ def make_parser() -> argparse.ArgumentParser:
                         help='go on with the trial that was stopped; --resume=HOW: recover '
                         '(default), ask, restart or state:LABEL')
     parser.add_argument('--from', metavar='NUMBER', type=int, dest='moment',
-                        help='go on from an earlier stored moment, as oracle_state lists them')
+                        help='go on from an earlier stored moment of it: its number in the store')
     return parser
 
 
