@@ -28,6 +28,7 @@ Encode = Callable[[Any], Any]
 Decode = Callable[[Any], Any]
 FetchBytes = Callable[[bytes], bytes]
 
+_as_json = json.JSONEncoder(separators=(',', ':')).encode
 SHORT = 256  # bytes: what is no longer stays within the text
 MOST = 1 << 28  # bytes of one value
 DIGEST = 16  # bytes
@@ -93,7 +94,7 @@ class Codecs:
         """
         writer = _Writer(self)
         try:
-            text = json.dumps(writer.plain(value), separators=(',', ':'))
+            text = _as_json(writer.plain(value))
         except RecursionError:
             raise NotStorable('it is nested too deeply, or holds itself') from None
         if len(text) <= SHORT:

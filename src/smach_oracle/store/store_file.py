@@ -127,25 +127,28 @@ class StoreFile:
 
         :raises sqlite3.Error: where they cannot be written.
         """
+        with _Transaction(self._db):
+            self._add(trial, moments)
+
+    def _add(self, trial: int, moments: Sequence[NewMoment]) -> None:
         database = self._db
-        with _Transaction(database):
-            for moment in moments:
-                number = database.execute(
-                    'INSERT INTO moments (trial, at, seq, kind, path, label, after) VALUES '
-                    '(?, ?, ?, ?, ?, ?, ?)', (trial, *moment[:5], moment.after)).lastrowid
-                parts: Dict[bytes, bytes] = {}
-                rows = []
-                for path, name, value in moment.facts:
-                    text = whole = None
-                    if value is not None:
-                        text, whole, needed = value
-                        parts.update(needed)
-                    rows.append((number, path, name, text, whole))
-                if rows:
-                    database.executemany('INSERT INTO facts VALUES (?, ?, ?, ?, ?)', rows)
-                if parts:
-                    database.executemany('INSERT OR IGNORE INTO parts VALUES (?, ?)',
-                                         list(parts.items()))
+        for moment in moments:
+            number = database.execute(
+                'INSERT INTO moments (trial, at, seq, kind, path, label, after) VALUES '
+                '(?, ?, ?, ?, ?, ?, ?)', (trial, *moment[:5], moment.after)).lastrowid
+            parts: Dict[bytes, bytes] = {}
+            rows = []
+            for path, name, value in moment.facts:
+                text = whole = None
+                if value is not None:
+                    text, whole, needed = value
+                    parts.update(needed)
+                rows.append((number, path, name, text, whole))
+            if rows:
+                database.executemany('INSERT INTO facts VALUES (?, ?, ?, ?, ?)', rows)
+            if parts:
+                database.executemany('INSERT OR IGNORE INTO parts VALUES (?, ?)',
+                                     list(parts.items()))
 
     def end_trial(self, trial: int, at: float, outcome: str) -> None:
         """Note that a trial has ended, so that it is never resumed.
@@ -153,23 +156,38 @@ class StoreFile:
         :raises sqlite3.Error: where it cannot be written.
         """
         with _Transaction(self._db):
-            self._db.execute('UPDATE trials SET ended = ?, outcome = ? WHERE number = ?',
-                             (at, outcome, trial))
+            self._end(trial, at, outcome)
 
-    def edit(self, trial: int, moment: NewMoment, who: str) -> None:
+    def edit(self, trial: int, moment: NewMoment, who: str, what: str) -> None:
         """Commit a moment that somebody has made by hand, with a line in the log.
 
         :raises StoreError: where it cannot be written.
         """
-        what = '{} {} {}: {}'.format(trial, moment.kind, moment.path or '/', ', '.join(
-            fact.name for fact in moment.facts))
         try:
             with _Transaction(self._db):
-                self._db.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)',
-                                 (moment.at, who, what))
-            self.add(trial, [moment])
+                self._log(moment.at, who, what)
+                self._add(trial, [moment])
         except sqlite3.Error as err:
             raise _told(self.path, err) from err
+
+    def drop(self, trial: int, at: float, outcome: str, who: str) -> None:
+        """End a trial by hand, so that it is never resumed, with a line in the log.
+
+        :raises StoreError: where it cannot be written.
+        """
+        try:
+            with _Transaction(self._db):
+                self._log(at, who, 'trial {}: {}'.format(trial, outcome))
+                self._end(trial, at, outcome)
+        except sqlite3.Error as err:
+            raise _told(self.path, err) from err
+
+    def _log(self, at: float, who: str, what: str) -> None:
+        self._db.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)', (at, who, what))
+
+    def _end(self, trial: int, at: float, outcome: str) -> None:
+        self._db.execute('UPDATE trials SET ended = ?, outcome = ? WHERE number = ?',
+                         (at, outcome, trial))
 
     # -- reading
 

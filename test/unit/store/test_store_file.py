@@ -82,10 +82,10 @@ def test_a_trial_that_has_ended_says_so(path):
 def test_an_edit_is_logged(path):
     store = StoreFile(path)
     number = store.begin_trial(TRIAL)
-    store.edit(number, moment(0, ('key:a', 7))._replace(kind='EDIT'), 'anna')
+    store.edit(number, moment(0, ('key:a', 7))._replace(kind='EDIT'), 'anna', 'a = 7')
     assert held(store, number) == {'key:a': 7}
     line, = store.log()
-    assert line.who == 'anna' and 'EDIT TASK: key:a' in line.what
+    assert (line.who, line.what) == ('anna', 'a = 7')
 
 
 def test_two_programs_write_one_store(path):

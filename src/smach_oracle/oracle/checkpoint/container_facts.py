@@ -3,6 +3,7 @@ import json
 from typing import Any, Dict, Iterator, List, Optional, Union
 
 from smach_oracle.store.codecs import Encoded
+from smach_oracle.store.names import EXECUTION, HISTORY, STATE, VISIT
 from smach_oracle.store.rows import Fact
 
 from ..machine.tree_node import TreeNode
@@ -10,16 +11,14 @@ from ..records.history import History
 from ..records.state_record import StateRecord
 from .stored_container import StoredContainer
 
-AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
-ASKED, ITEMS = 'asked', 'items'
 GOAL = 'goal:'  # how the name of a fact of the whole tree begins that has a goal's server
-VISIT, STATE = 'visit:', 'state:'  # how the names of such facts begin
+_as_json = json.JSONEncoder(separators=(',', ':')).encode
 Plain = Union[Dict[str, Any], List[Any], str, int]
 
 
 def fact_of(path: str, name: str, plain: Plain) -> Fact:
     """Return a fact of plain data."""
-    return Fact(path, name, Encoded(json.dumps(plain, separators=(',', ':')), None, {}))
+    return Fact(path, name, Encoded(_as_json(plain), None, {}))
 
 
 class ContainerFacts:
@@ -73,7 +72,7 @@ class ContainerFacts:
         self._visits = total
 
     def _if_new(self, name: str, plain: Plain) -> Iterator[Fact]:
-        text = json.dumps(plain, separators=(',', ':'))
+        text = _as_json(plain)
         if self._stored.get(name) != text:
             self._stored[name] = text
             yield Fact(self._path, name, Encoded(text, None, {}))

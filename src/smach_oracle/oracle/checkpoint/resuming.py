@@ -3,6 +3,7 @@ import time
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
 
 import smach
+from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
 from smach_oracle.store.rows import StoredTrial
 
 from ..branches.around import borders_in
@@ -16,7 +17,7 @@ from ..places.way import way_to
 from ..records.events import EventKind, FailureKind
 from ..records.running_goals import GOALS
 from ..records.state_record import StateRecord, Unfinished
-from .checkpointer import BEFORE, ENDED, FAILED, IN, SEQ_RESERVE, must_stop
+from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 

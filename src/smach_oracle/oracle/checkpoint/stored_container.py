@@ -1,6 +1,8 @@
 """What a store says of one container at one moment."""
 from typing import Any, Dict, List, Mapping
 
+from smach_oracle.store.names import BEFORE
+
 from ..records.visits import Visit
 
 
@@ -37,7 +39,7 @@ class StoredContainer:
     @property
     def jumped_to(self) -> str:
         """Path of the place to which a jump was under way, '' for none."""
-        return str(self.at[2] or '') if self.phase == 'before' and len(self.at) > 2 else ''
+        return str(self.at[2] or '') if self.phase == BEFORE and len(self.at) > 2 else ''
 
     @property
     def label(self) -> str:

@@ -4,14 +4,25 @@ from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from smach_oracle.store.codecs import Codecs, NotReadable
 from smach_oracle.store.errors import StoreDamaged
+from smach_oracle.store.names import (
+    ASKED,
+    AT,
+    EDIT,
+    EXECUTION,
+    HISTORY,
+    ITEMS,
+    KEPT_OUT,
+    KEY,
+    STATE,
+    VISIT,
+)
 from smach_oracle.store.rows import StoredFact, StoredValue
 from smach_oracle.store.store_file import StoreFile
 
 from ..records.events import EventKind
 from ..records.visits import Visit, VisitResult
-from .container_facts import ASKED, AT, EXECUTION, GOAL, HISTORY, ITEMS, STATE, VISIT
+from .container_facts import GOAL
 from .stored_container import StoredContainer
-from .userdata_facts import KEPT_OUT, KEY
 
 _Values = Dict[str, StoredValue]  # by key
 
@@ -81,6 +92,9 @@ class _Reading:
         container = self._tree.containers.setdefault(path, StoredContainer())
         if name.startswith(KEY):
             self._keys.setdefault(path, {})[name[len(KEY):]] = value
+            if fact.kind == EDIT:  # what somebody has set outlives a restore
+                for values in self._at_entry.get(path, {}).values():
+                    values[name[len(KEY):]] = value
         elif name.startswith(KEPT_OUT):
             container.missing.pop(name[len(KEPT_OUT):], None)
             if value.is_there:

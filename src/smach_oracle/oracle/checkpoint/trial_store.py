@@ -5,6 +5,7 @@ from typing import Optional, Set, Tuple
 
 import smach
 from smach_oracle.store.holding import MachineLock
+from smach_oracle.store.names import ENDED
 from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
@@ -14,7 +15,7 @@ from ..machine.tree_node import TreeNode
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
-from .checkpointer import ENDED, Checkpointer
+from .checkpointer import Checkpointer
 from .container_facts import GOAL
 from .resuming import Resumption, go_on
 from .storable import CODECS

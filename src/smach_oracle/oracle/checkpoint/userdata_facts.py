@@ -1,13 +1,14 @@
 """Which keys of a container's userdata are to be stored anew."""
-from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union
+import marshal
+from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union, cast
 
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
+from smach_oracle.store.names import KEPT_OUT, KEY
 from smach_oracle.store.rows import Fact
 
 from ..machine.protocols import Machine
 
-KEY = 'key:'  # how the name of such a fact begins
-KEPT_OUT = 'out:'  # and that of a fact which says why a key is not there
+_WITHOUT_REFERENCES = 2  # a version of marshal's format, in which equal data look equal
 _FIXED = (str, int, float, bool, type(None), bytes)  # the same object has the same value
 
 
@@ -22,6 +23,7 @@ class KeptOut(NamedTuple):
 class _Known(NamedTuple):
     value: object
     stored: Union[Encoded, str]  # why not
+    print_: Optional[bytes] = None  # of plain data: differs where the value does
 
 
 class UserdataFacts:
@@ -54,12 +56,17 @@ class UserdataFacts:
             yield Fact(self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + str(key), None)
 
     def _look(self, key: str, value: object, before: Optional[_Known]) -> Iterator[Fact]:
+        print_ = _print_of(value)
+        if before is not None and print_ is not None and print_ == before.print_:
+            if before.value is not value:
+                self._known[key] = before._replace(value=value)
+            return
         try:
             encoded = self._codecs.encode(value)
         except NotStorable as err:
             yield from self._keep_out(key, value, str(err), before)
             return
-        self._known[key] = _Known(value, encoded._replace(parts={}))
+        self._known[key] = _Known(value, encoded._replace(parts={}), print_)
         if before is None or isinstance(before.stored, str):
             if before is not None:
                 yield Fact(self._path, KEPT_OUT + str(key), None)
@@ -77,6 +84,14 @@ class UserdataFacts:
             yield Fact(self._path, KEY + str(key), None)
         yield Fact(self._path, KEPT_OUT + str(key), self._codecs.encode([kind, why]))
         self._tell(KeptOut(str(key), kind, why))
+
+
+def _print_of(value: object) -> Optional[bytes]:
+    """Return bytes that differ where plain data differ; None for anything else."""
+    try:
+        return marshal.dumps(cast(Any, value), _WITHOUT_REFERENCES)  # to compare; never loaded
+    except ValueError:
+        return None
 
 
 def keys_of(machine: Machine, label: str) -> FrozenSet[str]:
