@@ -10,7 +10,9 @@ from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
+from ..branches.items import can_be_indexed
 from ..errors import SettingsError
+from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
@@ -115,6 +117,7 @@ class TrialStore:
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
         """Store the trial from now on, and set the tree to where it was where it is resumed."""
         top, settings = self._top, self._top.settings
+        _tell_what_begins_anew(top)
         if resumed is not None:
             go_on(top, resumed)
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
@@ -138,6 +141,16 @@ class TrialStore:
     def _let_go(self) -> None:
         self._store.close()
         self._lock.release()
+
+
+def _tell_what_begins_anew(top: TreeNode) -> None:
+    """Name the Iterators that would begin with their first item after a crash."""
+    for node in nodes_of(top.machine):
+        for below, container in borders_below(node.machine):
+            if isinstance(container, smach.Iterator) and not can_be_indexed(container):
+                smach.logwarn('{}/{}: begins again with its first item where the machine is '
+                              'resumed, since what it goes through is no sequence'.format(
+                                  node.path, '/'.join(below)))
 
 
 def open_store(top: TreeNode) -> Optional[TrialStore]:

@@ -2,9 +2,10 @@
 import shutil
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import Diary, KilledMachine, Noted
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.store.store_file import StoreFile
 
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
@@ -236,3 +237,24 @@ def test_a_moment_that_is_not_there_is_refused(tmp_path):
     assert killed.run()['outcome'] == 'succeeded'
     ended = moments_of(killed)[2].number
     assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
+
+
+def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
+    def iterated(items):
+        iterator = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=items,
+                                  it_label='item', exhausted_outcome='succeeded')
+        with iterator:
+            smach.Iterator.set_contained_state(
+                'I', Noted('I', Diary(str(tmp_path / 'diary')), lambda: None,
+                           keys=('done', 'item')), loop_outcomes=['succeeded'])
+        return iterator
+
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'ONCE'})
+        smach.StateMachine.add('ONCE', iterated(iter([1, 2])), ENDS)
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named = [text for level, text in log if level == 'warn' and 'begins again' in text]
+    assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
