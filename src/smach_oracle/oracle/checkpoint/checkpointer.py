@@ -4,7 +4,7 @@ from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Set, Tuple
 
 import smach
 from smach_oracle.store.codecs import Codecs
-from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, IN, ITEMS
+from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, GOAL, IN, ITEMS
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
@@ -14,7 +14,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
-from .container_facts import GOAL, ContainerFacts, fact_of
+from .container_facts import ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, keys_of
 

@@ -11,7 +11,6 @@ from ..records.history import History
 from ..records.state_record import StateRecord
 from .stored_container import StoredContainer
 
-GOAL = 'goal:'  # how the name of a fact of the whole tree begins that has a goal's server
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
 Plain = Union[Dict[str, Any], List[Any], str, int]
 

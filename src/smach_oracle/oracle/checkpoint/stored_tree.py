@@ -9,6 +9,7 @@ from smach_oracle.store.names import (
     AT,
     EDIT,
     EXECUTION,
+    GOAL,
     HISTORY,
     ITEMS,
     KEPT_OUT,
@@ -21,7 +22,6 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..records.events import EventKind
 from ..records.visits import Visit, VisitResult
-from .container_facts import GOAL
 from .stored_container import StoredContainer
 
 _Values = Dict[str, StoredValue]  # by key

@@ -5,7 +5,7 @@ from typing import Optional, Set, Tuple
 
 import smach
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED
+from smach_oracle.store.names import ENDED, GOAL
 from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
@@ -18,10 +18,9 @@ from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
 from .checkpointer import Checkpointer
-from .container_facts import GOAL
 from .resuming import Resumption, go_on
 from .storable import CODECS
-from .stored_tree import read_tree
+from .stored_tree import StoredTree, read_tree
 from .structure import differences, structure_of
 
 # what may be resumed: the program was stopped, and the task was not done
@@ -70,12 +69,12 @@ class TrialStore:
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
         if earlier:
-            return self._resumption(last, word == ASK, earlier)
+            return self._resumption(last, tree, word == ASK, earlier)
         if top.phase in ('', ENDED) or word == RESTART:
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None
-        return self._resumption(last, word == ASK)._replace(begins_at=path)
+        return self._resumption(last, tree, word == ASK)._replace(begins_at=path)
 
     def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
         """Return the number of the moment that the settings name, 0 for the last one.
@@ -97,13 +96,14 @@ class TrialStore:
         _used.add(used)
         return number
 
-    def _resumption(self, trial: StoredTrial, asks: bool, earlier: int = 0) -> Resumption:
+    def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
+                    earlier: int = 0) -> Resumption:
+        """Return how a trial goes on; `tree`: what its last moment says."""
         changes = []
         if trial.structure != self._structure.id:
             changes = differences(self._store.description(trial.structure),
                                   self._structure.description)
         moments = self._store.moments(trial.number)
-        tree = read_tree(self._store, trial.number, CODECS)
         if earlier:
             # what runs elsewhere, and what was asked, has not become undone
             kept = {name: value for name, value in tree.whole.items()
