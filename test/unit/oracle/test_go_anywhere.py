@@ -2,7 +2,7 @@
 import threading
 
 import pytest
-from guarded_machines import chain
+from guarded_machines import OUTCOMES, both, chain
 from machines import (
     FakeExpert,
     Gate,
@@ -20,16 +20,6 @@ from smach_oracle.oracle.execution.departure import Departure
 from smach_oracle.oracle.records.events import EventKind
 
 ASKED = {'max_recoveries': 0}
-OUTCOMES = ['done', 'aborted', 'preempted']
-
-
-def both(**branches):
-    concurrence = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted',
-                                    outcome_map={'done': {label: 'done' for label in branches}})
-    with concurrence:
-        for label, branch in branches.items():
-            smach.Concurrence.add(label, branch)
-    return concurrence
 
 
 def each(state, items=(1, 2, 3)):
