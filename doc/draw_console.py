@@ -1,51 +1,75 @@
 #!/usr/bin/env python3
-"""Take the pictures of the operator console anew: a real console, a real machine under a real
-oracle, a headless Chromium.
+"""Take the pictures of the operator console anew: a real console, real machines under a real
+oracle, the simulated PR2, a headless Chromium.
 
-    python3 doc/draw_console.py [--to FOLDER]
+    python3 doc/draw_console.py [--to FOLDER] [--of kitchen|pr2]
 
-It writes console_question.png and console_machine.png. It starts a ROS master of its own. The other
-pictures of the console show the simulated robot, or a trial from its bag: they are taken by hand.
+`kitchen` writes console_question.png and console_machine.png. `pr2` writes console_perception.png,
+console_hand.png, console_3d.png and console_replay.png, and takes some minutes. Each starts a ROS
+master of its own. Look at what they have drawn.
 """
 import argparse
 import os
+import shutil
+import subprocess
 import sys
+import tempfile
 
 DOC = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [os.path.join(DOC, '..', folder) for folder in ('test/rostest', 'benchmarks')]
 
-SIZE = (1280, 900)
+SIZE = (1400, 900)
 MOST_BYTES = 200000  # of a picture
-QUESTION = '.question-row[data-key^="/alpha/"]'
+QUESTION = '.question-row.pending[data-key^="/{}/"]'
+CAMERA = '/head_camera/rgb/image_raw'
+CLOUD = '/head_camera/depth_registered/points'
+TABLE, HAND = (0.7, -0.05, 0.7), (0.55, -0.4, 0.85)  # m in base_footprint, to look at
+MARKED = ((0.27, 0.44), (0.405, 0.69))  # two corners around an object, as shares of the image
+PICTURED = '''
+const view = document.querySelector(arguments[0]);
+if (!view || view.width < 100) return false;
+const { data } = view.getContext("2d").getImageData(0, 0, view.width, view.height);
+return new Set(data).size > 50;'''
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--to', default=os.path.join(DOC, 'images'), help='folder of the pictures')
-    folder = parser.parse_args().to
-    import rospy
+    parser.add_argument('--of', choices=['kitchen', 'pr2'], help='default: both')
+    options = parser.parse_args()
+    if not options.of:  # a process has one ROS node only
+        for each in ('kitchen', 'pr2'):
+            subprocess.run([sys.executable, __file__, '--to', options.to, '--of', each],
+                           check=True)
+        return
     from answer_latency import Processes
-    from console_page import ConsolePage
-
-    class DrawnPage(ConsolePage):
-        """The page of which pictures are taken."""
-
     with Processes() as processes:
         processes.start_master()
-        rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
-        rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
-        try:
-            DrawnPage.begin('console_robot.py', 'PICK', '0.4', '2', '9', size=SIZE, name='ann')
-            draw(DrawnPage.browser, folder)
-        finally:
-            DrawnPage.tearDownClass()
-            rospy.signal_shutdown('drawn')
+        {'kitchen': draw_kitchen, 'pr2': draw_pr2}[options.of](processes, options.to)
 
 
-def draw(browser, folder):
+def draw_kitchen(_processes, folder):
+    """A question, and a machine that is paused."""
+    import rospy
+    from console_page import ConsolePage
+
+    class KitchenPage(ConsolePage):
+        """The page of which pictures are taken."""
+
+    rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
+    rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
+    try:
+        KitchenPage.begin('console_robot.py', 'PICK', '0.4', '2', '9', size=SIZE, name='ann')
+        work_in_kitchen(KitchenPage.browser, folder)
+    finally:
+        KitchenPage.tearDownClass()
+        rospy.signal_shutdown('drawn')
+
+
+def work_in_kitchen(browser, folder):
     """Work through a question, and take a picture at each place."""
-    browser.click(QUESTION)
+    browser.click(QUESTION.format('alpha'))
     expect(browser, 'It is yours.')
     browser.find('.choice.goto[data-settled]')
     take(browser, folder, 'console_question')
@@ -60,12 +84,157 @@ def draw(browser, folder):
     take(browser, folder, 'console_machine')
 
 
-def expect(browser, words):
+def draw_pr2(processes, folder):
+    """A trial of the simulated PR2, seen and handled by a person, and replayed from its bag."""
+    import rospy
+    from console_page import ConsolePage, Node
+    processes.start(['roslaunch', 'smach_oracle', 'pr2.launch', 'scripted_operator:=false',
+                     'benign:=true', 'real_time_factor:=1'])
+    bags = tempfile.mkdtemp()
+
+    class RobotPage(ConsolePage):
+        """The page of which pictures are taken, beside the simulated PR2."""
+
+        @classmethod
+        def start_robot(cls, robot, *arguments):
+            return Node(sys.executable, os.path.join(DOC, robot), '__name:=pr2')
+
+        @classmethod
+        def start_console(cls, *more):
+            return super().start_console('_bags:=' + bags, *more)
+
+    rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
+    look_at(TABLE)
+    rospy.set_param('/expert_console/cameras', {'/pr2': ['/head_camera']})
+    rospy.set_param('/pr2/record', bags)
+    rospy.set_param('/pr2/failure_cameras', [CAMERA])
+    try:
+        RobotPage.begin('draw_console_robot.py', size=SIZE, name='ann')
+        # from here on the page has the size of the pictures
+        RobotPage.browser.screenshot(os.path.join(bags, 'first.png'), *SIZE)
+        mark_an_object(RobotPage.browser, folder)
+        look_at(HAND)
+        drive_the_hand(RobotPage.browser, folder)
+        look_in_3d(RobotPage.browser, folder)
+        RobotPage.console.stop()
+        expect(RobotPage.browser, 'connection lost')
+        RobotPage.console = RobotPage.start_console()
+        replay(RobotPage.browser, folder)
+    finally:
+        RobotPage.tearDownClass()
+        rospy.signal_shutdown('drawn')
+        shutil.rmtree(bags)
+
+
+def look_at(place):
+    """Return when the head does; it waits for the simulation to come up."""
+    import actionlib
+    from geometry_msgs.msg import Point, PointStamped, Vector3
+    from std_msgs.msg import Header
+
+    from control_msgs.msg import PointHeadAction, PointHeadGoal
+    head = actionlib.SimpleActionClient('/head_traj_controller/point_head_action', PointHeadAction)
+    if not head.wait_for_server():
+        raise RuntimeError('the simulated head is not there')
+    head.send_goal_and_wait(
+        PointHeadGoal(target=PointStamped(Header(frame_id='base_footprint'), Point(*place)),
+                      pointing_axis=Vector3(0, 0, 1), pointing_frame='wide_stereo_optical_frame'))
+
+
+def mark_an_object(browser, folder):
+    """Answer the first question in the image of the failure."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    browser.click(QUESTION.format('pr2'), 120.0)
+    expect(browser, 'It is yours.')
+    browser.click('.choice.interface[data-name=perception]')
+    browser.find('.perception.shown', 60.0)
+    canvas = browser.find('.perception .drawing')
+    browser.run('arguments[0].closest(".perception").scrollIntoView()', canvas)
+    wide, high = canvas.size['width'], canvas.size['height']
+    first, last = ((int((x - 0.5) * wide), int((y - 0.5) * high)) for x, y in MARKED)
+    action = ActionChains(browser.driver, duration=20)
+    action.move_to_element_with_offset(canvas, *first).click_and_hold()
+    action.move_to_element_with_offset(canvas, *last).release().perform()
+    browser.find('[data-fact=size]')
+    until(lambda: browser.run('return Number(document.querySelector(".object-view .cloud")'
+                              '.dataset.triangles || 0)') > 10000, 'the robot beside the object')
+    browser.find('.accept[data-settled], [data-settled] .accept')
+    take(browser, folder, 'console_perception')
+    browser.click('.perception .accept')
+
+
+def drive_the_hand(browser, folder):
+    """Answer the second question with the hand, which goes up in the picture."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    scheme(browser, 'dark')
+    browser.click(QUESTION.format('pr2'), 60.0)
+    browser.click('.choice.interface[data-name=manipulation]')
+    browser.find('.manipulation', 60.0)
+    browser.click('.manipulation .wheel')
+    expect(browser, 'You drive.', '.driver')
+    browser.click('[data-arm=right]')
+    browser.click('[data-frame=base]')
+    until(lambda: browser.run(PICTURED, '.drive-camera canvas'), 'the camera')
+    browser.run('document.querySelector(".manipulation").scrollIntoView()')
+    browser.hold('r')
+    until(lambda: 'mm/s' in browser.text('.manipulation'), 'the hand moves')
+    take(browser, folder, 'console_hand')
+    ActionChains(browser.driver, duration=0).key_up('r').perform()
+    browser.click('.finish')
+    expect(browser, 'PICK counts as having ended with succeeded.', '.follow-up')
+
+
+def look_in_3d(browser, folder):
+    """The robot with what its camera sees."""
+    browser.click('#tab-sensors')
+    browser.click('.sensor-list [data-topic="{}"]'.format(CLOUD))
+    expect(browser, 'of 307200 points', '.cloud-view')
+    until(lambda: browser.run('return Number(document.querySelector(".cloud-view .cloud")'
+                              '.dataset.triangles || 0)') > 10000, 'the robot beside its cloud')
+    take(browser, folder, 'console_3d')
+    browser.click('.cloud-view .view-close')
+    scheme(browser, 'light')
+
+
+def replay(browser, folder):
+    """The trial from its bag, as it stood when the second question was answered."""
+    from selenium.webdriver.common.keys import Keys
+    expect(browser, 'live', '#status')
+    browser.click('#tab-trials')
+    browser.click('.trial[data-number]', 60.0)
+    slider = browser.find('.replay [role=slider]')
+    slider.send_keys(Keys.HOME)
+    for _ in range(12):
+        slider.send_keys(Keys.PAGE_UP)
+        if all(browser.says(words, '.replay-question', 1.0)
+               for words in ('Question about PICK', 'Answer of ann')):
+            break
+    until(lambda: browser.run(PICTURED, '.replay-images .shown canvas'), 'what was seen')
+    take(browser, folder, 'console_replay')
+
+
+def scheme(browser, name):
+    """`light` or `dark`, as a system that prefers it."""
+    browser.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'prefers-color-scheme', 'value': name}]})
+
+
+def until(is_so, what, limit_s=60.0):
+    """Wait for it.
+
+    :raises AssertionError: where it does not come.
+    """
+    from waiting import wait_for
+    if not wait_for(is_so, limit_s):
+        raise AssertionError('the page does not show ' + what)
+
+
+def expect(browser, words, selector='body'):
     """Wait until the page says so.
 
     :raises AssertionError: where it does not.
     """
-    if not browser.says(words):
+    if not browser.says(words, selector, 60.0):
         raise AssertionError('the page does not say {!r}; it says:\n{}'.format(
             words, browser.text()))
 
@@ -79,9 +248,23 @@ def take(browser, folder, name):
     path = os.path.join(folder, name + '.png')
     browser.run('document.querySelectorAll("#toasts > *").forEach((each) => each.remove())')
     browser.screenshot(path, *SIZE)
-    Image.open(path).convert('RGB').quantize(200).save(path, optimize=True)
-    if os.path.getsize(path) > MOST_BYTES:
-        raise AssertionError('{} has {} bytes'.format(path, os.path.getsize(path)))
+    whole = Image.open(path).convert('RGB')
+    for mixed in (128, 64, 32):
+        in_few_colours(whole, mixed).save(path, optimize=True)
+        if os.path.getsize(path) <= MOST_BYTES:
+            return
+    raise AssertionError('{} has {} bytes'.format(path, os.path.getsize(path)))
+
+
+def in_few_colours(whole, mixed):
+    """Those of the page as they are, those of a camera's image by the nearest of so many."""
+    from PIL import Image
+    counted = sorted(whole.getcolors(whole.width * whole.height), reverse=True)
+    frequent = [value for _, colour in counted[:128] for value in colour]
+    others = whole.quantize(mixed, method=Image.FASTOCTREE).getpalette()[:3 * mixed]
+    palette = Image.new('P', (1, 1))
+    palette.putpalette(frequent + others)
+    return whole.quantize(palette=palette, dither=0)
 
 
 if __name__ == '__main__':

@@ -175,8 +175,9 @@ class StateMachine(Container):
         """Put the machine to its initial state, take over the input keys and call the start
         callbacks.
         """
-        if self._preempted_state is not None and not self._preempt_requested:
-            # it ignored a request of the last run, since settled elsewhere
+        if self._preempted_state is not None:
+            # it ignored a request of the last run, or was asked after an error had ended that;
+            # a request that stands is passed on to the initial state
             self._preempted_state.recall_preempt()
         self._preempted_label = None
         self._preempted_state = None

@@ -109,6 +109,7 @@ class Hold(ConsolePage, unittest.TestCase):
         self.assertFalse(browser.find(RESUME).is_enabled())
         self.assertIn('needs the role of an operator', browser.text('.go-on'))
         self.assert_accessible('a machine that is paused, for a viewer')
+        self.assertTrue(wait_for(lambda: not browser.text('.hand-reply')), 'it is said once')
         browser.run('document.querySelector("{}").disabled = false'.format(RESUME))
         browser.click(RESUME)
         browser.find('.name-demand #expert').send_keys('ann')

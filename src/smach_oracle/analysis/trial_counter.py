@@ -6,7 +6,7 @@ from collections import Counter
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Set, Tuple
 
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by
 from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
 
@@ -38,8 +38,10 @@ class TrialCounter:
         self._start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
         self._earliest_s = self._latest_s = 0.0
+        self.resumed = 0  # how often it went on after its program was stopped
         self._count = 0
         self._last_seq = -1
+        self._left_out = 0  # numbers that no event has, as a resumed trial numbers on
         self._failures: Dict[str, int] = Counter()
         self._asked: Set[str] = set()
         self._answered: Set[str] = set()
@@ -109,7 +111,7 @@ class TrialCounter:
     @property
     def lost_events(self) -> int:
         """Gaps in the numbering: events that were lost, or that came before the first one added."""
-        return self._last_seq + 1 - self._count
+        return self._last_seq + 1 - self._count - self._left_out
 
     def add(self, event: Event) -> None:
         """Count one event."""
@@ -117,12 +119,16 @@ class TrialCounter:
         if event.kind == EventKind.TRIAL_START:
             self.experiment = _experiment(event)
             self._start = event.data if isinstance(event.data, Mapping) else {}
+        elif event.kind == EventKind.RESUMED:
+            self.resumed += 1
+            self._end = None  # it was stopped, and has not ended
         elif event.kind == EventKind.TRIAL_END:
             self._end = self._end or event
         elif event.kind == EventKind.STATE_START:
             self._state_seen = True
         elif event.kind == EventKind.FAILURE:
-            self._failures['{}/{}'.format(event.path, event.state)] += 1
+            if event.failure_kind != FailureKind.INTERRUPTED:
+                self._failures['{}/{}'.format(event.path, event.state)] += 1
         elif event.kind in (EventKind.HEALTH_WAIT_START, EventKind.HEALTH_WAIT_END):
             self._count_wait(event)
         elif event.kind == EventKind.QUERY_OPENED:
@@ -135,6 +141,9 @@ class TrialCounter:
         if not self._count:
             self.trial_id, self.experiment = event.trial_id, _experiment(event)
             self.start_time = self._earliest_s = self._latest_s = event.wall_time
+        if event.kind == EventKind.RESUMED:
+            stored = event.data.get('last_seq', -1) if isinstance(event.data, Mapping) else -1
+            self._left_out += max(0, event.seq - 1 - max(stored, self._last_seq))
         self._count += 1
         self._last_seq = max(self._last_seq, event.seq)
         self._earliest_s = min(self._earliest_s, event.wall_time)

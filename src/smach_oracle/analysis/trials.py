@@ -33,6 +33,7 @@ class TrialSummary(NamedTuple):
     cause: Optional[RecordedCause] = None  # what a simulated world was given to fail with
     truth: Optional[Truth] = None  # how it ended, by the judge of a simulated world
     unwell_s: float = 0.0  # in which it waited until the robot was well
+    resumed: int = 0  # how often it went on after its program was stopped
 
     @property
     def replicate(self) -> str:
@@ -109,4 +110,5 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
         outcome=counter.outcome, failures=counter.failures, recoveries=counter.recoveries,
         questions=counter.questions, answered=counter.answered,
         failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
-        settings=counter.settings, unwell_s=counter.unwell_s)
+        settings=counter.settings, unwell_s=counter.unwell_s,
+        resumed=counter.resumed)

@@ -60,6 +60,7 @@ class VariantCounts(NamedTuple):
     lost_events: int
     replicates: int = 1
     truth_known: int = 0  # trials whose true end a world has recorded
+    resumed: int = 0  # trials that went on after their program was stopped
 
     def of(self, name: str) -> Count:
         """The count of that name."""
@@ -169,7 +170,8 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
                    for name, holds in _BY_TRUTH]
     return VariantCounts(variant.experiment, variant.name, len(trials), tuple(counts),
                          sum(1 for trial in trials if trial.lost_events),
-                         sum(trial.lost_events for trial in trials), len(parts), len(known))
+                         sum(trial.lost_events for trial in trials), len(parts), len(known),
+                         sum(1 for trial in trials if trial.resumed))
 
 
 def _by_events(name: str, number: Callable[[TrialSummary], int], trials: Sequence[TrialSummary],

@@ -13,7 +13,7 @@ nothing could be replayed.
 import argparse
 import itertools
 import sys
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, make_estimator
 from smach_oracle.oracle.decision.policy import (
@@ -27,7 +27,7 @@ from smach_oracle.oracle.decision.policy import (
     policy_named,
 )
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by, is_counted
 from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
@@ -68,6 +68,7 @@ class _LearnedState:
         self.context: Optional[FailureContext] = None
         self.held_back = False  # the present question is about no failure
         self.recoveries = 0  # of this trial, as recorded
+        self.interrupted = False  # the program was stopped while it ran: nothing is learned of it
         # whether each was met, of those run for the present failure
         self.preconditions: List[bool] = []
 
@@ -84,11 +85,17 @@ class Replay:
         self._states: Dict[Key, _LearnedState] = {}
         self._histories: Dict[Key, History] = {}
         self._branches: Dict[str, Tuple[str, ...]] = {}  # states that are on their own, by path
+        self._running: Set[str] = set()  # paths of containers
+        self._go_on: Set[str] = set()  # those that ran when the program was stopped
 
     def take(self, event: Event) -> Optional[str]:
         """Follow one event; returns the action at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
+        elif event.kind == EventKind.RESUMED:
+            self._go_on = set(self._running)
+        elif event.kind == EventKind.CONTAINER_END and event.outcome:
+            self._running.discard(event.path)
         elif event.kind == EventKind.CONTAINER_START:
             self._begin_execution(event)
         elif event.kind == EventKind.FAILURE:
@@ -105,6 +112,7 @@ class Replay:
         return None
 
     def _begin_trial(self) -> None:
+        self._running.clear()
         for history in self._histories.values():
             history.begin_trial()
         for state in self._states.values():
@@ -129,6 +137,10 @@ class Replay:
         return self._states[key]
 
     def _begin_execution(self, event: Event) -> None:
+        if event.path in self._go_on:
+            self._go_on.discard(event.path)
+            return
+        self._running.add(event.path)
         branches = branches_of(event)
         self._branches[event.path] = branches
         for key in [(event.path, state) for state in branches] or [(event.path, '')]:
@@ -142,6 +154,10 @@ class Replay:
 
     def _failed(self, event: Event) -> None:
         state, history = self._state(event), self._history(event)
+        state.interrupted = event.failure_kind == FailureKind.INTERRUPTED
+        if state.interrupted:
+            state.context = None
+            return
         successes = state.estimator.successes
         state.context = history.failure_context(event.state, '', successes)
         state.preconditions = []
@@ -150,6 +166,8 @@ class Replay:
         self._visited(event, VisitResult.FAILURE)
 
     def _superseded(self, event: Event) -> None:
+        if self._state(event).interrupted:
+            return
         if self._state(event).held_back:
             self._visited(event, VisitResult.SUPERSEDED)
             return
@@ -159,7 +177,7 @@ class Replay:
     def _left(self, event: Event) -> None:
         state = self._state(event)
         # the end of the visit whose failure is known, or of none: the state was held back
-        if state.context is not None or not event.outcome:
+        if state.context is not None or state.interrupted or not event.outcome:
             return
         if not is_preempted(event.outcome) and is_counted(event):
             state.estimator.add(False)
@@ -171,7 +189,8 @@ class Replay:
 
     def begin_visit(self, event: Event) -> None:
         """A state is about to run."""
-        self._state(event).context = None
+        state = self._state(event)
+        state.context, state.interrupted = None, False
 
     def _decide(self, event: Event) -> str:
         state = self._state(event)
@@ -245,7 +264,7 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     other_trials = 0
     for trial in trials:
         another = False
-        for event in trial:
+        for event in _that_count(trial):
             _check_rate(own, event)
             if event.kind == EventKind.STATE_START:
                 own.begin_visit(event)
@@ -260,8 +279,24 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
     return TriedSettings(dict(settings), counts, len(trials), other_trials)
 
 
+def _that_count(trial: Sequence[Event]) -> List[Event]:
+    """Leave out what a program told before it was killed, and had not stored yet.
+
+    The machine went on from before that.
+    """
+    found: List[Event] = []
+    for event in trial:
+        if event.kind == EventKind.RESUMED and isinstance(event.data, Mapping):
+            stored = event.data.get('last_seq', event.seq)
+            found = [each for each in found if each.seq <= stored]
+        found.append(event)
+    return found
+
+
 def _check_rate(own: Replay, event: Event) -> None:
-    if event.kind == EventKind.FAILURE and abs(own.rate(event) - event.rate) > _ROUNDING:
+    if event.kind != EventKind.FAILURE or event.failure_kind == FailureKind.INTERRUPTED:
+        return
+    if abs(own.rate(event) - event.rate) > _ROUNDING:
         raise BagError(
             '{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}: states '
             'with '

@@ -28,6 +28,7 @@ def still_runs(goal: ExpertQueryGoal) -> bool:
 def standing_words(goal: ExpertQueryGoal) -> str:
     """How the state of a question stands, to follow its name."""
     return {ExpertQueryGoal.STILL_RUNNING: 'still runs',
+            OracleEvent.INTERRUPTED: 'was interrupted',
             ExpertQueryGoal.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
 
 
@@ -44,6 +45,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
             outcome or 'nothing'),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
         ExpertQueryGoal.HELD_BACK: 'was not executed',
+        OracleEvent.INTERRUPTED: 'ran when the program was stopped, or was about to begin',
     }.get(goal.failure_kind, 'failed')
 
 
@@ -86,6 +88,8 @@ def event_words(event: Event) -> str:
     by = ' by ' + event.by if event.by else ''
     sentence = {
         EventKind.TRIAL_START: lambda: 'The trial of {} began.'.format(event.path),
+        EventKind.RESUMED: lambda: 'The trial of {} goes on after its program was stopped.'.format(
+            event.path),
         EventKind.CONTAINER_START: lambda: '{} began in {}.'.format(event.path, event.state),
         EventKind.CONTAINER_END: lambda: '{} ended{}.'.format(event.path, _with(event.outcome)),
         EventKind.TRANSITION: lambda: '{} ended{}; next: {}.'.format(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .asking.question import Answer, AnswerKind, Expert, Question
+    from .checkpoint.storable import register_codec
     from .container import OracleContainer
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
     from .execution.unwrapping import unwrap
@@ -23,12 +24,12 @@ _LAZY = {
     'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
     'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
     'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question',
-    'OperatorHand': 'operator_hand',
+    'OperatorHand': 'operator_hand', 'register_codec': 'checkpoint.storable',
     'unwrap': 'execution.unwrapping'
 }
 __all__ = ['Answer', 'AnswerKind', 'Expert', 'ExponentialFailureRate', 'FailureClass',
            'FailureRate', 'OperatorHand', 'OracleContainer', 'Question', 'Settings',
-           'oracle_of', 'unwrap']
+           'oracle_of', 'register_codec', 'unwrap']
 
 
 def __getattr__(name: str) -> object:

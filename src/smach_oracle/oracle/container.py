@@ -267,6 +267,9 @@ class OracleContainer(smach.StateMachine):
         if node.entry and node.entry in self._states:
             self._set_current_state(node.entry)
         node.entry = ''
+        if node.resuming is not None:
+            entry, node.resuming = node.resuming, None
+            entry.enter(node)
         super().call_start_cbs()
 
     def _update_once(self) -> Optional[str]:

@@ -84,6 +84,8 @@ class OperatorHand:
                 top.machine.request_preempt()
             else:
                 text = '{} does not run'.format(top.path)
+                if top.tree.control.paused:
+                    text += '; its pause is lifted'
         except Exception as err:  # it is the user's
             text += ', and its request_preempt failed: {!r}'.format(err)
         finally:
@@ -98,8 +100,10 @@ class OperatorHand:
         The machine is paused from now on.
 
         :param path: of the container, as in events; '': every one.
-        :raises OperatorError: where nothing waits there.
+        :raises OperatorError: where nothing waits there; the machine is paused nevertheless, but
+            not where there is no such container.
         """
+        self._nodes_at(path)
         control = self._top.tree.control
         was_paused = control.paused
         control.pause(by)
@@ -310,13 +314,21 @@ class OperatorHand:
 
     def _node_at(self, path: str, state: str) -> TreeNode:
         """Return the container at a path; of branches, which have one path, that of the state."""
+        found = self._nodes_at(path)
+        return next((node for node in found if state in node.labels()), found[0])
+
+    def _nodes_at(self, path: str) -> List[TreeNode]:
+        """Return the containers at a path, '': the top machine.
+
+        :raises OperatorError: where there is none.
+        """
         top = self._top
         nodes = list(nodes_of(top.machine))
         found = [node for node in nodes if node.path == (path.strip('/') or top.path)]
         if not found:
             raise OperatorError('there is no container {!r}; there are: {}'.format(
                 path, ', '.join(sorted({node.path for node in nodes}))))
-        return next((node for node in found if state in node.labels()), found[0])
+        return found
 
 
 def _pattern(text: str) -> PathPattern:

@@ -44,6 +44,7 @@ from .parameters import private_flag, private_names, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
+from .stored import prepare_store
 from .waiting.service_waiting import ServiceWaiting
 
 # for trials to tell their end, before their bags are closed under them; roslaunch gives a node 15 s
@@ -113,6 +114,8 @@ class Attachments:
             self._machines.add(machine)
             node = rospy.core.is_initialized() and not rospy.core.is_shutdown_requested()
             plan = self._plan_recording(node)  # first, since it may raise
+            if oracle_of(machine).settings.checkpoint:
+                prepare_store(node)
             if node:
                 self._start_node()
                 self._attach_to_node(machine)

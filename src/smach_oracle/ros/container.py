@@ -24,7 +24,13 @@ from smach_oracle.oracle.settings.settings import Settings
 
 from .attachment import attachments
 from .expert.failure_text import describe_failure
-from .loaded_settings import DEFAULT_PARAM, LoadedSettings, read_param, resolve_python
+from .loaded_settings import (
+    DEFAULT_PARAM,
+    LoadedSettings,
+    read_checkpoint,
+    read_param,
+    resolve_python,
+)
 from .machine_names import machine_names
 from .main_thread import outside_main_thread
 
@@ -147,13 +153,15 @@ def take_parameters(machine: BareContainer) -> None:
     given = _given[machine]
     # Python objects that they name are looked up in this thread: a module may be imported for it
     parameters = outside_main_thread(functools.partial(read_param, DEFAULT_PARAM))
-    if parameters:
+    checkpoint, checkpoint_name = outside_main_thread(read_checkpoint)
+    if parameters or checkpoint:
         settings = LoadedSettings(given.settings)
-        name = rospy.resolve_name(DEFAULT_PARAM)
-        for change in settings.overridden_by(parameters):
-            _tell_once('{}: the parameter {} overrides {}'.format(
-                oracle_of(machine).path, name, change))
-        settings.put(parameters, 'parameter ' + name)
+        for values, name in ((parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM)),
+                             (checkpoint, checkpoint_name)):
+            for change in settings.overridden_by(values):
+                _tell_once('{}: the {} overrides {}'.format(
+                    oracle_of(machine).path, name, change))
+            settings.put(values, name)
         # Not strict: one parameter serves every machine of the node, and not each of them has every
         # state.
         BareContainer.wrap(machine, settings=checked(settings, given.preconditions),

@@ -17,6 +17,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from .parameters import read_or_default
 
 DEFAULT_PARAM = '~oracle'
+CHECKPOINT_PARAM = '~checkpoint'  # goes before the key of DEFAULT_PARAM
 PYTHON_PREFIX = 'python:'
 
 
@@ -77,6 +78,7 @@ def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PAR
         settings.put(values, str(path), lines)
     if param and rospy.core.is_initialized():
         settings.put(read_param(param), 'parameter ' + rospy.resolve_name(param))
+        settings.put(*read_checkpoint())
     if overrides:
         settings.put(overrides, 'command line')
     return settings
@@ -129,6 +131,16 @@ def read_param(param: str) -> Dict[str, Any]:
     if isinstance(values.get('states'), dict):
         values['states'] = dict(_state_entries(values['states']))
     return values
+
+
+def read_checkpoint() -> Tuple[Dict[str, Any], str]:
+    """Return the private parameter `~checkpoint` as a setting, empty where it is not set.
+
+    :returns: with it the name of the parameter.
+    """
+    value = read_or_default(CHECKPOINT_PARAM, '')
+    return ({'checkpoint': value} if value != '' else {},
+            'parameter ' + str(rospy.resolve_name(CHECKPOINT_PARAM)))
 
 
 def resolve_python(name: str) -> object:

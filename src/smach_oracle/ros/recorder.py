@@ -114,7 +114,8 @@ class TrialRecorder:
         if os.getpid() != self._process:
             return  # a forked child has no writer thread, and the bag is its parent's
         item = EventItem(event, now()._replace(wall=event.wall_time))
-        weight = WEIGHT_OF_A_FILE if event.kind == EventKind.TRIAL_START else 1
+        weight = (WEIGHT_OF_A_FILE
+                  if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED) else 1)
         if not self._queue.put_event(item, self._may_wait, weight):
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
@@ -231,7 +232,7 @@ class _MachineObserver:
         if event.kind == EventKind.TRIAL_END:
             self._take_snapshots(event)
         self._observe(event)
-        if event.kind == EventKind.TRIAL_START:
+        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
             self._take_snapshots(event)
 
     def _take_snapshots(self, event: Event) -> None:

@@ -2,7 +2,12 @@
 import threading
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Union
 
-from smach_oracle.oracle.asking.answer_rules import addressed, check_answer, choices_of
+from smach_oracle.oracle.asking.answer_rules import (
+    AnswerChoices,
+    addressed,
+    check_answer,
+    choices_of,
+)
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
@@ -33,6 +38,7 @@ def _in_words(answer: Optional[Answer]) -> str:
 def goto(state: str, *, about: str = '', why: str = '') -> ScriptedAnswer:
     """Send the machine to a state.
 
+    :param state: LABEL or PATH/LABEL, the path relative to the top machine.
     :param about: the failed state, LABEL or PATH/LABEL, that is expected in the question.
     """
     return ScriptedAnswer(Answer(AnswerKind.GOTO, state=state, by=BY, why=why), about)
@@ -121,10 +127,12 @@ class AnswerScript(Expert):
         try:
             said = self._said(question)
             self._chosen = said
-            if said.answer is not None:
-                choices = choices_of(question)
-                check_answer(addressed(said.answer, choices), choices)
-            return said.answer
+            if said.answer is None:
+                return None
+            choices = choices_of(question)
+            answer = addressed(_placed(said.answer, choices), choices)
+            check_answer(answer, choices)
+            return answer
         except AnswerError as err:
             self._note('the answer of the script does not fit {}: {}'.format(
                 _about(question), err))
@@ -175,6 +183,18 @@ def _as_scripted(reply: object) -> ScriptedAnswer:
         return reply
     raise ScriptError('{!r} is no answer; give goto, supersede, give_up, use_interface or '
                       'no_answer'.format(reply))
+
+
+def _placed(answer: Answer, choices: AnswerChoices) -> Answer:
+    """Return an answer that names a state by its path with the container of that state."""
+    if answer.kind is not AnswerKind.GOTO or answer.container or '/' not in str(answer.state):
+        return answer
+    top = choices.container.split('/')[0]
+    paths = (answer.state, '{}/{}'.format(top, answer.state))
+    for container, label in choices.states:
+        if '{}/{}'.format(container or choices.container, label) in paths:
+            return answer._replace(container=container, state=label)
+    return answer
 
 
 def _path(question: Question) -> str:

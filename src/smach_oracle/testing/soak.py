@@ -3,7 +3,7 @@ import contextlib
 import os
 import random
 import tempfile
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, TypeVar, Union
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -19,6 +19,7 @@ from .places import StatePlace, find_place, places_of
 from .soak_report import SoakReport, SoakTrial
 
 MachineOrFactory = Union[smach.StateMachine, Callable[[], smach.StateMachine]]
+Name = TypeVar('Name', str, FaultKind)
 KINDS = (FaultKind.OUTCOME, FaultKind.EXCEPTION)
 
 
@@ -55,11 +56,13 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     :param overrun_s: seconds of wall time that an OVERRUN takes.
     :param expert: who answers, such as `expert(function)`; None: as with `Bench`.
     :param limit_s: seconds of wall time after which a trial counts as not recovered.
-    :raises FaultError: for a state that is not there, or where nothing can fail.
+    :raises FaultError: for a state that is not there, where nothing can fail, and for a number
+        below 1.
     :raises SettingsError: naming key, value and what is allowed.
     :raises AssertionError: where the machine does not end well without a fault.
     """
-    plan = SoakPlan(machine, seed, tuple(FaultKind(kind) for kind in kinds), tuple(states),
+    _check_count('trials', trials)
+    plan = SoakPlan(machine, seed, _kinds(kinds), _names(states),
                     most_in_row, overrun_s, expert, settings, preconditions, limit_s)
     runner = _SoakRunner(plan)
     told = []
@@ -76,22 +79,37 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
                preconditions: PreconditionLists = None, limit_s: float = LIMIT_S) -> ObservedTrial:
     """Run one trial of a soak alone, by its number from 1; the arguments are those of `soak`.
 
-    :raises FaultError: for a state that is not there, or where nothing can fail.
+    :raises FaultError: for a state that is not there, where nothing can fail, and for a number
+        below 1.
     :raises SettingsError: naming key, value and what is allowed.
     :raises ScriptError: where a question did not go with the script of the expert.
     :raises TrialLimitError: where the trial did not end in time.
     :raises AssertionError: where the machine does not end well without a fault.
     """
-    return _alone(SoakPlan(machine, seed, tuple(FaultKind(kind) for kind in kinds), tuple(states),
+    return _alone(SoakPlan(machine, seed, _kinds(kinds), _names(states),
                            most_in_row, overrun_s, expert, settings, preconditions, limit_s),
                   number)
 
 
 def _alone(plan: SoakPlan, number: int) -> ObservedTrial:
+    _check_count('number', number)
     runner = _SoakRunner(plan)
     with runner.unchanged():
         runner.draw_candidates()
         return runner.run([runner.fault(number)])
+
+
+def _kinds(given: Iterable[FaultKind]) -> Tuple[FaultKind, ...]:
+    allowed = ', '.join(kind.value for kind in FaultKind)
+    try:
+        return tuple(FaultKind(kind) for kind in _names(given))
+    except ValueError as err:
+        raise FaultError('kinds: {}; allowed is a list of {}'.format(err, allowed)) from err
+
+
+def _names(given: Iterable[Name]) -> Tuple[Name, ...]:
+    """Return what was given as a list; a single text is one name, and not its letters."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 class _Candidate(NamedTuple):
@@ -112,6 +130,8 @@ class _SoakRunner:
     """Runs the trials of a plan."""
 
     def __init__(self, plan: SoakPlan) -> None:
+        if plan.most_in_row is not None:
+            _check_count('most_in_row', plan.most_in_row)
         self._plan = plan
         self._candidates: List[_Candidate] = []
         self._fresh: Callable[[], None] = _nothing
@@ -231,6 +251,11 @@ class _SoakRunner:
             raise FaultError('a soak: {!r} is no StateMachine, nor a function that builds '
                              'one'.format(made))
         return made
+
+
+def _check_count(name: str, count: object) -> None:
+    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+        raise FaultError('a soak: {} is {!r}; give a whole number from 1'.format(name, count))
 
 
 def _nothing() -> None:

@@ -11,7 +11,7 @@ from std_msgs.msg import String
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import load_trials, summarise
-from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind
+from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind, FailureKind
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording import bag_format
 from smach_oracle.ros.recording.bag_writer import BagWriter
@@ -246,3 +246,32 @@ def test_what_is_not_there_is_said_clearly(tmp_path):
     BagWriter(str(tmp_path / 'empty.bag')).close()
     with pytest.raises(BagError, match='nothing was recorded in 1 bag'):
         load_trials([str(tmp_path)])
+
+
+def resumed_story():
+    """Of two bags; the program was killed after the event with number 2, of which 1 is stored."""
+    first = story(START, ENTERED, ENTERED)
+    resumed = EventKind.RESUMED, {'data': {'last_seq': 1}}
+    interrupted = EventKind.FAILURE, {'state': 'PICK', 'failure_kind': FailureKind.INTERRUPTED}
+    later = story(resumed, interrupted, REVISIT, JUMP, ENTERED, END)
+    return first + [event._replace(seq=event.seq + 1001) for event in later]
+
+
+def test_a_resumed_trial_is_one_and_has_lost_nothing():
+    trial = summarise(resumed_story())
+    assert (trial.resumed, trial.lost_events, trial.failures) == (1, 0, 0)
+    assert trial.ending is TrialEnding.SUCCESS
+
+
+def test_what_a_killed_program_had_stored_and_not_recorded_is_lost():
+    events = resumed_story()
+    del events[1:3]  # numbers 1, which is stored, and 2, of which nobody knows
+    assert summarise(events).lost_events == 1
+
+
+def test_a_trial_that_was_stopped_and_goes_on_ends_as_it_does_later():
+    stopped = story(START, ENTERED, (EventKind.TRIAL_END, {'data': {'ended_by': 'stopped'}}))
+    assert summarise(stopped).ending is TrialEnding.PREEMPTED
+    later = story((EventKind.RESUMED, {'data': {'last_seq': 2}}), END)
+    trial = summarise(stopped + [event._replace(seq=event.seq + 1002) for event in later])
+    assert (trial.ending, trial.resumed) == (TrialEnding.SUCCESS, 1)

@@ -8,11 +8,12 @@ PACKAGE = ROOT / 'src/smach_oracle'
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': set(),
+    'oracle': {'store'},
+    'store': set(),  # no ROS, no SMACH
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
-            'oracle.oracle_of', 'oracle.waiting'},
+            'oracle.oracle_of', 'oracle.waiting', 'store'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -37,21 +38,21 @@ ARROWS: Dict[str, Set[str]] = {
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
 TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))
 # what the executive keeps to itself
-INSIDE = {'oracle.execution', 'oracle.branches', 'oracle.recovery', 'oracle.places',
-          'oracle.machine'}
+INSIDE = {'oracle.execution', 'oracle.checkpoint', 'oracle.branches', 'oracle.recovery',
+          'oracle.places', 'oracle.machine'}
 Layer = Union[str, Set[str]]
 # the packages and modules of a room that has packages, from the top down. Each may import those
 # below it alone: names in one set do not know each other.
 LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
-        'prospects', 'operator_hand', 'container', 'question', 'execution', 'branches', 'recovery',
-        'places', 'machine', 'control', 'asking', 'records', 'settings', 'decision',
-        'number_checks', 'background', 'waiting', 'errors'
+        'prospects', 'operator_hand', 'container', 'question', 'execution', 'checkpoint',
+        'branches', 'recovery', 'places', 'machine', 'control', 'asking', 'records', 'settings',
+        'decision', 'number_checks', 'background', 'waiting', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
                                                  'hand', 'waiting'},
-        {'recording', 'interfaces', 'goal_link', 'loaded_settings'},
+        {'recording', 'interfaces', 'goal_link', 'loaded_settings', 'stored'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
@@ -67,6 +68,10 @@ LAYERS: Dict[str, List[Layer]] = {
         {'graphs', 'feeds', 'commands', 'web'}
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
+    'store': [
+        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file', 'rows',
+        {'codecs', 'errors', 'names'}
+    ],
     'pr2': [
         'nodes', {'skills', 'ros_robot'}, {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
         'perception', {'model', 'robot', 'kitchen'}, 'work_costs'
@@ -80,9 +85,9 @@ LAYERS: Dict[str, List[Layer]] = {
 }
 # what runs where no ROS is installed
 ROS_FREE = [
-    'oracle', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception', 'pr2/planning',
-    'pr2/skills', 'simulation/physics', 'simulation/scenes', 'inspection_robot/world',
-    'inspection_robot/robot', 'commands', 'packages'
+    'oracle', 'store', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception',
+    'pr2/planning', 'pr2/skills', 'simulation/physics', 'simulation/scenes',
+    'inspection_robot/world', 'inspection_robot/robot', 'commands', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(

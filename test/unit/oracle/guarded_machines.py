@@ -24,6 +24,16 @@ def chain(**states):
     return machine
 
 
+def both(**branches):
+    """A Concurrence of these, which ends with 'done' where all of them do."""
+    concurrence = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted',
+                                    outcome_map={'done': {label: 'done' for label in branches}})
+    with concurrence:
+        for label, branch in branches.items():
+            smach.Concurrence.add(label, branch)
+    return concurrence
+
+
 def guarded(machine, *answers, on_retry='confirm', states=None, **settings):
     """The machine, watched, in which POUR is not repeated by itself; the expert.
 

@@ -1,8 +1,9 @@
 """The autonomy of states: run, announce, confirm; by settings and at run time."""
 import pytest
-from held_machines import Gate, Held
+from held_machines import Gate, Held, eventually
 from machines import Scripted, chain_of
 
+import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.control.control import Control
 from smach_oracle.oracle.control.hold import HeldPlace, LetGo
@@ -104,6 +105,16 @@ def test_a_preempt_ends_a_wait_for_a_confirmation() -> None:
         assert (held.end(), first.runs) == ('preempted', 0)
 
 
+def test_a_preempt_while_nothing_runs_leaves_the_next_trial_to_be_confirmed() -> None:
+    held = Held(chain_of(Scripted(), Scripted()), settings={'states': {'B': {
+        'autonomy': 'confirm'}}})
+    assert held.hand.preempt() == 'SM_ROOT does not run'
+    with held.begin():
+        held.waits_before('SM_ROOT/B')
+        held.hand.confirm()
+        assert held.end() == 'done'
+
+
 def test_a_state_to_which_the_oracle_goes_is_confirmed_again() -> None:
     first = Scripted('aborted')
     held = Held(chain_of(first), settings={'autonomy': 'confirm'})
@@ -138,3 +149,22 @@ def test_a_level_that_is_set_just_before_a_wait_begins_counts() -> None:
     control.begin(hold)
     assert not hold.waits_for_confirmation
     assert control.wait(hold, lambda: None) is LetGo.RESUMED
+
+
+def test_after_an_operators_preempt_what_comes_behind_the_clean_up_is_confirmed() -> None:
+    gate, tidy, last = Gate(), Scripted(), Scripted()
+    machine = smach.StateMachine(['done', 'aborted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(gate, outcomes=('ok', 'aborted', 'preempted')),
+                               {'ok': 'B', 'preempted': 'TIDY_UP'})
+        smach.StateMachine.add('TIDY_UP', tidy, {'ok': 'B', 'preempted': 'aborted'})
+        smach.StateMachine.add('B', last, {'ok': 'done', 'preempted': 'aborted'})
+    held = Held(machine, settings={'states': {'B': {'autonomy': 'confirm'},
+                                              'TIDY_UP': {'autonomy': 'confirm'}}})
+    with held.begin():
+        eventually(gate.entered.is_set)
+        held.hand.preempt()
+        held.waits_before('SM_ROOT/B')
+        assert (tidy.runs, last.runs) == (1, 0)
+        held.hand.confirm()
+        assert held.end() == 'done'

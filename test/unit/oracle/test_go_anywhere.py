@@ -2,24 +2,24 @@
 import threading
 
 import pytest
-from guarded_machines import chain
-from machines import FakeExpert, Gate, Scripted, Watched, give_up, goto, in_thread, supersede
+from guarded_machines import OUTCOMES, both, chain
+from machines import (
+    FakeExpert,
+    Gate,
+    Scripted,
+    Watched,
+    chain_of,
+    give_up,
+    goto,
+    in_thread,
+    supersede,
+)
 
 import smach
 from smach_oracle.oracle.execution.departure import Departure
 from smach_oracle.oracle.records.events import EventKind
 
 ASKED = {'max_recoveries': 0}
-OUTCOMES = ['done', 'aborted', 'preempted']
-
-
-def both(**branches):
-    concurrence = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted',
-                                    outcome_map={'done': {label: 'done' for label in branches}})
-    with concurrence:
-        for label, branch in branches.items():
-            smach.Concurrence.add(label, branch)
-    return concurrence
 
 
 def each(state, items=(1, 2, 3)):
@@ -130,6 +130,62 @@ def test_of_two_branches_that_go_elsewhere_the_first_wins():
         watched = Watched(machine, name='TOP', expert=Expert(), settings=ASKED)
         assert watched.run() == 'done'
         assert len(jumps(watched)) == 1 and watched.visits()[-1] == 'C'
+
+
+def jump_of_another_branch(right):
+    """LEFT goes to C of the top machine; RIGHT obeys the preempt, goes on, and fails in IN."""
+    gate = Gate()
+
+    def fails(state, ud):
+        assert gate.entered.wait(20)
+        return 'aborted'
+
+    def obeys(state, ud):
+        gate(state, ud)
+        return 'ok'  # its author goes on
+    machine = chain(A=Scripted(), BOTH=both(LEFT=chain(L=Scripted(fails)),
+                                            RIGHT=chain(OBEYS=Scripted(obeys), IN=right)),
+                    C=Scripted())
+    watched, expert, outcome = run(machine, to('TOP', 'C'), to('TOP', 'A'))
+    assert outcome == 'done' and len(jumps(watched)) == 1
+    return watched, expert
+
+
+def test_a_branch_whose_own_jump_comes_too_late_is_left_as_a_whole():
+    inner = chain_of(Scripted('aborted', outcomes=('ok', 'aborted')), outcomes=('done', 'aborted'))
+    watched, expert = jump_of_another_branch(inner)
+    assert [event.path for event in watched.of(EventKind.FAILURE)] == [
+        'TOP/BOTH/LEFT', 'TOP/BOTH/RIGHT/IN']
+    assert [question.failed_state for question in expert.questions] == ['L', 'A']
+    ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
+    assert ends['TOP/BOTH/RIGHT/IN'] == 'aborted' and ends['TOP/BOTH/RIGHT'] == 'preempted'
+
+
+def test_what_runs_beside_a_jump_that_comes_too_late_is_preempted():
+    beside = Gate()
+
+    def fails(state, ud):
+        assert beside.entered.wait(20)
+        return 'aborted'
+    watched, _ = jump_of_another_branch(both(DEEP=chain(R=Scripted(fails)),
+                                             WAITS=chain(S=Scripted(beside))))
+    ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
+    assert ends['TOP/BOTH/RIGHT/IN/WAITS'] == 'preempted' and ends['TOP/BOTH/RIGHT'] == 'preempted'
+
+
+def test_keys_missing_at_a_place_are_none_of_the_container_above():
+    machine = chain(A=Scripted('aborted', 'aborted'),
+                    PICK=chain(B=Scripted(input_keys=['cup']), D=Scripted()))
+    expert = FakeExpert(to('TOP/PICK', 'B'))
+
+    def sees(ud):
+        ud['cup'] = 'red'
+        return True
+    watched = Watched(machine, name='TOP', expert=expert, preconditions={'A': [sees]},
+                      settings={'states': {'A': {'prior': 0.5}}})
+    watched.run()
+    assert watched.of(EventKind.PRECONDITION_END)
+    assert watched.of(EventKind.JUMP)[-1].data['missing_keys'] == ['cup']
 
 
 def test_down_into_one_branch_begins_the_others_at_their_own_start():

@@ -74,6 +74,18 @@ def test_a_step_of_a_machine_that_runs_pauses_it() -> None:
         held.waits_before('SM_ROOT/B')
 
 
+def test_a_step_of_a_container_that_is_not_there_pauses_nothing() -> None:
+    gate = Gate()
+    held = Held(chain_of(Scripted(gate), Scripted()))
+    with held.begin():
+        eventually(gate.entered.is_set)
+        with pytest.raises(OperatorError, match="no container 'KITCHEN'; there are: SM_ROOT"):
+            held.hand.step('KITCHEN')
+        assert not held.hand.status().paused
+        gate.opened.set()
+        assert held.end() == 'done'
+
+
 def test_a_preempt_ends_a_paused_machine_at_once() -> None:
     first = Scripted()
     held = Held(chain_of(first))

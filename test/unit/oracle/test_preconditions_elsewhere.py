@@ -2,14 +2,12 @@
 import threading
 
 import pytest
-from guarded_machines import chain
+from guarded_machines import OUTCOMES, both, chain
 from machines import FakeExpert, Scripted, Watched, give_up, in_thread, supersede
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
-
-OUTCOMES = ['done', 'aborted', 'preempted']
 
 
 def ends(watched):
@@ -20,15 +18,6 @@ def ends(watched):
 def wrapped(machine, state, *preconditions, states=None, **more):
     settings = {'states': {state: {'preconditions': list(preconditions)}, **(states or {})}}
     return Watched(machine, name='TOP', settings=settings, **more)
-
-
-def both(**branches):
-    concurrence = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted',
-                                    outcome_map={'done': {label: 'done' for label in branches}})
-    with concurrence:
-        for label, branch in branches.items():
-            smach.Concurrence.add(label, branch)
-    return concurrence
 
 
 def each(state):

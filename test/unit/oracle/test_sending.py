@@ -2,6 +2,7 @@
 import threading
 
 import pytest
+from guarded_machines import chain
 from held_machines import Gate, Held, eventually
 from machines import FakeExpert, Scripted, chain_of, contents, goto
 
@@ -201,21 +202,10 @@ def test_a_preempt_comes_before_a_jump() -> None:
     assert not held.of(EventKind.SENT)
 
 
-def nested(**states):
-    """A machine of these states, each of which leads to the next."""
-    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
-    labels = list(states)
-    with machine:
-        for label, following in zip(labels, labels[1:] + ['done']):
-            good = 'ok' if isinstance(states[label], Scripted) else 'done'
-            smach.StateMachine.add(label, states[label], {good: following})
-    return machine
-
-
 def test_it_can_be_sent_into_the_middle_of_a_machine_that_does_not_run() -> None:
     gate, look, aim = Gate(), Scripted(), Scripted()
     between = Scripted()
-    machine = nested(FIRST=Scripted(gate), BETWEEN=between, SEE=nested(ARM=nested(AIM=aim,
+    machine = chain(FIRST=Scripted(gate), BETWEEN=between, SEE=chain(ARM=chain(AIM=aim,
                                                                                   LOOK=look)))
     with Held(machine).begin() as held:
         assert gate.entered.wait(20)
@@ -232,7 +222,7 @@ def test_it_can_be_sent_into_the_middle_of_a_machine_that_does_not_run() -> None
 
 
 def test_a_paused_machine_goes_into_another_container_and_waits_on_the_way() -> None:
-    held = Held(nested(FIRST=Scripted(), SEE=nested(AIM=Scripted(), LOOK=Scripted())))
+    held = Held(chain(FIRST=Scripted(), SEE=chain(AIM=Scripted(), LOOK=Scripted())))
     held.hand.pause()
     with held.begin():
         held.waits_before('SM_ROOT/FIRST')
@@ -248,7 +238,7 @@ def test_a_paused_machine_goes_into_another_container_and_waits_on_the_way() -> 
 def test_a_jump_into_another_container_has_the_checks_of_an_experts_jump() -> None:
     gate = Gate()
     pour = Scripted()
-    machine = nested(SEE=nested(POUR=pour, LOOK=Scripted(input_keys=['lamp'])),
+    machine = chain(SEE=chain(POUR=pour, LOOK=Scripted(input_keys=['lamp'])),
                      WAIT=Scripted(gate), LAST=Scripted())
     held = Held(machine, settings={'states': {'POUR': {'on_retry': 'confirm'}}})
     with held.begin():

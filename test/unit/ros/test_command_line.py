@@ -29,7 +29,7 @@ def test_a_script_whose_name_begins_with_a_dash_can_be_named():
 
 def test_every_option_that_takes_a_value_is_known_to_the_splitter():
     takes_value = {name for action in make_parser()._actions for name in action.option_strings
-                   if action.nargs != 0 and name.startswith('--')}
+                   if action.nargs not in (0, '?') and name.startswith('--')}
     assert takes_value == set(OPTIONS_WITH_VALUE)
 
 

@@ -246,3 +246,29 @@ def test_states_start_unpreempted_and_a_request_can_be_recalled():
     assert state.preempt_requested()
     state.recall_preempt()
     assert not state.preempt_requested()
+
+
+@pytest.mark.improvement
+def test_a_preempt_between_two_runs_stops_one_state_after_an_error_too():
+    seen = []
+
+    class Told(smach.State):
+        def __init__(self, label):
+            smach.State.__init__(self, outcomes=['ok'])
+            self.label = label
+
+        def execute(self, ud):
+            seen.append((self.label, self.preempt_requested()))
+            self.service_preempt()
+            if seen == [('A', False), ('B', False)]:
+                raise RuntimeError('the first time')
+            return 'ok'
+    machine = smach.StateMachine(outcomes=['ok'])
+    with machine:
+        smach.StateMachine.add('A', Told('A'), {'ok': 'B'})
+        smach.StateMachine.add('B', Told('B'), {'ok': 'ok'})
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine.execute()
+    machine.request_preempt()
+    assert machine.execute() == 'ok'
+    assert seen[2:] == [('A', True), ('B', False)]

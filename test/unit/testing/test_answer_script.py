@@ -1,7 +1,8 @@
 """An expert by script answers what its script says, and nothing else."""
 import pytest
-from bench_machines import Works, fetch_machine, nested_machine
+from bench_machines import OUTCOMES, Works, fetch_machine, nested_machine
 
+import smach
 from smach_oracle.testing import (
     Bench,
     ScriptError,
@@ -123,3 +124,24 @@ def test_answers_that_nobody_needed_are_counted():
     script = expert(goto('DETECT'), goto('DETECT'))
     trial_with(script).assert_recovered()
     assert script.left == 1
+
+
+def two_rooms():
+    machine = smach.StateMachine(OUTCOMES)
+    with machine:
+        smach.StateMachine.add('KITCHEN', fetch_machine(), {'succeeded': 'HALL'})
+        smach.StateMachine.add('HALL', fetch_machine(), {'succeeded': 'TABLE'})
+        smach.StateMachine.add('TABLE', Works())
+    return machine
+
+
+@pytest.mark.parametrize('state', ['KITCHEN/PICK', 'SM_ROOT/KITCHEN/PICK'])
+def test_goto_leads_to_a_state_of_another_container_by_its_path(state):
+    trial = trial_with(expert(goto(state)), fail('TABLE', visit=1), machine=two_rooms())
+    trial.assert_jumped('TABLE', to='KITCHEN/PICK').assert_ended_with('succeeded')
+    trial.assert_visited(['KITCHEN/PICK', 'HALL/PICK', 'TABLE', 'KITCHEN/PICK', 'TABLE'])
+
+
+def test_a_label_that_several_other_containers_have_needs_its_path():
+    with pytest.raises(ScriptError, match='it is in SM_ROOT/HALL, SM_ROOT/KITCHEN: name'):
+        trial_with(expert(goto('PICK')), fail('TABLE', visit=1), machine=two_rooms())

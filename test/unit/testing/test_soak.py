@@ -152,3 +152,21 @@ def test_what_cannot_be_soaked_is_refused(machine, more, said):
     with pytest.raises(FaultError) as refused:
         soak(machine, trials=1, **more)
     assert said in str(refused.value)
+
+
+@pytest.mark.parametrize('given', [{'trials': 0}, {'trials': -1}, {'most_in_row': 0},
+                                   {'trials': 2.0}, {'most_in_row': True}])
+def test_a_soak_that_would_show_nothing_is_refused(given):
+    name, value = list(given.items())[0]
+    with pytest.raises(FaultError, match='{} is {!r}; give a whole number'.format(name, value)):
+        soak(fetch_machine, **dict({'trials': 2}, **given))
+
+
+def test_a_trial_of_a_soak_has_a_number_from_1():
+    with pytest.raises(FaultError, match='number is 0'):
+        soak_trial(fetch_machine, 0)
+
+
+def test_one_name_is_not_read_letter_by_letter():
+    with pytest.raises(FaultError, match="kinds: 'none' .*; allowed is a list of outcome"):
+        soak(machine_with_one_cup, trials=1, kinds='none')

@@ -175,8 +175,10 @@ def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
     free = [label for (path, label), blocked in choices.states.items()
             if path == container and not blocked]
     if target not in choices.states:
-        raise AnswerError('{} has no state {!r} to go to; allowed: {}'.format(
-            container or choices.container, answer.state, names(free)))
+        elsewhere = [path for path, label in choices.states if label == answer.state]
+        raise AnswerError('{} has no state {!r} to go to; allowed: {}{}'.format(
+            container or choices.container, answer.state, names(free),
+            '; it is in {}: name the container'.format(names(elsewhere)) if elsewhere else ''))
     if choices.states[target]:
         raise AnswerError('{} cannot be entered now: {}; allowed: {}'.format(
             answer.state, choices.states[target], names(free)))

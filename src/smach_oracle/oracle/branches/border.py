@@ -1,6 +1,6 @@
 """Concurrences and Iterators of a wrapped tree: their branches, and where an Iterator goes on."""
 import threading
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, cast
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, cast
 
 import smach
 
@@ -29,6 +29,7 @@ class Border:
         self.below: Tuple[str, ...] = ()  # labels that lead to it from there
         self._lock = threading.Lock()
         self._is_in_use = False
+        self._resumed: Optional[Tuple[Dict[str, Any], Tuple[str, ...], int]] = None
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
@@ -53,6 +54,25 @@ class Border:
                           data={BRANCHES: list(self.machines)})
         self._take_places()
         return True
+
+    # -- going on after the program was stopped
+
+    def resume(self, keys: Mapping[str, Any], gone: Iterable[str], item: int) -> None:
+        """Have this userdata at the next execution, once its inputs are copied.
+
+        `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1;
+        0: the first.
+        """
+        self._resumed = dict(keys), tuple(gone), item
+
+    def take_over_userdata(self) -> None:
+        """Have the userdata that `resume` was given, at the first execution after it."""
+        resumed, self._resumed = self._resumed, None
+        if resumed is not None:
+            data = self.container.userdata._data
+            for key in resumed[1]:
+                data.pop(key, None)
+            data.update(resumed[0])
 
     def _runs_in_tree(self) -> bool:
         top = self.top
@@ -152,6 +172,11 @@ class IteratorBorder(Border):
         """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
         return self._items.in_words() if self._is_in_use and self._items is not None else ''
 
+    @property
+    def item_number(self) -> int:
+        """Number of the item under way, from 1; 0: none is."""
+        return self._items.number if self._is_in_use and self._items is not None else 0
+
     # -- going on
 
     def ask_to_go_on(self, go_on: bool) -> None:
@@ -175,6 +200,7 @@ class IteratorBorder(Border):
         if items is None or items.given is not iterator._items:
             items = TrackedItems(iterator._items, self._tell)
         self.goes_on = items.goes_on = may and items.has_rest()
+        items.begins_with = 1 if self._resumed is None else self._resumed[2]
         if self.goes_on:
             self._pass_on(dict(self.states()))
         else:

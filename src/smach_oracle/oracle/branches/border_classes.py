@@ -55,6 +55,13 @@ class _Bordered:
             reduced[3:])
 
 
+    def _copy_input_keys(self, parent_ud: Optional[smach.UserData],
+                         ud: smach.UserData) -> None:
+        base: Any = super()
+        base._copy_input_keys(parent_ud, ud)
+        self._oracle_border.take_over_userdata()
+
+
 class _BorderedIterator(_Bordered):
     _oracle_border: IteratorBorder
 

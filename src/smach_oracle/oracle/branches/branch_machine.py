@@ -50,6 +50,9 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
         smach.logwarn('{}: a branch does not begin, as the state around it was abandoned'.format(
             node.path))
         return None
+    if node.ended_before is not None:
+        outcome, node.ended_before = node.ended_before, None
+        return outcome
     node.engine.begin_execution()
     node.preempt_told = node.gave_up = False
     node.departure = None

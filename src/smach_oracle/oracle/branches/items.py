@@ -17,6 +17,7 @@ class TrackedItems:
         """`given`: an iterable, or a callable that returns one; `tell` takes words for the log."""
         self.given = given
         self.goes_on = False
+        self.begins_with = 1  # number of the item that is the first where it begins anew
         self.number = 0  # of the item under way, from 1; 0: none
         self.is_finished = True  # the item under way
         self.is_exhausted = False
@@ -58,6 +59,16 @@ class TrackedItems:
         self._count = len(source) if isinstance(source, Sized) else None
         self.number, self.is_finished, self.is_exhausted = 0, True, False
         self._is_pending, self._error = False, None
+        self._pass_over()
+
+    def _pass_over(self) -> None:
+        """Leave out the items that were finished before the program was stopped."""
+        passed, self.begins_with = max(0, self.begins_with - 1), 1
+        for _ in range(passed):
+            next(cast(Iterator[object], self._items), None)
+        self.number = passed
+        if passed:
+            self._tell('goes on with item {}'.format(passed + 1))
 
     def _source(self) -> Iterable[object]:
         return self.given() if callable(self.given) else self.given
@@ -134,3 +145,13 @@ class TrackedItems:
 
     def __str__(self) -> str:
         return str(self.given)
+
+
+def can_be_indexed(iterator: Any) -> bool:
+    """Whether what an Iterator goes through has the same items in the same order each time."""
+    items = getattr(iterator, '_items', None)
+    items = items.given if isinstance(items, TrackedItems) else items
+    if callable(items):
+        return True  # whoever makes them anew says what they are
+    return (hasattr(items, '__len__') and hasattr(items, '__getitem__')
+            and not hasattr(items, 'keys'))

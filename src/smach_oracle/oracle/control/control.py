@@ -70,6 +70,7 @@ class Control:
         with self._changed:
             self._jumps.clear()
             self._moving.clear()
+            self._stopping = False  # of a stop that came between two trials
             self.in_trial = True
             self._note_change()
 
@@ -202,10 +203,16 @@ class Control:
                 self._note_change()
 
     def stop(self) -> None:
-        """Lift the pause for a stop: what waits ends, and nothing more is held in this trial."""
+        """Lift the pause for a stop: what waits ends, and nothing is held until it is serviced."""
         with self._changed:
             self.paused, self.paused_by, self._stopping = False, '', True
             self._note_change()
+
+    def stop_is_over(self) -> None:
+        """Hold again what is to be held: the machine goes on after a stop that was serviced."""
+        if self._stopping:
+            with self._changed:
+                self._stopping = False
 
     def resume(self) -> Tuple[Hold, ...]:
         """Lift the pause; return what waited because of it, or was sent from where it waited."""

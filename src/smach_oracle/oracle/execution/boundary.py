@@ -47,6 +47,8 @@ def _locked(node: TreeNode) -> Iterator[None]:
 def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
     stops = machine.preempt_requested() or _is_to_stop(node)
+    if not (stops or was_preempted):
+        control.stop_is_over()
     jump = None if stops else control.take_jump(node.key)
     if jump is not None and make_jump(node, jump):
         return Stop()  # to the next boundary, which is before that state

@@ -11,6 +11,7 @@ import smach
 from ..machine.nesting import machines_below
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..places.handing_over import links_to
 from ..places.levels import levels_above
 from ..places.way import repeated_on, why_closed_on
 from ..records.events import FailureKind
@@ -56,7 +57,8 @@ class Departure:
 def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     """Leave the containers between a failure and the level that goes on; whether they are left.
 
-    They are not where another departure came before, such as that of a concurrent branch.
+    They are not where another departure came before, such as that of a concurrent branch. That one
+    leaves the containers in between, too.
 
     To be called in the thread of the failed state's container, its lock not held: what runs in the
     containers is preempted.
@@ -65,20 +67,26 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     left = [] if arrives_at is None else _left_for(node, arrives_at)
     if arrives_at is None or not left:
         return False
-    if not _claim([*left, arrives_at],
-                  Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))):
+    departure = Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))
+    nodes = [*left, arrives_at]
+    others = _claim(nodes, departure)
+    if others:
+        _preempt(_container_apart(nodes, others))
         return False
-    state = arrives_at.machine._current_state
     where = (verdict.way.down[-1].path if verdict.way is not None
              else 'its end with {}'.format(verdict.ending.outcome))
     smach.loginfo('{}/{} is left for {}'.format(arrives_at.path, arrives_at.machine._current_label,
                                                 where))
+    _preempt(arrives_at.machine._current_state)
+    return True
+
+
+def _preempt(state: Optional[smach.State]) -> None:
     try:
         if state is not None:
             state.request_preempt()
     except Exception as err:  # it is the user's
         smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
-    return True
 
 
 def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
@@ -91,18 +99,43 @@ def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
     return []
 
 
-def _claim(nodes: List[TreeNode], departure: Departure) -> bool:
-    tree = departure.arrives_at.tree
-    with tree.departures_lock:
-        if any(each.departure is not None for each in nodes):
-            return False
-        for each in nodes:
-            each.departure = departure
-    for each in nodes[1:]:
+def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
+    """Have containers left by a departure; return from where on another one has come before.
+
+    Those below are then left by that other one.
+    """
+    with departure.arrives_at.tree.departures_lock:
+        first = next((index for index, each in enumerate(nodes) if each.departure is not None),
+                     len(nodes))
+        others = nodes[first:]
+        leaving = others[0].departure if others else departure
+        for each in nodes[:first]:
+            each.departure = leaving
+    for each in nodes[1:first]:
         record = each.records.by_label.get(each.machine._current_label or '')
         if record is not None:
             record.retire_edges()  # its visit ends by no plain success
-    return True
+    return others
+
+
+def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[smach.State]:
+    """Return the outermost container around a failure that another departure does not leave.
+
+    What runs in it was preempted by that one, but may have gone on. None where it is the failed
+    state's own.
+
+    :param others: the last ones of `nodes`, which the other departure leaves.
+    """
+    inner = nodes[:-len(others)]
+    other = cast(Optional[Departure], others[0].departure)
+    if not inner or other is None:
+        return None
+    path = others[0].path
+    for label, link in zip(inner[-1].below, links_to(inner[-1])):
+        path = '{}/{}'.format(path, label)
+        if not other.failed.startswith(path + '/'):
+            return None if link.below is nodes[0].machine else link.below
+    return None
 
 
 def take_departure(node: TreeNode) -> Optional[Departure]:

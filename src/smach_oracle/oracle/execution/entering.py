@@ -39,8 +39,13 @@ def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
 
 
 def missing_for(way: Way, written: Collection[str]) -> Tuple[str, ...]:
-    """Return the input keys that a place would not find; `written`: what is written for it."""
+    """Return the input keys that a place would not find.
+
+    :param written: keys of the container that holds the whole way, written for it.
+    """
     node, label = way.down[-1]
+    if node is not way.meets:
+        return missing_on(way, written)  # keys of its own may have the same names
     remapping = node.machine._remappings.get(label) or {}
     return tuple(key for key in missing_on(way, written)
                  if remapping.get(key, key) not in written)

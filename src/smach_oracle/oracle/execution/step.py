@@ -14,7 +14,7 @@ from ..machine.workers import recall_preempts
 from ..places.stepping_back import failure_context
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
-from ..records.state_record import StateRecord
+from ..records.state_record import StateRecord, Unfinished
 from ..records.visits import VisitResult
 from ..recovery.failure import (
     ContainerEnding,
@@ -32,6 +32,7 @@ from .boundary import Stop, pass_boundary
 from .departure import Departure, is_settled, leaving_outcome, take_departure
 from .oracle_visit import OracleVisit
 from .passed_over import tell_passed_over
+from .resumed_visit import ResumedVisit
 from .starting_over import keep_start
 from .transitions import go_to, message_of, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
@@ -113,6 +114,8 @@ class Step:
         when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
+        if record.unfinished is not None:
+            return record.take_unfinished()
         entered_by_oracle, way_down = record.entered_by_oracle, record.way_down
         if entered_by_oracle or way_down:
             record.forget_entry()
@@ -183,6 +186,8 @@ class Step:
                 return self._taken_out(outcome)
             outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
+        if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
+            return self._unfinished(judged, outcome)
         stopping = self._machine.preempt_requested() or smach.is_shutdown()
         if self._machine.preempt_requested():
             node.tell_preempt()
@@ -229,6 +234,20 @@ class Step:
             recall_preempts(self._machine._states[record.label])  # it services none
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         return OracleVisit(node, record, failure).run(self._context(), False)
+
+    def _unfinished(self, failure: Failure, before: Unfinished) -> Optional[str]:
+        """Go on with a visit that was begun before the program was stopped.
+
+        It teaches nothing. A failure from before is counted and told already.
+        """
+        node, record = self._node, self._record
+        if self._machine.preempt_requested() or smach.is_shutdown():
+            return self._end_unrecovered(self._preempted_ending(failure), failure)
+        if failure.kind is FailureKind.INTERRUPTED:
+            node.emit(EventKind.FAILURE, state=failure.state, failure_kind=int(failure.kind),
+                      failure_class=int(record.failure_class), rate=record.rate,
+                      text=failure.text)
+        return ResumedVisit(node, record, failure, before.asks).run(self._context(), False)
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
         """Go on after a failure while the robot was not well; `why`: see `why_unwell_after`."""

@@ -2,10 +2,13 @@
 
 Also what one execution of any container begins and ends.
 """
+import time
 from typing import Any, Callable, Dict, Optional
 
 import smach
 
+from ..checkpoint.resuming import Resumption, tell_resumed
+from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.repeats import begin_watching
@@ -25,13 +28,16 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         smach.logwarn('{}: does not begin, as the state around it was abandoned'.format(node.path))
         return None
     if node.has_running_ancestor():
-        return _run(node, execute)
+        outcome, node.ended_before = node.ended_before, None
+        return _run(node, execute) if outcome is None else outcome
     adopt(machine)
     for each in nodes_of(machine):
         bring_up_to_date(each)
     if node.tree.recover:
         node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
-    node.tree.begin_trial(machine.new_trial_id())
+    store = open_store(node)
+    resumed = None if store is None else store.to_resume()
+    node.tree.begin_trial(machine.new_trial_id() if resumed is None else resumed.trial.trial_id)
     for each in nodes_of(machine):
         # one that still runs was abandoned in an earlier trial, and is left there
         if not each.machine.is_running():
@@ -39,13 +45,19 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
     begin_watching(node)
     node.tree.restarts.begin_trial(may_start_over(node))
     node.tree.budget.begin(node.settings.budget)
-    return _run_trial(node, execute)
+    if store is not None:
+        store.begin_trial(resumed)
+    return _run_trial(node, execute, store, resumed)
 
 
-def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
-    node.emit(EventKind.TRIAL_START, data={
-        'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
-        'settings': _settings(node)})
+def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
+               store: Optional[TrialStore], resumed: Optional[Resumption]) -> Optional[str]:
+    if resumed is None:
+        node.emit(EventKind.TRIAL_START, data={
+            'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
+            'settings': _settings(node)})
+    else:
+        tell_resumed(node, resumed)
     node.tree.control.begin_trial()
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
@@ -57,9 +69,12 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional
         raise
     finally:
         node.tree.control.end_trial()
+        why = _trial_end(node, outcome, error)
         node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
-                  data={ENDED_BY: _trial_end(node, outcome, error).value, **_learned(node)})
+                  data={ENDED_BY: why.value, **_learned(node)})
         save_rates(node)
+        if store is not None:
+            store.end(why, outcome or '', time.time())
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
@@ -96,7 +111,8 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
 def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     machine = node.machine
     node.begin_execution()
-    node.emit(EventKind.CONTAINER_START, state=node.entry or machine._initial_state_label or '')
+    begins_in = (node.entry if node.resuming is None else node.resuming.label)
+    node.emit(EventKind.CONTAINER_START, state=begins_in or machine._initial_state_label or '')
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
     try:

@@ -5,7 +5,7 @@ The trial, its events, the expert, the threads that were left behind.
 import itertools
 import threading
 import uuid
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, Mapping, Optional
 
 import smach
 
@@ -73,6 +73,16 @@ class Tree:
         self.trials += 1
         self._questions = 0
         self.events.begin_trial(trial_id)
+
+    def go_on_counting(self, visits: int, whole: Mapping[str, Any]) -> None:
+        """Number visits behind `visits`, and go on with what the stored trial had spent."""
+        self._visits = itertools.count(visits + 1)
+        self._questions = int(whole.get('questions', 0))
+        self.budget.go_on(whole.get('budget'))
+
+    def spent(self) -> Dict[str, Any]:
+        """Return what a trial that goes on needs of what is spent, as plain data."""
+        return {'questions': self._questions, 'budget': self.budget.spent()}
 
     def next_visit(self) -> int:
         """Return the number of the next visit of a state, in whichever container."""

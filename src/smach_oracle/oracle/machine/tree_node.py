@@ -80,6 +80,20 @@ class DeparturePort(Protocol):
         """That level."""
 
 
+class EntryPort(Protocol):
+    """Where a container goes on whose program was stopped (`checkpoint.resuming`)."""
+
+    @property
+    def label(self) -> str:
+        """The state in which it goes on."""
+
+    def take_over_records(self, node: 'TreeNode') -> None:
+        """Have the visits of the execution that was stopped."""
+
+    def enter(self, node: 'TreeNode') -> None:
+        """Have the userdata as it was, and the state in which it goes on as the current one."""
+
+
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -109,6 +123,9 @@ class TreeNode:
         # where a verdict from below or here ends the present state
         self.departure: Optional[DeparturePort] = None
         self.entry = ''  # the state in which the next execution begins; '': its initial one
+        self.resuming: Optional[EntryPort] = None  # at the next execution
+        # outcome of the next execution, which was over before the program was stopped
+        self.ended_before: Optional[str] = None
         self.gave_up = False  # the latest execution ended so
         # the states that are executed as preconditions now
         self.as_preconditions: Tuple[smach.State, ...] = ()
@@ -293,6 +310,8 @@ class TreeNode:
         self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()
+        if self.resuming is not None:
+            self.resuming.take_over_records(self)
 
     def begin_stepping(self) -> None:
         """At the first state of an execution, look at what the engine is like."""

@@ -2,7 +2,7 @@
 import contextlib
 import threading
 from time import monotonic
-from typing import Any, Iterator, Optional, Tuple
+from typing import Any, Iterator, List, Optional, Sequence, Tuple
 
 from ..settings.budget import Budget
 
@@ -27,6 +27,20 @@ class TrialBudget:
             self._recoveries = self._questions = 0
             self._begun_s = self._stands_since_s = monotonic()
             self._stood_s = 0.0
+
+    def spent(self) -> List[float]:
+        """Return the recoveries, the questions and the seconds spent."""
+        with self._lock:
+            self._note()
+            return [self._recoveries, self._questions,
+                    monotonic() - self._begun_s - self._stood_s]
+
+    def go_on(self, spent: Optional[Sequence[float]]) -> None:
+        """Go on after `begin` with what was spent before; None: nothing."""
+        if spent:
+            with self._lock:
+                self._recoveries, self._questions = int(spent[0]), int(spent[1])
+                self._begun_s -= spent[2]
 
     @contextlib.contextmanager
     def stands_still(self) -> Iterator[None]:

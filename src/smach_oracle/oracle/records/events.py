@@ -48,6 +48,7 @@ class EventKind(IntEnum):
     HOLD_END = 28
     ANNOUNCE = 29
     SENT = 30
+    RESUMED = 31
 
 
 class FailureKind(IntEnum):
@@ -59,6 +60,7 @@ class FailureKind(IntEnum):
     EXCEPTION = 3
     UNREGISTERED_OUTCOME = 4
     TIME_LIMIT = 5
+    INTERRUPTED = 8  # the program was stopped while it ran
     # not failures, but causes to ask an expert: of questions alone (ExpertQuery.action)
     HELD_BACK = 6  # it was not executed, since it is not to be repeated
     STILL_RUNNING = 7
@@ -110,6 +112,16 @@ class EventSource:
             self.trial_id = trial_id
             self._seq = 0
             self._over = False
+
+    @property
+    def last_seq(self) -> int:
+        """Number of the last event; -1 before the first."""
+        return self._seq - 1
+
+    def go_on_behind(self, seq: int) -> None:
+        """Number the coming events of the trial from `seq` + 1."""
+        with self._lock:
+            self._seq = seq + 1
 
     def emit(self, kind: EventKind, path: str, of_trial: Optional[str] = None,
              **fields: Any) -> None:

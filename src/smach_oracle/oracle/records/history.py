@@ -8,7 +8,7 @@ the present state began to fail (`succeeded_before`, the prose). Both are kept u
 come in, so no walk over the chain is ever needed.
 """
 from collections import deque
-from typing import Deque, NamedTuple, Optional, Tuple
+from typing import Any, Deque, List, NamedTuple, Optional, Tuple
 
 from ..decision.policy import FailureContext
 from .visits import Visit, VisitResult
@@ -24,6 +24,16 @@ class _Streak(NamedTuple):
     successes: int  # of that state in all, when it failed
     anchor: Optional[str]
     anchored: bool  # whether `anchor` was looked up in this execution's chain
+
+
+class _CountedVisits(Deque[Visit]):
+    """Visits, with their number, those that are gone included."""
+
+    added = 0
+
+    def append(self, visit: Visit) -> None:
+        super().append(visit)
+        self.added += 1
 
 
 _NO_STREAK = _Streak(None, 0, None, False)
@@ -57,12 +67,31 @@ class History:
         that goes on failing gets a new goal for its steps back, from the new chain.
         """
         self.visits.clear()
+        if isinstance(self.visits, _CountedVisits):
+            self.visits.added = 0
         self.unconditioned = self.succeeded = self.succeeded_other = None
         self._streak = self._streak._replace(anchor=None, anchored=False)
 
     def resize(self, length: int) -> None:
         """Keep the latest `length` visits from now on."""
-        self.visits = deque(self.visits, maxlen=length)
+        added = self.visits_of_execution
+        kind = type(self.visits)
+        self.visits = kind(self.visits, maxlen=length)
+        if isinstance(self.visits, _CountedVisits):
+            self.visits.added = added
+
+    def count_visits(self) -> None:
+        """Know from now on how many visits this execution has had."""
+        if not isinstance(self.visits, _CountedVisits):
+            counted = _CountedVisits(self.visits, maxlen=self.visits.maxlen)
+            counted.added = len(counted)
+            self.visits = counted
+
+    @property
+    def visits_of_execution(self) -> int:
+        """Number of visits of this execution, where they are counted; else of those kept."""
+        return (self.visits.added if isinstance(self.visits, _CountedVisits)
+                else len(self.visits))
 
     def visited(self, visit: Visit, has_preconditions: bool) -> None:
         """Add a visit that has ended."""
@@ -126,6 +155,27 @@ class History:
 
     def _latest_other(self, state: str) -> Optional[str]:
         return self.succeeded if self.succeeded != state else self.succeeded_other
+
+    def told(self) -> List[Any]:
+        """Return all but the visits as plain data, for `take_over`."""
+        return [self.unconditioned, self.succeeded, self.succeeded_other, list(self._streak),
+                list(self._before)]
+
+    def take_over(self, visits: List[Visit], number: int, told: List[Any]) -> None:
+        """Go on from another history: its latest visits, their number in all, and what it told.
+
+        :raises ValueError: where `told` is none of a history.
+        """
+        try:
+            unconditioned, succeeded, succeeded_other, streak, before = told
+            streaks = _Streak(*streak), _Streak(*before)
+        except TypeError as err:
+            raise ValueError('that is no history: {}'.format(err)) from err
+        self.visits = _CountedVisits(visits, maxlen=self.visits.maxlen)
+        self.visits.added = number
+        self.unconditioned, self.succeeded = unconditioned, succeeded
+        self.succeeded_other = succeeded_other
+        self._streak, self._before = streaks
 
     def latest(self) -> Tuple[Visit, ...]:
         """Return the latest visits, oldest first."""

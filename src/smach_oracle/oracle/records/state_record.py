@@ -1,10 +1,21 @@
 """What the oracle remembers of one state of a container. Pure; no smach."""
 import threading
-from typing import Any, Dict, Mapping, Optional, Protocol, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
 from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
+from ..records.events import FailureKind
 from ..records.visits import Visit
 from ..settings.settings import StateSettings
+
+
+class Unfinished(NamedTuple):
+    """In place of an execution: how a state stood when the program was stopped."""
+
+    kind: FailureKind
+    outcome: str
+    text: str
+    asks: str  # why a person is asked at once, '' where nobody is
+    snapshot: Optional[Mapping[str, Any]] = None  # userdata with which it began
 
 
 class FastEdge:
@@ -68,7 +79,9 @@ class StateRecord:
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
                  'unwell_repeats',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
-                 'way_down', '_is_special', '_estimator', '_lock', '_learned', '_retired',
+                 'way_down', 'unfinished', 'open_question', '_is_special', '_estimator', '_lock',
+                 '_learned',
+                 '_retired',
                  '_edges', '_visits', '_visits_before')
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
@@ -87,6 +100,8 @@ class StateRecord:
         self.entered_by_oracle = False  # at the coming visit
         # at the coming visit: the state in which each container below it begins
         self.way_down: Tuple[Any, ...] = ()
+        self.unfinished: Optional[Unfinished] = None  # in place of the coming visit
+        self.open_question = ''  # id of one that was open when the program was stopped
         self._learned = 0  # successes by way of edges that the estimator knows
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
@@ -113,7 +128,8 @@ class StateRecord:
     def be_special(self, special: bool) -> None:
         """Have more done than to execute the state, which a time limit wants in any case."""
         self._is_special = special or self.settings.time_limit_s is not None
-        self.special = self._is_special or self.entered_by_oracle or bool(self.way_down)
+        self.special = (self._is_special or self.entered_by_oracle or bool(self.way_down)
+                        or self.unfinished is not None)
 
     def enter_by_oracle(self) -> None:
         """Note that the oracle leads to the state, which is visited next."""
@@ -123,6 +139,32 @@ class StateRecord:
         """Note in which state each container below begins at the visit that is next."""
         self.way_down = way_down
         self.special = self.special or bool(way_down)
+
+    def resume(self, unfinished: Unfinished) -> None:
+        """Note that the coming visit is one that was begun before the program was stopped."""
+        self.unfinished, self.special = unfinished, True
+
+    def take_question(self) -> str:
+        """Return the id of the question that is open again, once; '' where none is."""
+        question, self.open_question = self.open_question, ''
+        return question
+
+    def take_unfinished(self) -> Optional[Unfinished]:
+        """Return what stands in place of the coming visit, once."""
+        unfinished, self.unfinished = self.unfinished, None
+        if unfinished is not None and unfinished.snapshot is not None:
+            self.snapshot = dict(unfinished.snapshot)
+        self.be_special(self._is_special)
+        return unfinished
+
+    def go_on(self, counts: List[int], longest_s: Optional[float]) -> None:
+        """Go on counting: visits, recoveries, fallbacks, and repeats while not well, of the trial.
+
+        :raises ValueError: where these are not four numbers.
+        """
+        visits, self.recoveries, self.fallbacks, self.unwell_repeats = counts
+        self._visits_before = self._visits + self._by_edges() - visits
+        self.longest_s = longest_s
 
     def forget_entry(self) -> None:
         """Note that the visit to which the oracle led begins now, or never."""
@@ -222,7 +264,7 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=_NO_VIEW, way_down=())
+        state.update(snapshot=None, view=_NO_VIEW, way_down=(), unfinished=None)
         del state['_lock']
         return state
 

@@ -7,7 +7,7 @@ import smach
 from ..machine.nesting import items_under_way
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
-from ..records.state_record import StateRecord
+from ..records.state_record import StateRecord, Unfinished
 from .failure import (
     Failure,
     Route,
@@ -52,6 +52,8 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
                        _once(partial(raised_error, label, state, error)), traceback_of(error))
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
+    if isinstance(outcome, Unfinished):
+        return _failure_before(node, label, outcome)
     if isinstance(outcome, HeldBack):
         return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
     if outcome not in state.get_registered_outcomes():
@@ -77,6 +79,17 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
 def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
     """Have an error made once: SMACH logs each that is made."""
     return lru_cache(maxsize=1)(make)
+
+
+def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
+    """Return the failure of a visit that was begun before the program was stopped."""
+    route = route_of(node.machine, label, before.outcome) if before.outcome else None
+    error = None
+    if route is None or not route.target:
+        route = None
+        if before.kind not in (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT):
+            error = partial(smach.InvalidUserCodeError, '{}: {}'.format(label, before.text))
+    return Failure(label, before.kind, before.outcome, before.text, route, error)
 
 
 def _description(node: TreeNode, label: str, state: smach.State) -> str:

@@ -32,8 +32,9 @@ def make_question(node: TreeNode, record: StateRecord, failure: Failure, account
     machine = node.machine
     state = machine._states[record.label]
     return Question(
-        question_id=node.tree.next_question_id(), trial_id=node.tree.trial_id,
-        container_path=node.path, failed_state=record.label, failure_kind=failure.kind,
+        question_id=record.take_question() or node.tree.next_question_id(),
+        trial_id=node.tree.trial_id, container_path=node.path, failed_state=record.label,
+        failure_kind=failure.kind,
         outcome=failure.outcome, text=failure.text, failure_class=int(record.failure_class),
         rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
         reason=account.reason, tried=account.tried, history=node.records.history.latest(),

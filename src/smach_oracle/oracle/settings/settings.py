@@ -15,6 +15,7 @@ from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
+from .on_resume import checked_on_resume
 from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .policy_choice import checked_policy
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
@@ -75,6 +76,11 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY),
                                    _MAX_HISTORY),
     'rates_file': values.file,
+    'checkpoint': values.file,
+    'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
+    'on_resume': checked_on_resume,
+    'resume_from': values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62),
+    'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
     'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
@@ -90,8 +96,6 @@ class Settings:
 
     defaults: StateSettings = StateSettings()
     policy: str = 'prose'
-    # those that are not the policy's defaults
-    policy_parameters: Mapping[str, float] = field(default_factory=dict)
     failing_outcomes: Tuple[str, ...] = DEFAULT_FAILING_OUTCOMES
     userdata: str = 'restore'
     deep_copy_keys: Tuple[str, ...] = ()
@@ -118,6 +122,14 @@ class Settings:
     still_running_factor: float = 10.0
     # whether a step back may lead to what ran before in the container above
     step_back_across: bool = False
+    # those that are not the policy's defaults
+    policy_parameters: Mapping[str, float] = field(default_factory=dict)
+    checkpoint: str = ''  # the store of the trials; '': nothing is stored
+    checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
+    checkpoint_synchronous: str = 'FULL'
+    # what is done about a stored trial that was not finished, and for STATE the path of a state
+    on_resume: Tuple[str, str] = ('ask', '')
+    resume_from: int = 0  # number of the stored moment, 0: the last one of a trial
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

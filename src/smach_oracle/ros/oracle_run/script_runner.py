@@ -40,7 +40,7 @@ from .refusal import USAGE_ERROR, Refusal
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--record',
-                      '--record-topic')
+                      '--record-topic', '--checkpoint', '--from')
 
 
 class CommandLine(NamedTuple):
@@ -99,6 +99,13 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--record', metavar='FOLDER', help='one bag per trial in this folder')
     parser.add_argument('--record-topic', metavar='TOPIC', action='append', default=[],
                         help='record this topic as well (repeatable)')
+    parser.add_argument('--checkpoint', metavar='FILE',
+                        help='store where the machines stand, to go on from there after a crash')
+    parser.add_argument('--resume', metavar='HOW', nargs='?', const='recover',
+                        help='go on with the trial that was stopped; --resume=HOW: recover '
+                        '(default), ask, restart or state:LABEL')
+    parser.add_argument('--from', metavar='NUMBER', type=int, dest='moment',
+                        help='go on from an earlier stored moment of it: its number in the store')
     return parser
 
 
@@ -133,12 +140,25 @@ def parse(args: Sequence[str]) -> Invocation:
         overrides['policy'] = given.policy
     if given.rates_file:
         overrides['rates_file'] = os.path.abspath(path_of(given.rates_file))
+    overrides.update(_stored(given))
     if given.no_nested:
         overrides['nested'] = False
     record = os.path.abspath(path_of(given.record)) if given.record else ''
     return Invocation(script, line.script_args, given.config, overrides, not given.without_oracle,
                       attachment.RecordingOptions(record, tuple(given.record_topic)), given.name,
                       given.check)
+
+
+def _stored(given: argparse.Namespace) -> Dict[str, Any]:
+    """Return the settings about what is stored."""
+    found: Dict[str, Any] = {}
+    if given.checkpoint:
+        found['checkpoint'] = os.path.abspath(path_of(given.checkpoint))
+    if given.resume or given.moment is not None:
+        found['on_resume'] = given.resume or 'recover'
+    if given.moment is not None:
+        found['resume_from'] = given.moment
+    return found
 
 
 def _why_not_readable(script: str) -> str:
@@ -228,6 +248,8 @@ class MachineWrapper:
         loaded = load(self._invocation)
         with _located(loaded):
             settings = read_settings(loaded)
+            if not settings.checkpoint and 'on_resume' in self._invocation.overrides:
+                raise SettingsError('checkpoint', '', 'a file, where a machine is to be resumed')
             if self._invocation.recover:
                 self._check_preconditions(machine, settings)
             self._is_first = False

@@ -231,7 +231,7 @@ class MachinePart(Part, Recovering):
     def arrive(self, label: str, goal: Goal) -> Course:
         """A jump has left the state of that label; a preempt of where it goes ends it."""
         if goal.machine.flag:
-            self.flag = True  # what is left is preempted
+            self._preempt_left(goal)
             self._preempted = self.child(label)
             return (yield from self._ended(label, self.child(label).left_with, False))
         if goal.machine is not self:
@@ -240,6 +240,16 @@ class MachinePart(Part, Recovering):
             self.tell('TRANSITION', label, self.child(label).left_with, self.left_with)
             raise Jumping(goal)
         return (yield from self.follow_from_below(label, goal))
+
+    def _preempt_left(self, goal: Goal) -> None:
+        """What is left is preempted, up to where the jump would have gone."""
+        self.flag = True
+        part: Part = self
+        while part is not goal.machine:
+            part.flag = True
+            if isinstance(part, MachinePart) and part is not self:
+                part._preempted = part.current
+            part = part.parent
 
     def leave(self) -> None:
         """End at once, as preempted."""

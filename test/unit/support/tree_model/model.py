@@ -219,7 +219,7 @@ class Model:
             goal = goal._replace(repeats=self.repeats.repeated_by(goal.machine, goal.label))
         goal = next((beside.goal for beside, _ in way if beside.goal is not None), goal)
         for beside, label in way:
-            if beside.goal is None:
+            if beside.goal is None and goal.machine in _with_ancestors(beside):
                 beside.leave_for(goal, label)
         return Jumping(goal)
 

@@ -100,6 +100,8 @@ class Recovering:
             target = self.memory.step_back_target(self.run.plan.policy, label)
         if target and self.run.repeats.repeated_by(self, target):
             action, target, by = 'ask', '', 'on_retry'
+        elif target and self.run.is_spent('recoveries'):
+            action, target, by = 'ask', '', 'budget'  # by a branch beside, meanwhile
         return Decision(action, target, by, written)
 
     def _run_checks(self: Any, label: str, checks: Any, written: Set[str]) -> Course:

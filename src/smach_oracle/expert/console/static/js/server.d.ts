@@ -228,7 +228,7 @@ export type EventKind = 'trial_start' | 'trial_end' | 'container_start' | 'conta
   | 'decision' | 'jump' | 'query_opened' | 'query_claimed' | 'query_released' | 'query_answered'
   | 'query_expired' | 'query_cancelled' | 'interface_start' | 'interface_end' | 'supersede'
   | 'give_up' | 'preempt' | 'warning' | 'health_wait_start' | 'health_wait_end'
-  | 'operator_command' | 'hold_start' | 'hold_end' | 'announce' | 'sent'
+  | 'operator_command' | 'hold_start' | 'hold_end' | 'announce' | 'sent' | 'resumed'
   | `${number}`; // of a later release
 
 export interface TrialEvent {

@@ -15,6 +15,7 @@ import { byContainer, listed, machineOf, resumable, standingWords, waiting } fro
 /** @typedef {'resume_machine' | 'step_machine' | 'confirm_state'} Start */
 
 const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
+const REPLY_LASTS_MS = 20000; // it is of the past then
 const NEEDS_ROLE = 'To let it go on needs the role of an operator.';
 
 export class MachineHand {
@@ -33,6 +34,7 @@ export class MachineHand {
     this.standing = h('p', { class: 'standing', role: 'status' });
     this.goOn = h('div', { class: 'row wrap go-on' });
     this.reply = h('p', { class: 'dim hand-reply', role: 'status' });
+    this.replied = { to: '', at: 0 }; // the command, and when (ms)
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.breakpoints = new Breakpoints((pattern, remove) => this.breakAt(pattern, remove));
     this.root = h('section', { class: 'machine-hand', 'aria-label': 'Stop or hold the machine' },
@@ -72,9 +74,19 @@ export class MachineHand {
     if (!machine) return;
     setText(this.stopButton, '■ Stop ' + machine.path);
     setText(this.standing, standingWords(machine));
+    if (this.replyIsOver(machine)) setText(this.reply, '');
     this.root.classList.toggle('held', machine.paused || waiting(machine).length > 0);
     this.showGoOn(machine);
     this.breakpoints.show(machine.breakpoints, this.app.mayAnswer);
+  }
+
+  /**
+   * Of a pause the line above says the same as soon as the robot tells it.
+   * @param {HeldMachine} machine
+   */
+  replyIsOver(machine) {
+    const { to, at } = this.replied;
+    return (to === 'pause_machine' && machine.paused) || performance.now() - at > REPLY_LASTS_MS;
   }
 
   /** @param {HeldMachine} machine */
@@ -122,11 +134,11 @@ export class MachineHand {
     const { robot } = this;
     try {
       const reply = await this.app.connection.request(command, { robot, path });
-      this.tell(robot, reply.ok, reply.message);
+      this.tell(robot, command, reply);
     } catch (err) {
       unlessLost(err);
       if (command === 'stop_machine' || command === 'pause_machine') {
-        this.tell(robot, false, CANNOT_STOP);
+        this.tell(robot, command, { ok: false, message: CANNOT_STOP });
       }
     }
   }
@@ -136,11 +148,13 @@ export class MachineHand {
    * @param {boolean} remove
    */
   async breakAt(pattern, remove) {
+    setText(this.problem, '');
+    setText(this.reply, '');
     const { robot, machine } = this;
     try {
       const reply = await this.app.connection.request('set_breakpoint', { robot, pattern, remove,
         path: machine?.path || '' });
-      this.tell(robot, reply.ok, reply.message);
+      this.tell(robot, 'set_breakpoint', reply);
       return reply.ok;
     } catch (err) {
       unlessLost(err);
@@ -151,12 +165,14 @@ export class MachineHand {
   /**
    * What a robot has answered, unless another one is shown by now.
    * @param {string} robot
-   * @param {boolean} ok
-   * @param {string} message
+   * @param {string} command
+   * @param {{ ok: boolean, message: string }} reply
    */
-  tell(robot, ok, message) {
+  tell(robot, command, { ok, message }) {
     if (robot !== this.robot) return;
+    this.replied = { to: command, at: performance.now() };
     setText(this.reply, ok ? message : '');
     setText(this.problem, ok ? '' : message);
+    this.update();
   }
 }

@@ -1,0 +1,223 @@
+"""Stores where every container of a tree stands, before each state begins."""
+import time
+from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Set, Tuple
+
+import smach
+from smach_oracle.store.codecs import Codecs
+from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, GOAL, IN, ITEMS
+from smach_oracle.store.rows import Fact, NewMoment
+from smach_oracle.store.store_writer import StoreWriter
+
+from ..branches.around import borders_around
+from ..machine.nesting import nodes_of
+from ..machine.tree_node import TreeNode
+from ..records.events import Event, EventKind
+from ..records.facts import JUMPED_TO
+from ..records.running_goals import GOALS
+from .container_facts import ContainerFacts, fact_of
+from .stored_tree import StoredTree
+from .userdata_facts import KeptOut, UserdataFacts, keys_of
+
+SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
+# after these the machine waits until the disk has it
+_COMMITTED = frozenset((
+    EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.FAILURE,
+    EventKind.PRECONDITION_START,
+    EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
+    EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
+    EventKind.HOLD_START, EventKind.SENT))
+_CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
+                     EventKind.QUERY_CANCELLED))
+_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
+
+
+class Checkpointer:
+    """An observer of a tree's events that commits a moment to a store where it is due.
+
+    It is called by the thread in which the step happens, before the machine goes on.
+    """
+
+    def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
+                 before: Optional[StoredTree] = None, behind: Optional[int] = None) -> None:
+        """`before`: what is stored of the trial, where it is resumed.
+
+        `behind`: the moment that it goes on from, where that is not the last one.
+        """
+        self._before, self._behind = before, behind
+        self._top, self._writer, self._codecs = top, writer, codecs
+        self._nodes: Dict[str, TreeNode] = {}
+        self._facts: Dict[str, ContainerFacts] = {}
+        self._userdata: Dict[str, UserdataFacts] = {}
+        self._pending: List[Fact] = []
+        self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
+        self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        self._seq_stored = -1
+        self._told: Set[Tuple[str, str]] = set()
+        self._goals = set(() if before is None else before.goals)  # ids of stored ones
+
+    def __call__(self, event: Event) -> None:
+        """Take one event; see EventSource."""
+        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
+            self._begin_trial()
+        node = self._node_of(event)
+        if node is None:
+            return
+        self._pending += self._items_around(node)
+        self._pending += self._where(event, node)
+        if event.state:
+            self._ran.setdefault(node.key, set()).add(event.state)
+        if event.kind is EventKind.CONTAINER_START and node.resuming is None:
+            self._pending += self._facts_of(node).begin_execution()
+        if event.kind is EventKind.CONTAINER_END:
+            self._pending += self._collected(node, all_keys=True)
+            self._pending += self._around(node)
+        if (event.kind in _COMMITTED or self._ends_branch(event, node)
+                or event.seq >= self._seq_stored + SEQ_RESERVE - 1):
+            self._commit(event, node)
+
+    def goal_begins(self, goal_id: str, server: str) -> None:
+        """Store a goal that is about to be sent."""
+        self._goals.add(goal_id)
+        self._commit_by_hand('GOAL', (fact_of('', GOAL + goal_id, server),))
+
+    def last_words(self) -> None:
+        """Store what has not been stored of the trial, which has ended."""
+        facts = tuple(self._pending) + tuple(
+            fact for node in self._nodes.values() for fact in self._facts_of(node).all_states())
+        self._pending = []
+        self._commit_by_hand('TRIAL_END', facts + tuple(self._ended_goals()))
+
+    def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
+        """Commit a moment that belongs to no event."""
+        top = self._top
+        self._writer.commit(NewMoment(time.time(), top.events.last_seq, kind, top.key, '', facts),
+                            lambda: must_stop(top))
+
+    def _ended_goals(self) -> Iterator[Fact]:
+        """Yield that goals do not run any more."""
+        if self._goals:
+            for goal_id in self._goals.difference(GOALS.running()):
+                self._goals.discard(goal_id)
+                yield Fact('', GOAL + goal_id, None)
+
+    def _begin_trial(self) -> None:
+        self._nodes = {node.key: node for node in nodes_of(self._top.machine)}
+        for node in self._nodes.values():
+            self._pending += self._facts_of(node).all_states()
+        self._pending += self._collected(self._top, all_keys=True)
+        for goal_id, server in GOALS.running().items():
+            self._goals.add(goal_id)
+            self._pending.append(fact_of('', GOAL + goal_id, server))
+
+    def _node_of(self, event: Event) -> Optional[TreeNode]:
+        """Return the container that an event is of: that of a branch goes by its label as well."""
+        for key in ('{}/{}'.format(event.path, event.state), event.path):
+            node = self._nodes.get(key)
+            if node is not None and node.path == event.path:
+                return node
+        found = {node.key: node for node in nodes_of(self._top.machine)}
+        if found.keys() == self._nodes.keys():
+            return None
+        self._nodes = found
+        return self._node_of(event)
+
+    def _facts_of(self, node: TreeNode) -> ContainerFacts:
+        facts = self._facts.get(node.key)
+        if facts is None:
+            facts = self._facts[node.key] = ContainerFacts(node, None if self._before is None else
+                                                           self._before.container(node.key))
+        return facts
+
+    # -- what a moment has
+
+    def _where(self, event: Event, node: TreeNode) -> Iterator[Fact]:
+        """Yield where the container stands after an event."""
+        kind, label = event.kind, event.state
+        if kind is EventKind.STATE_START:
+            yield fact_of(node.key, AT, [label, IN])
+            if isinstance(node.machine._states.get(label), smach.Container):
+                yield from self._not_begun_below('{}/{}'.format(node.key, label))
+        elif kind is EventKind.CONTAINER_START and node.resuming is None:
+            yield fact_of(node.key, AT, [label, BEFORE])
+        elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
+                event.target in node.machine._states and not node.is_oracle(event.target)):
+            yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
+        elif kind is EventKind.FAILURE:
+            yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
+                                         event.text])
+        elif kind is EventKind.QUERY_OPENED:
+            yield fact_of(node.key, ASKED, [label, event.query_id])
+        elif kind in _CLOSES:
+            yield Fact(node.key, ASKED, None)
+        elif kind is EventKind.CONTAINER_END and node.branch is None:
+            yield fact_of(node.key, AT, [event.outcome, ENDED])
+        elif node.branch is not None and kind in _LEAVES:
+            outcome = event.outcome if kind is EventKind.GIVE_UP else event.target
+            if outcome and not node.is_oracle(outcome) and outcome not in node.machine._states:
+                yield fact_of(node.key, AT, [outcome, ENDED])
+
+    def _not_begun_below(self, path: str) -> Iterator[Fact]:
+        """Yield that what is in a container or state has not begun in this visit of it."""
+        yield from (Fact(key, AT, None) for key in list(self._nodes)
+                    if (key + '/').startswith(path + '/'))
+
+    def _ends_branch(self, event: Event, node: TreeNode) -> bool:
+        """Whether a branch has ended, or a machine in a Concurrence: no state follows it."""
+        if node.branch is not None:
+            return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
+        return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
+
+    def _items_around(self, node: TreeNode) -> Iterator[Fact]:
+        """Yield which items the Iterators around a container have come to."""
+        for path, border in borders_around(node):
+            number = getattr(border, 'item_number', 0)
+            if number and self._items.get(path) != number:
+                self._items[path] = number
+                yield fact_of(path, ITEMS, number)
+                yield from self._not_begun_below(path)
+
+    def _commit(self, event: Event, node: TreeNode) -> None:
+        facts = self._pending + list(self._collected(node)) + list(self._ended_goals())
+        facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
+        self._pending = []
+        self._seq_stored = event.seq
+        behind, self._behind = self._behind, None
+        self._writer.commit(
+            NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
+                      tuple(facts), behind), lambda: must_stop(node))
+
+    def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
+        """Yield what is new of a container."""
+        labels = self._ran.pop(node.key, set())
+        yield from self._facts_of(node).changed(list(labels))
+        reached = None if all_keys else frozenset().union(
+            *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
+        yield from self._keys(node.path if node.branch is not None else node.key,
+                              node.machine.userdata._data, reached)
+
+    def _keys(self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
+              ) -> Iterator[Fact]:
+        userdata = self._userdata.get(path)
+        if userdata is None:
+            userdata = self._userdata[path] = UserdataFacts(
+                self._codecs, path, lambda out: self._tell(path, out))
+        yield from userdata.changed(data, reached)
+
+    def _around(self, node: TreeNode) -> Iterator[Fact]:
+        """Yield what is new of the userdata into which the outputs of a container have gone."""
+        for path, border in borders_around(node):
+            yield from self._keys(path, border.container.userdata._data, None)
+        if node.parent is not None and len(node.below) == 1:
+            yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
+
+    def _tell(self, path: str, out: KeptOut) -> None:
+        if (path, out.key) in self._told:
+            return
+        self._told.add((path, out.key))
+        smach.logwarn('{}: userdata key {!r} ({}) cannot be stored: {}. It will be missing where '
+                      'the machine is resumed'.format(path, out.key, out.kind, out.why))
+
+
+def must_stop(node: TreeNode) -> bool:
+    """Whether nobody may wait any longer."""
+    return node.machine.preempt_requested() or bool(smach.is_shutdown())

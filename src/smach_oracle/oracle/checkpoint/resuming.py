@@ -1,0 +1,243 @@
+"""Sets a tree to where a stored trial stood, so that its execution goes on from there."""
+import time
+from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
+
+import smach
+from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
+from smach_oracle.store.rows import StoredTrial
+
+from ..branches.around import borders_in
+from ..branches.border import border_of
+from ..branches.items import can_be_indexed
+from ..errors import SettingsError
+from ..machine.nesting import nodes_of
+from ..machine.tree_node import TreeNode
+from ..places.place import Place, place_named, places_of
+from ..places.way import way_to
+from ..records.events import EventKind, FailureKind
+from ..records.running_goals import GOALS
+from ..records.state_record import StateRecord, Unfinished
+from .checkpointer import SEQ_RESERVE, must_stop
+from .stored_container import StoredContainer
+from .stored_tree import StoredTree
+
+STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
+NOT_BEGUN = 'the program was stopped before it began'
+
+
+class Resumption(NamedTuple):
+    """A trial that goes on."""
+
+    trial: StoredTrial
+    tree: StoredTree
+    moment: int  # number of the one that it goes on from
+    seq: int  # of the last event that is stored
+    at: float  # s since the epoch, when that was
+    asks: bool  # a person is asked before anything moves
+    changes: List[str]  # how the script differs from the one that was stopped
+    begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
+    is_earlier: bool = False  # whether later moments of the trial are stored
+
+    @property
+    def age_s(self) -> float:
+        """How long ago that was, s."""
+        return max(0.0, time.time() - self.at)
+
+
+def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
+    """Say that a trial goes on."""
+    smach.logwarn('{}: trial {} goes on{}; its program was stopped {:.0f} s ago'.format(
+        top.path, resumption.trial.trial_id, ' from moment {}'.format(
+            resumption.moment) if resumption.is_earlier else '', resumption.age_s))
+    for change in resumption.changes:
+        smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
+    _end_goals(top, resumption)
+    top.emit(EventKind.RESUMED, data={
+        'last_seq': resumption.seq, 'moment': resumption.moment,
+        'stopped_s': round(resumption.age_s, 3), 'changes': resumption.changes})
+
+
+def _end_goals(top: TreeNode, resumption: Resumption) -> None:
+    """End what the program that was killed has left running, before anything is sent."""
+    goals = resumption.tree.goals
+    if not goals:
+        return
+    smach.logwarn('{}: the program was killed while {} ran: cancelled, and waited for'.format(
+        top.path, ', '.join('a goal of {}'.format(server) for server in sorted(goals.values()))))
+    for goal_id, server in GOALS.end_goals(goals, lambda: must_stop(top)).items():
+        smach.logwarn('{}: a goal of {} may still run'.format(top.path, server))
+        GOALS.keep(goal_id, server)
+
+
+class EntryPoint:
+    """Where one container goes on; it is used up when that begins to execute."""
+
+    def __init__(self, stored: StoredContainer, down: Sequence[Place] = ()) -> None:
+        """`down`: the states in which the containers below begin, where it is sent to one."""
+        self._stored, self._down = stored, tuple(down)
+
+    @property
+    def label(self) -> str:
+        """The state in which it goes on."""
+        return self._stored.label
+
+    def take_over_records(self, node: TreeNode) -> None:
+        """Have the visits of the execution that was stopped."""
+        stored = self._stored
+        if stored.history:
+            node.records.history.take_over(stored.visits, stored.visits_of_execution,
+                                           stored.history)
+
+    def enter(self, node: TreeNode) -> None:
+        """Have the userdata as it was, and the state in which it goes on as the current one."""
+        stored, machine = self._stored, node.machine
+        data = machine.userdata._data
+        for key in stored.gone:
+            data.pop(key, None)
+        data.update(stored.keys)
+        for key, why in sorted(stored.missing.items()):
+            node.warn('userdata key {!r} {}'.format(key, 'has the value that the script gives it, '
+                                                    'as {}'.format(why) if key in data
+                                                    else 'is missing, as ' + why))
+        for label, snapshot in stored.snapshots.items():
+            if label in machine._states and not node.is_oracle(label):
+                node.record(label).snapshot = snapshot
+        machine._set_current_state(stored.label)
+        if self._down:
+            node.record(stored.label).go_down(self._down)
+
+
+def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
+    """Return the way down from a container to a place to which a jump was under way."""
+    place = next((each for each in places_of(node) if each.path == path), None)
+    way = None if place is None else way_to(node, place)
+    return way.down[1:] if way is not None and way.meets is node else ()
+
+
+def go_on(top: TreeNode, resumption: Resumption) -> None:
+    """Set every container of the tree to where it was; to be called once the trial has begun."""
+    nodes = list(nodes_of(top.machine))
+    latest = 0
+    for node in nodes:
+        stored = resumption.tree.container(node.key)
+        for label, told in stored.states.items():
+            if label in node.machine._states and not node.is_oracle(label):
+                latest = max(latest, _restore(node, node.record(label), told))
+        if stored.history:
+            node.records.history.take_over([], 0, stored.history)
+    top.tree.go_on_counting(latest, resumption.tree.whole)
+    top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
+    if resumption.begins_at:
+        _begin_at(top, resumption)
+    else:
+        _Setting(resumption, nodes).activate(top)
+
+
+def _begin_at(top: TreeNode, resumption: Resumption) -> None:
+    """Let the machine begin at the state that the settings name, with what was stored.
+
+    :raises SettingsError: where there is no such state.
+    """
+    place = place_named(top, resumption.begins_at)
+    way = None if place is None else way_to(top, place)
+    if way is None:
+        raise SettingsError('on_resume', 'state:' + resumption.begins_at,
+                            'the label of a state of {}, or the path of one below it'.format(
+                                top.path))
+    stored = resumption.tree.container(top.key)
+    stored.at = [way.first, BEFORE]
+    top.resuming = EntryPoint(stored, way.down[1:])
+
+
+def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
+    """Have what was learned and counted of a state; return the number of its latest visit."""
+    record.restore(told['learned'])
+    record.go_on(told['counts'], told['longest_s'])
+    mark = node.records.marks.of(record.label)
+    mark.reached, mark.executed, mark.done, mark.spent = told['mark']
+    return int(mark.reached)
+
+
+class _Setting:
+    """Sets the containers that ran to where they were."""
+
+    def __init__(self, resumption: Resumption, nodes: List[TreeNode]) -> None:
+        self._resumption, self._nodes = resumption, nodes
+
+    def activate(self, node: TreeNode) -> None:
+        """Set a container that was under way, and what is in its state."""
+        stored = self._resumption.tree.container(node.key)
+        if node.branch is None:
+            node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
+        record = node.record(stored.label)
+        # a question of an earlier moment may have been answered since: it is asked anew
+        if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
+            record.open_question = stored.asked[1]
+        if stored.phase == FAILED or record.open_question:
+            record.resume(self._unfinished(node, stored))
+        elif stored.phase == IN:
+            self._go_on_in(node, stored, record)
+        elif self._resumption.asks:
+            self._ask_before(node, stored.label)
+
+    def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
+        """Set what is in a state that was under way, or say that it is in doubt."""
+        inside = self._inside(node, stored.label)
+        if inside is None:
+            record.resume(self._unfinished(node, stored))
+            return
+        for path, border in borders_in(node, stored.label):
+            told = self._resumption.tree.container(path)
+            border.resume(told.keys, told.gone, told.item)
+        for each in inside:
+            self._set(each)
+
+    def _set(self, node: TreeNode) -> None:
+        """Set a container in a state that was under way."""
+        stored = self._resumption.tree.container(node.key)
+        if stored.phase == ENDED:
+            node.ended_before = stored.label
+        elif stored.phase:
+            self.activate(node)
+        else:
+            self._ask_before(node, node.machine._initial_state_label or '')
+
+    def _ask_before(self, node: TreeNode, label: str) -> None:
+        """Have a person asked before a state that had not begun, where nothing is to move."""
+        if self._resumption.asks and label in node.machine._states:
+            node.record(label).resume(
+                Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption)))
+
+    def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
+        is_open = node.record(stored.label).open_question
+        why = _why(self._resumption) if self._resumption.asks or is_open else ''
+        # a branch has the userdata of the Concurrence or Iterator that holds it
+        snapshots = self._resumption.tree.container(node.path).snapshots
+        if stored.phase == FAILED:
+            kind, outcome, text = stored.at[2:5]
+            return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label))
+        return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label))
+
+    def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
+        """Return the containers directly in a state; None where it can only go on as a whole."""
+        inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
+        state = node.machine._states.get(label)
+        return inside if inside and _is_wrapped_through(state) else None
+
+
+def _is_wrapped_through(state: object) -> bool:
+    """Whether each plain state in it has an oracle of its own, so that each is told of."""
+    if isinstance(state, smach.StateMachine):
+        return hasattr(state, '_oracle')
+    border = border_of(state)
+    return border is not None and all(
+        label in border.machines or _is_wrapped_through(inner)
+        for label, inner in border.states()) and (
+            not isinstance(state, smach.Iterator) or can_be_indexed(state))
+
+
+def _why(resumption: Resumption) -> str:
+    told = 'the program was stopped {:.0f} s ago'.format(resumption.age_s)
+    if resumption.changes:
+        told += ', and the script has changed since: ' + '; '.join(resumption.changes)
+    return told

@@ -1,0 +1,47 @@
+"""What a store says of one container at one moment."""
+from typing import Any, Dict, List, Mapping
+
+from smach_oracle.store.names import BEFORE
+
+from ..records.visits import Visit
+
+
+class StoredContainer:
+    """One container as it was.
+
+    `at`: label (or, where it has ended, its outcome), phase, and what belongs to that; empty where
+    it has not begun in the present visit of the state that holds it. `keys`: userdata.
+    `missing`: why a key that was there is not. `gone`: keys that were deleted. `visits`: of its
+    latest execution, oldest first. `snapshots`: userdata with which its states began, by label.
+    `asked`: label and id of the open question. `item`: of an Iterator, the number of the one under
+    way.
+    """
+
+    def __init__(self) -> None:
+        self.at: List[Any] = []
+        self.execution = 0
+        self.history: List[Any] = []
+        self.visits: List[Visit] = []
+        self.visits_of_execution = 0
+        self.states: Dict[str, Mapping[str, Any]] = {}
+        self.keys: Dict[str, Any] = {}
+        self.missing: Dict[str, str] = {}
+        self.snapshots: Dict[str, Dict[str, Any]] = {}
+        self.asked: List[str] = []
+        self.item = 0
+        self.gone: List[str] = []
+
+    @property
+    def phase(self) -> str:
+        """The phase, '' where it has not begun."""
+        return str(self.at[1]) if self.at else ''
+
+    @property
+    def jumped_to(self) -> str:
+        """Path of the place to which a jump was under way, '' for none."""
+        return str(self.at[2] or '') if self.phase == BEFORE and len(self.at) > 2 else ''
+
+    @property
+    def label(self) -> str:
+        """The state where it stands, '' where it has not begun."""
+        return str(self.at[0]) if self.at else ''

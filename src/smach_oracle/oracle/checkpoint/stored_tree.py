@@ -1,0 +1,164 @@
+"""Reads what a store says of the containers of a tree at one moment."""
+import json
+from typing import Any, Dict, NamedTuple, Optional, Tuple
+
+from smach_oracle.store.codecs import Codecs, NotReadable
+from smach_oracle.store.errors import StoreDamaged
+from smach_oracle.store.names import (
+    ASKED,
+    AT,
+    EDIT,
+    EXECUTION,
+    GOAL,
+    HISTORY,
+    ITEMS,
+    KEPT_OUT,
+    KEY,
+    STATE,
+    VISIT,
+)
+from smach_oracle.store.rows import StoredFact, StoredValue
+from smach_oracle.store.store_file import StoreFile
+
+from ..records.events import EventKind
+from ..records.visits import Visit, VisitResult
+from .stored_container import StoredContainer
+
+_Values = Dict[str, StoredValue]  # by key
+
+
+class StoredTree(NamedTuple):
+    """The containers by their keys, and what belongs to the whole tree, by name."""
+
+    containers: Dict[str, StoredContainer]
+    whole: Dict[str, Any]
+
+    @property
+    def goals(self) -> Dict[str, str]:
+        """Servers of the goals that ran, by goal id."""
+        return {name[len(GOAL):]: str(server) for name, server in self.whole.items()
+                if name.startswith(GOAL) and server}
+
+    def container(self, key: str) -> StoredContainer:
+        """Return what is stored of a container, nothing where nothing is."""
+        return self.containers.get(key) or StoredContainer()
+
+
+def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int] = None
+              ) -> StoredTree:
+    """Return what a store says at a moment of a trial, by default the last one.
+
+    :raises StoreDamaged: where the store cannot be read.
+    """
+    return _Reading(store, codecs).read(trial, until)
+
+
+class _Reading:
+    """One pass over the facts of a trial."""
+
+    def __init__(self, store: StoreFile, codecs: Codecs) -> None:
+        self._store, self._codecs = store, codecs
+        self._tree = StoredTree({}, {})
+        self._keys: Dict[str, _Values] = {}  # by path
+        self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
+        self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
+        self._decoded: Dict[StoredValue, Any] = {}
+
+    def read(self, trial: int, until: Optional[int]) -> StoredTree:
+        before: Optional[StoredFact] = None
+        for fact in self._store.facts(trial, until):
+            if before is not None and before.moment != fact.moment:
+                self._note_entry(before)
+            before = fact
+            if fact.name:
+                self._take(fact)
+        if before is not None:
+            self._note_entry(before)
+        for path, container in self._tree.containers.items():
+            self._put_together(path, container)
+        return self._tree
+
+    def _note_entry(self, fact: StoredFact) -> None:
+        """Keep the userdata with which a state began, as its snapshot."""
+        if fact.kind == EventKind.STATE_START.name:
+            path = fact.moment_path
+            self._at_entry.setdefault(path, {})[fact.label] = dict(self._keys.get(path, {}))
+
+    def _take(self, fact: StoredFact) -> None:
+        path, name, value = fact.path, fact.name, fact.value
+        if not path:
+            self._tree.whole[name] = _plain(value)
+            return
+        container = self._tree.containers.setdefault(path, StoredContainer())
+        if name.startswith(KEY):
+            self._keys.setdefault(path, {})[name[len(KEY):]] = value
+            if fact.kind == EDIT:  # what somebody has set outlives a restore
+                for values in self._at_entry.get(path, {}).values():
+                    values[name[len(KEY):]] = value
+        elif name.startswith(KEPT_OUT):
+            container.missing.pop(name[len(KEPT_OUT):], None)
+            if value.is_there:
+                kind, why = _plain(value)
+                container.missing[name[len(KEPT_OUT):]] = '{} was not stored: {}'.format(kind, why)
+        elif name.startswith(VISIT):
+            execution, number = map(int, name[len(VISIT):].split(':'))
+            state, outcome, result = _plain(value)
+            self._visits.setdefault(path, {})[execution, number] = Visit(
+                state, outcome, VisitResult(result))
+        elif name.startswith(STATE):
+            container.states[name[len(STATE):]] = _plain(value)
+        else:
+            self._take_named(container, path, name, _plain(value))
+
+    def _take_named(self, container: StoredContainer, path: str, name: str, plain: Any) -> None:
+        if name == AT:
+            container.at = plain or []
+        elif name == HISTORY:
+            container.history = plain
+        elif name == ASKED:
+            container.asked = plain or []
+        elif name == ITEMS:
+            container.item = plain or 0
+        elif name == EXECUTION:
+            container.execution = plain
+            self._at_entry.pop(path, None)
+
+    def _put_together(self, path: str, container: StoredContainer) -> None:
+        visits = self._visits.get(path, {})
+        present = sorted(number for execution, number in visits
+                         if execution == container.execution)
+        container.visits = [visits[container.execution, number] for number in present]
+        container.visits_of_execution = present[-1] + 1 if present else 0
+        for key, value in self._keys.get(path, {}).items():
+            if not value.is_there:
+                container.gone.append(key)
+                continue
+            try:
+                container.keys[key] = self._value(value)
+            except NotReadable as err:
+                container.missing[key] = str(err)
+        for label, values in self._at_entry.get(path, {}).items():
+            container.snapshots[label] = self._readable(values)
+
+    def _readable(self, values: _Values) -> Dict[str, Any]:
+        found = {}
+        for key, value in values.items():
+            try:
+                if value.is_there:
+                    found[key] = self._value(value)
+            except NotReadable:
+                pass  # said of the present value, or not needed any more
+        return found
+
+    def _value(self, value: StoredValue) -> Any:
+        """Return a value; the same object where the same one is meant."""
+        if value not in self._decoded:
+            self._decoded[value] = self._codecs.decode(value.text, value.whole, self._store.part)
+        return self._decoded[value]
+
+
+def _plain(value: StoredValue) -> Any:
+    try:
+        return json.loads(value.text or 'null')
+    except ValueError as err:
+        raise StoreDamaged('a stored fact cannot be read: {}'.format(err)) from err

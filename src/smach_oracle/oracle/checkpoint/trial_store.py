@@ -1,0 +1,161 @@
+"""The store of one trial: opened before it begins, held while it runs."""
+import os
+import time
+from typing import Optional, Set, Tuple
+
+import smach
+from smach_oracle.store.holding import MachineLock
+from smach_oracle.store.names import ENDED, GOAL
+from smach_oracle.store.rows import StoredTrial
+from smach_oracle.store.store_file import NewTrial, StoreFile
+from smach_oracle.store.store_writer import Ending, StoreWriter
+
+from ..branches.items import can_be_indexed
+from ..errors import SettingsError
+from ..machine.nesting import borders_below, nodes_of
+from ..machine.tree_node import TreeNode
+from ..records.facts import TrialEnd
+from ..records.running_goals import GOALS
+from ..settings.on_resume import ASK, RESTART
+from .checkpointer import Checkpointer
+from .resuming import Resumption, go_on
+from .storable import CODECS
+from .stored_tree import StoredTree, read_tree
+from .structure import differences, structure_of
+
+# what may be resumed: the program was stopped, and the task was not done
+_CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
+_used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
+RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
+
+
+class TrialStore:
+    """What one trial leaves in the store that the settings name."""
+
+    def __init__(self, top: TreeNode) -> None:
+        """Hold the machine in the store.
+
+        :raises StoreError: where the store cannot be opened, or another process holds the machine.
+        """
+        settings = top.settings
+        self._top = top
+        self._lock = MachineLock(settings.checkpoint, top.name)
+        self._lock.take()
+        try:
+            self._store = StoreFile(settings.checkpoint, settings.checkpoint_synchronous)
+        except BaseException:
+            self._lock.release()
+            raise
+        self._structure = structure_of(top)
+
+    def to_resume(self) -> Optional[Resumption]:
+        """Return the trial that goes on, None where a new one begins."""
+        try:
+            return self._to_resume()
+        except BaseException:
+            self._let_go()
+            raise
+
+    def _to_resume(self) -> Optional[Resumption]:
+        trials = self._store.trials(self._top.name)
+        last = trials[-1] if trials else None
+        if last is None or last.ended is not None or not last.moments:
+            self._earlier_moment(None)
+            smach.loginfo('{}: {} has no trial that was stopped: a new one begins'.format(
+                self._top.path, self._store.path))
+            return None
+        tree = read_tree(self._store, last.number, CODECS)
+        top = tree.container(self._top.key)
+        word, path = self._top.settings.on_resume
+        earlier = self._earlier_moment(last)
+        if earlier:
+            return self._resumption(last, tree, word == ASK, earlier)
+        if top.phase in ('', ENDED) or word == RESTART:
+            self._store.end_trial(last.number, time.time(),
+                                  top.label if top.phase == ENDED else RESTARTED)
+            return None
+        return self._resumption(last, tree, word == ASK)._replace(begins_at=path)
+
+    def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
+        """Return the number of the moment that the settings name, 0 for the last one.
+
+        A program goes on from it once.
+
+        :raises SettingsError: where it is none of the unfinished trial.
+        """
+        number = self._top.settings.resume_from
+        used = (os.path.abspath(self._store.path), number)
+        if not number or used in _used:
+            return 0
+        trial = self._store.trial_of(number)
+        if trial is not None and trial.machine != self._top.name:
+            return 0  # of another machine of the program
+        if trial is None or unfinished is None or trial.number != unfinished.number:
+            raise SettingsError('resume_from', number, 'a moment of the trial of {} that was '
+                                'stopped and has not ended'.format(self._top.name))
+        _used.add(used)
+        return number
+
+    def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
+                    earlier: int = 0) -> Resumption:
+        """Return how a trial goes on; `tree`: what its last moment says."""
+        changes = []
+        if trial.structure != self._structure.id:
+            changes = differences(self._store.description(trial.structure),
+                                  self._structure.description)
+        moments = self._store.moments(trial.number)
+        if earlier:
+            # what runs elsewhere, and what was asked, has not become undone
+            kept = {name: value for name, value in tree.whole.items()
+                    if name.startswith(GOAL) or name == 'questions'}
+            tree = read_tree(self._store, trial.number, CODECS, earlier)
+            tree.whole.update(kept)
+        return Resumption(trial, tree, earlier or moments[-1].number,
+                          max(each.seq for each in moments), moments[-1].at,
+                          asks or bool(changes), changes, is_earlier=bool(earlier))
+
+    def begin_trial(self, resumed: Optional[Resumption]) -> None:
+        """Store the trial from now on, and set the tree to where it was where it is resumed."""
+        top, settings = self._top, self._top.settings
+        _tell_what_begins_anew(top)
+        if resumed is not None:
+            go_on(top, resumed)
+        new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
+        self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
+                                   settings.checkpoint_wait_s, smach.logwarn)
+        self._observer = Checkpointer(top, self._writer, CODECS,
+                                      None if resumed is None else resumed.tree,
+                                      resumed.moment if resumed and resumed.is_earlier else None)
+        GOALS.observers.append(self._observer.goal_begins)
+        top.events.observers.insert(0, self._observer)  # before who may hold the machine up
+
+    def end(self, why: TrialEnd, outcome: str, at: float) -> None:
+        """Store the last of the trial, and let go of the store."""
+        if self._observer in self._top.events.observers:
+            self._top.events.observers.remove(self._observer)
+        GOALS.observers.remove(self._observer.goal_begins)
+        self._observer.last_words()
+        self._writer.close(None if why in _CAN_GO_ON else Ending(at, outcome))
+        self._let_go()
+
+    def _let_go(self) -> None:
+        self._store.close()
+        self._lock.release()
+
+
+def _tell_what_begins_anew(top: TreeNode) -> None:
+    """Name the Iterators that would begin with their first item after a crash."""
+    for node in nodes_of(top.machine):
+        for below, container in borders_below(node.machine):
+            if isinstance(container, smach.Iterator) and not can_be_indexed(container):
+                smach.logwarn('{}/{}: begins again with its first item where the machine is '
+                              'resumed, since what it goes through is no sequence'.format(
+                                  node.path, '/'.join(below)))
+
+
+def open_store(top: TreeNode) -> Optional[TrialStore]:
+    """Return the store that the settings name, None where they name none.
+
+    :raises StoreError: where it cannot be opened, or another process holds the machine.
+    """
+    return TrialStore(top) if top.settings.checkpoint else None

@@ -1,0 +1,105 @@
+"""Which keys of a container's userdata are to be stored anew."""
+import marshal
+from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union, cast
+
+from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
+from smach_oracle.store.names import KEPT_OUT, KEY
+from smach_oracle.store.rows import Fact
+
+from ..machine.protocols import Machine
+
+_WITHOUT_REFERENCES = 2  # a version of marshal's format, in which equal data look equal
+_FIXED = (str, int, float, bool, type(None), bytes)  # the same object has the same value
+
+
+class KeptOut(NamedTuple):
+    """A value that cannot be stored."""
+
+    key: str
+    kind: str  # its type
+    why: str
+
+
+class _Known(NamedTuple):
+    value: object
+    stored: Union[Encoded, str]  # why not
+    print_: Optional[bytes] = None  # of plain data: differs where the value does
+
+
+class UserdataFacts:
+    """Tells what of the userdata of one container differs from what is stored.
+
+    A key is looked at where it holds another object than before, or one that may have changed
+    inside: a list, an array, a message. Of those it is enough to look at what the states can reach
+    that have run since.
+    """
+
+    def __init__(self, codecs: Codecs, path: str, tell: Callable[[KeptOut], None]) -> None:
+        """`tell` gets each value that cannot be stored, when it is first seen."""
+        self._codecs, self._path, self._tell = codecs, path, tell
+        self._known: Dict[str, _Known] = {}
+
+    def changed(self, data: Dict[str, Any], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
+        """Yield the facts that are new.
+
+        `data`: the userdata. `reached`: keys whose values may have changed inside; None: all.
+        """
+        known = self._known
+        for key, value in list(data.items()):
+            before = known.get(key)
+            if before is not None and before.value is value and (
+                    type(value) in _FIXED or (reached is not None and key not in reached)):
+                continue
+            yield from self._look(key, value, before)
+        for key in [key for key in known if key not in data]:
+            stored = known.pop(key).stored
+            yield Fact(self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + str(key), None)
+
+    def _look(self, key: str, value: object, before: Optional[_Known]) -> Iterator[Fact]:
+        print_ = _print_of(value)
+        if before is not None and print_ is not None and print_ == before.print_:
+            if before.value is not value:
+                self._known[key] = before._replace(value=value)
+            return
+        try:
+            encoded = self._codecs.encode(value)
+        except NotStorable as err:
+            yield from self._keep_out(key, value, str(err), before)
+            return
+        self._known[key] = _Known(value, encoded._replace(parts={}), print_)
+        if before is None or isinstance(before.stored, str):
+            if before is not None:
+                yield Fact(self._path, KEPT_OUT + str(key), None)
+        elif before.stored[:2] == encoded[:2]:
+            return
+        yield Fact(self._path, KEY + str(key), encoded)
+
+    def _keep_out(self, key: str, value: object, why: str, before: Optional[_Known]
+                  ) -> Iterator[Fact]:
+        kind = '{}.{}'.format(type(value).__module__, type(value).__qualname__)
+        self._known[key] = _Known(value, kind)
+        if before is not None and before.stored == kind:
+            return
+        if before is not None and not isinstance(before.stored, str):
+            yield Fact(self._path, KEY + str(key), None)
+        yield Fact(self._path, KEPT_OUT + str(key), self._codecs.encode([kind, why]))
+        self._tell(KeptOut(str(key), kind, why))
+
+
+def _print_of(value: object) -> Optional[bytes]:
+    """Return bytes that differ where plain data differ; None for anything else."""
+    try:
+        return marshal.dumps(cast(Any, value), _WITHOUT_REFERENCES)  # to compare; never loaded
+    except ValueError:
+        return None
+
+
+def keys_of(machine: Machine, label: str) -> FrozenSet[str]:
+    """Return the keys of a container that one of its states can read or write."""
+    state = machine._states.get(label)
+    if state is None:
+        return frozenset()
+    remapping = machine._remappings.get(label) or {}
+    return frozenset(remapping.get(key, key) for key in
+                     set(state.get_registered_input_keys()).union(
+                         state.get_registered_output_keys()))

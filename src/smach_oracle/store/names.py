@@ -1,0 +1,11 @@
+"""The names of facts in a store, and the phases of a container: the format of what is stored."""
+
+# of a container
+AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
+ASKED, ITEMS = 'asked', 'items'
+# how the names of such facts begin: of a visit, a state, a userdata key, one that was kept out
+VISIT, STATE, KEY, KEPT_OUT = 'visit:', 'state:', 'key:', 'out:'
+GOAL = 'goal:'  # and of one of the whole tree that has a goal's server
+# phases: of the state at which a container stands, or of itself
+BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
+EDIT = 'EDIT'  # kind of a moment that somebody has made by hand

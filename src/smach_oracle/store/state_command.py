@@ -1,0 +1,164 @@
+"""The command oracle_state: look at the store of stopped machines, and change what is in it."""
+import argparse
+import getpass
+import socket
+import sys
+import time
+from typing import List, Optional
+
+from .errors import StoreError
+from .holding import MachineLock
+from .rows import StoredTrial
+from .stopped_trial import StoppedTrial, in_words
+from .store_file import StoreFile
+
+WRONG = 2  # exit code
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Run the command; return its exit code."""
+    given = _parser().parse_args(arguments)
+    try:
+        given.work(given)
+    except StoreError as err:
+        sys.stderr.write('oracle_state: {}\n'.format(err))
+        return WRONG
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='oracle_state', description='Look at the stored state of machines whose program has '
+        'stopped, and change it before it goes on. Nothing is changed while a program holds the '
+        'machine.')
+    parser.add_argument('path', help='the store, as the setting `checkpoint` names it')
+    parser.set_defaults(work=_list)
+    works = parser.add_subparsers(metavar='WHAT')
+    works.add_parser('list', help='all trials (default)').set_defaults(work=_list)
+    show = _add(works, 'show', _show, 'where the machine stood, and its userdata')
+    show.add_argument('--at', type=int, metavar='NUMBER', help='an earlier moment')
+    _add(works, 'moments', _moments, 'the moments of a trial, with their numbers')
+    _add(works, 'log', _log, 'what was changed by hand, when and by whom')
+    edit = _add(works, 'edit', _edit, 'give a userdata key another value')
+    edit.add_argument('assignment', metavar='KEY=JSON', help="such as count=3 or name='\"cup\"'")
+    edit.add_argument('--container', metavar='PATH', help='by default the top machine')
+    go_to = _add(works, 'goto', _go_to, 'let it go on at another state')
+    go_to.add_argument('label', metavar='LABEL', help='of a state, or its path below the top '
+                       'machine')
+    _add(works, 'drop', _drop, 'end the trial: it is never resumed')
+    return parser
+
+
+def _add(works: 'argparse._SubParsersAction[argparse.ArgumentParser]', name: str, work: object,
+         about: str) -> argparse.ArgumentParser:
+    parser = works.add_parser(name, help=about, description=about)
+    parser.add_argument('--trial', type=int, metavar='NUMBER',
+                        help='by default the latest one that has not ended')
+    parser.set_defaults(work=work)
+    return parser
+
+
+def _list(given: argparse.Namespace) -> None:
+    store = StoreFile(given.path, read_only=True)
+    trials = store.trials()
+    if not trials:
+        sys.stdout.write('no trial is stored\n')
+    for trial in trials:
+        sys.stdout.write('{:>5}  {:<20} {}  {:>6} moments  {}\n'.format(
+            trial.number, trial.machine, _when(trial.begun), trial.moments,
+            _how_it_is(store, trial)))
+
+
+def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
+    if trial.ended is not None:
+        return 'ended: ' + trial.outcome
+    if MachineLock(store.path, trial.machine).is_held_elsewhere():
+        return 'runs'
+    standing = StoppedTrial(store, trial).places()
+    return 'stopped: ' + in_words(standing[-1]) if standing else 'stopped before it began'
+
+
+def _show(given: argparse.Namespace) -> None:
+    store = StoreFile(given.path, read_only=True)
+    trial = _trial(store, given)
+    stopped = StoppedTrial(store, trial, given.at)
+    _say('trial {} of {}, begun {}: {}'.format(trial.number, trial.machine, _when(trial.begun),
+                                              _how_it_is(store, trial)))
+    _say('\nWhere it stood')
+    for standing in stopped.places():
+        _say('  ' + in_words(standing))
+    for path, question in stopped.questions():
+        _say('  question {} about {} was open'.format(question, path))
+    for path, count in stopped.recoveries():
+        _say('  {} was recovered from {} time{}'.format(path, count, '' if count == 1 else 's'))
+    _say('\nUserdata')
+    for path, key, text in stopped.userdata():
+        _say('  {} {} = {}'.format(path, key, text))
+
+
+def _moments(given: argparse.Namespace) -> None:
+    store = StoreFile(given.path, read_only=True)
+    for moment in store.moments(_trial(store, given).number):
+        _say('{:>7}  {}  {:<18} {}{}'.format(
+            moment.number, _when(moment.at), moment.kind.lower(),
+            '/'.join(filter(None, (moment.path, moment.label))),
+            '' if moment.after is None else '  (goes on from {})'.format(moment.after)))
+
+
+def _log(given: argparse.Namespace) -> None:
+    for line in StoreFile(given.path, read_only=True).log():
+        _say('{}  {:<20} {}'.format(_when(line.at), line.who, line.what))
+
+
+def _edit(given: argparse.Namespace) -> None:
+    key, equals, text = given.assignment.partition('=')
+    if not equals or not key.strip():
+        raise StoreError('{!r}: KEY=JSON is wanted, such as count=3'.format(given.assignment))
+    stopped = _stopped(given)
+    stopped.edit(key.strip(), text, given.container or stopped.trial.machine, _user_name())
+    _say('{} is changed'.format(key.strip()))
+
+
+def _go_to(given: argparse.Namespace) -> None:
+    _stopped(given).go_to(given.label, _user_name())
+    _say('it will go on at {}'.format(given.label))
+
+
+def _drop(given: argparse.Namespace) -> None:
+    stopped = _stopped(given)
+    stopped.drop(_user_name())
+    _say('trial {} is dropped'.format(stopped.trial.number))
+
+
+def _stopped(given: argparse.Namespace) -> StoppedTrial:
+    StoreFile(given.path, read_only=True).close()  # a store is not made by looking for it
+    store = StoreFile(given.path)
+    return StoppedTrial(store, _trial(store, given))
+
+
+def _trial(store: StoreFile, given: argparse.Namespace) -> StoredTrial:
+    trials = store.trials()
+    if given.trial is None:
+        trials = [trial for trial in trials if trial.ended is None] or trials
+    else:
+        trials = [trial for trial in trials if trial.number == given.trial]
+    if not trials:
+        raise StoreError('{}: there is no {}'.format(
+            given.path, 'trial' if given.trial is None else 'trial {}'.format(given.trial)))
+    return trials[-1]
+
+
+def _user_name() -> str:
+    try:
+        name = getpass.getuser()
+    except (KeyError, OSError):  # a user without a name, as in some containers
+        name = 'unknown'
+    return '{}@{}'.format(name, socket.gethostname())
+
+
+def _when(at: float) -> str:
+    return time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(at))
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + '\n')

@@ -1,0 +1,175 @@
+"""A stored trial, looked at and changed by hand."""
+import json
+import time
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple
+
+from .codecs import Codecs, NotStorable
+from .errors import StoreError
+from .holding import MachineLock
+from .names import ASKED, AT, BEFORE, EDIT, ENDED, FAILED, KEPT_OUT, KEY, STATE
+from .rows import Fact, NewMoment, StoredTrial, StoredValue
+from .store_file import StoreFile
+
+DROPPED = 'dropped'  # in place of the outcome of a trial that somebody has dropped
+LONGEST = 200  # letters of a value that are shown
+
+
+class Standing(NamedTuple):
+    """Where one container stands."""
+
+    path: str
+    label: str  # of the state; of a container that has ended, its outcome
+    phase: str
+    text: str  # what it failed with
+
+
+class StoppedTrial:
+    """One trial of a store; what is changed is a new moment, and those before it stay."""
+
+    def __init__(self, store: StoreFile, trial: StoredTrial, until: Optional[int] = None) -> None:
+        """`until`: the moment that is looked at; by default the last one."""
+        self._store, self.trial = store, trial
+        self._facts: Dict[Tuple[str, str], StoredValue] = {}
+        for fact in store.facts(trial.number, until):
+            if fact.name:
+                self._facts[fact.path, fact.name] = fact.value
+
+    # -- what is there
+
+    def places(self) -> List[Standing]:
+        """Return where the containers stand that had begun, the outermost first."""
+        found = []
+        for path, at in sorted(self._named(AT)):
+            if at:
+                text = ' '.join(filter(None, map(str, at[3:5]))) if at[1] == FAILED else ''
+                found.append(Standing(path, str(at[0]), str(at[1]), text))
+        return found
+
+    def userdata(self) -> Iterator[Tuple[str, str, str]]:
+        """Yield path, key and value as JSON, long ones cut, or why there is none."""
+        for (path, name), value in sorted(self._facts.items()):
+            if name.startswith(KEY) and value.is_there:
+                yield path, name[len(KEY):], self._text_of(value)
+            elif name.startswith(KEPT_OUT) and value.is_there:
+                kind, why = json.loads(value.text or '["", ""]')
+                yield path, name[len(KEPT_OUT):], '({}, not stored: {})'.format(kind, why)
+
+    def questions(self) -> Iterator[Tuple[str, str]]:
+        """Yield path of the state and id of each question that was open."""
+        for path, asked in sorted(self._named(ASKED)):
+            if asked:
+                yield '{}/{}'.format(path, asked[0]), str(asked[1])
+
+    def recoveries(self) -> Iterator[Tuple[str, int]]:
+        """Yield path of the state and number of its recoveries, where there were any."""
+        for (path, name), value in sorted(self._facts.items()):
+            if name.startswith(STATE) and value.is_there:
+                count = json.loads(value.text or '{}').get('counts', [0, 0])[1]
+                if count:
+                    yield '{}/{}'.format(path, name[len(STATE):]), int(count)
+
+    def _named(self, name: str) -> Iterator[Tuple[str, Any]]:
+        for (path, each), value in self._facts.items():
+            if each == name and value.is_there:
+                yield path, json.loads(value.text or 'null')
+
+    def _text_of(self, value: StoredValue) -> str:
+        text = value.text
+        if text is None and value.whole is not None:
+            text = self._store.part(value.whole).decode('ascii', 'replace')
+        text = text or ''
+        return text if len(text) <= LONGEST else '{}... ({} letters)'.format(
+            text[:LONGEST], len(text))
+
+    # -- changing it
+
+    def edit(self, key: str, json_text: str, path: str, who: str) -> None:
+        """Give a userdata key of a container another value.
+
+        :param json_text: plain JSON; what it means for the script is the user's business.
+        :param path: of the container.
+        :raises StoreError: for what is no JSON, a container that is not stored, a trial that has
+            ended or whose machine a process holds, and where it cannot be written.
+        """
+        if path not in self._containers():
+            raise StoreError('there is no container {!r}; there are {}'.format(
+                path, ', '.join(sorted(self._containers()))))
+        try:
+            encoded = Codecs().encode(json.loads(json_text))
+        except (ValueError, NotStorable) as err:
+            raise StoreError('{}: {!r} is no JSON ({}); a text needs quotes'.format(
+                key, json_text, err)) from err
+        facts = [Fact(path, KEY + key, encoded)]
+        if (path, KEPT_OUT + key) in self._facts:
+            facts.append(Fact(path, KEPT_OUT + key, None))
+        self._commit(path, '', facts, who, '{}: {} = {}'.format(path, key, json_text))
+
+    def go_to(self, label: str, who: str) -> None:
+        """Let the machine go on at another state.
+
+        :param label: of the top machine, or the path of a state below it.
+        :raises StoreError: as `edit`, and where there is no such state.
+        """
+        top, states = self.trial.machine, self._states()
+        if label not in states:
+            raise StoreError('there is no state {!r}; there are {}'.format(
+                label, ', '.join(sorted(states))))
+        first, _, below = label.partition('/')
+        at: List[Optional[str]] = [first, BEFORE, '{}/{}'.format(top, label) if below else None]
+        facts = [Fact(top, AT, Codecs().encode(at))]
+        facts += (Fact(path, ASKED, None) for path, _ in self._named(ASKED))
+        self._commit(top, first, facts, who, 'go to ' + label)
+
+    def drop(self, who: str) -> None:
+        """End the trial, so that it is never resumed.
+
+        :raises StoreError: as `edit`.
+        """
+        lock = self._held()
+        try:
+            self._store.drop(self.trial.number, time.time(), DROPPED, who)
+        finally:
+            lock.release()
+
+    def _commit(self, path: str, label: str, facts: List[Fact], who: str, what: str) -> None:
+        lock = self._held()
+        try:
+            moments = self._store.moments(self.trial.number)
+            seq = max((moment.seq for moment in moments), default=-1)
+            self._store.edit(self.trial.number, NewMoment(
+                time.time(), seq, EDIT, path, label, tuple(facts)), who,
+                'trial {}: {}'.format(self.trial.number, what))
+        finally:
+            lock.release()
+
+    def _held(self) -> MachineLock:
+        """Hold the machine, so that no program begins while it is changed."""
+        if self.trial.ended is not None:
+            raise StoreError('trial {} has ended ({}), and is never resumed'.format(
+                self.trial.number, self.trial.outcome))
+        lock = MachineLock(self._store.path, self.trial.machine)
+        lock.take()
+        return lock
+
+    def _containers(self) -> List[str]:
+        top = self.trial.machine
+        return [top + ('/' + path if path else '') for path in self._structure()]
+
+    def _states(self) -> List[str]:
+        return ['/'.join(filter(None, (path, label)))
+                for path, container in self._structure().items()
+                for label in container.get('states', {})]
+
+    def _structure(self) -> Mapping[str, Any]:
+        found = json.loads(self._store.description(self.trial.structure) or '{}')
+        return found if isinstance(found, dict) else {}
+
+
+def in_words(standing: Standing) -> str:
+    """Return where a container stands, as a sentence."""
+    if standing.phase == ENDED:
+        return '{} had ended with {}'.format(standing.path, standing.label)
+    if standing.phase == FAILED:
+        return '{}/{} had failed: {}'.format(standing.path, standing.label, standing.text)
+    return '{}/{} {}'.format(standing.path, standing.label,
+                             'was next' if standing.phase == BEFORE else 'was under way')

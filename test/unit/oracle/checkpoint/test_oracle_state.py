@@ -1,0 +1,117 @@
+"""The command oracle_state, on the store of a machine that was killed."""
+import pytest
+from killed_machines import KilledMachine, Noted
+
+import smach
+from smach_oracle.store.holding import MachineLock
+from smach_oracle.store.state_command import main
+
+ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+
+
+def build(diary, points):
+    inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+    with inner:
+        smach.StateMachine.add('X', Noted('X', diary, points), {'succeeded': 'Y'})
+        smach.StateMachine.add('Y', Noted('Y', diary, points), ENDS)
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    machine.userdata.file = open('/dev/null')
+    with machine:
+        smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'XY'})
+        smach.StateMachine.add('XY', inner, ENDS)
+    return machine
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """Killed while X runs."""
+    machine = KilledMachine(tmp_path, build)
+    assert machine.run(kill_at=11) is None
+    assert machine.diary.count('begins')['X'] == 1
+    return machine
+
+
+def told(capsys, *arguments):
+    assert main([str(each) for each in arguments]) == 0
+    return capsys.readouterr().out
+
+
+def refused(capsys, *arguments):
+    assert main([str(each) for each in arguments]) == 2
+    return capsys.readouterr().err
+
+
+def test_a_list_says_how_each_trial_stands(killed, capsys):
+    assert 'stopped: TOP/XY/X was under way' in told(capsys, killed.store)
+    assert killed.run()['outcome'] == 'succeeded'
+    assert 'ended: succeeded' in told(capsys, killed.store, 'list')
+
+
+def test_it_shows_where_the_machine_stood_and_its_userdata(killed, capsys):
+    said = told(capsys, killed.store, 'show')
+    assert 'TOP/XY was under way' in said and 'TOP/XY/X was under way' in said
+    assert 'TOP done = ["A"]' in said
+    assert 'TOP file = (_io.TextIOWrapper, not stored: no codec is registered' in said
+
+
+def test_an_earlier_moment_is_shown(killed, capsys):
+    lines = told(capsys, killed.store, 'moments').splitlines()
+    first = next(line for line in lines if line.endswith('TOP/A'))
+    assert 'TOP done = []' in told(capsys, killed.store, 'show', '--at', first.split()[0])
+
+
+def test_an_edited_key_is_what_the_machine_goes_on_with(killed, capsys):
+    told(capsys, killed.store, 'edit', 'done=["by hand"]', '--container', 'TOP/XY')
+    assert killed.run()['done'] == ['by hand', 'X', 'Y']
+    assert 'done = ["by hand"]' in told(capsys, killed.store, 'log')
+
+
+def test_it_goes_on_at_another_state(killed, capsys):
+    told(capsys, killed.store, 'goto', 'A')
+    assert killed.run()['outcome'] == 'succeeded'
+    assert killed.diary.count('begins')['A'] == 2
+
+
+def test_it_goes_on_at_a_state_below(killed, capsys):
+    told(capsys, killed.store, 'goto', 'XY/Y')
+    assert killed.run()['outcome'] == 'succeeded'
+    assert killed.diary.count('begins') == {'A': 1, 'X': 1, 'Y': 1}
+
+
+def test_a_dropped_trial_is_not_resumed(killed, capsys):
+    told(capsys, killed.store, 'drop')
+    assert 'ended: dropped' in told(capsys, killed.store)
+    assert killed.run()['events'][0][0] == 'TRIAL_START'
+
+
+@pytest.mark.parametrize('change', [['drop'], ['goto', 'A'], ['edit', 'done=[]']])
+def test_what_a_process_holds_is_not_changed(killed, capsys, change):
+    lock = MachineLock(killed.store, 'TOP')
+    lock.take()
+    assert 'machine TOP is held by process' in refused(capsys, killed.store, *change)
+    lock.release()
+    assert told(capsys, killed.store, 'log') == ''
+
+
+@pytest.mark.parametrize('change, why', [
+    (['goto', 'NOWHERE'], "there is no state 'NOWHERE'; there are A, XY, XY/X, XY/Y"),
+    (['edit', 'done=cup'], "'cup' is no JSON"),
+    (['edit', 'done'], 'KEY=JSON is wanted'),
+    (['edit', 'done=1', '--container', 'TOP/ZZ'], "no container 'TOP/ZZ'; there are TOP, TOP/XY"),
+    (['drop', '--trial', '9'], 'there is no trial 9'),
+])
+def test_a_wrong_change_is_refused_with_what_is_allowed(killed, capsys, change, why):
+    assert why in refused(capsys, killed.store, *change)
+    assert told(capsys, killed.store, 'log') == ''
+
+
+def test_a_trial_that_has_ended_is_not_changed(killed, capsys):
+    killed.run()
+    assert 'has ended (succeeded)' in refused(capsys, killed.store, 'goto', 'A')
+
+
+def test_looking_for_a_store_makes_none(tmp_path, capsys):
+    where = tmp_path / 'none.db'
+    assert 'there is no such store' in refused(capsys, where, 'drop')
+    assert not where.exists()

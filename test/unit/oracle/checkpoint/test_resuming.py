@@ -1,0 +1,260 @@
+"""A machine that was killed goes on where it stood."""
+import shutil
+
+import pytest
+from killed_machines import Diary, KilledMachine, Noted
+
+import smach
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.store.store_file import StoreFile
+
+ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+ALL = ['A', 'X', 'Y', 'LEFT', 'M1', 'M2', 'I0', 'I1', 'I2', 'J1', 'K1', 'J2', 'K2', 'B']
+
+
+def flat(diary, points):
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'B'})
+        smach.StateMachine.add('B', Noted('B', diary, points, failures=1), {'succeeded': 'C'})
+        smach.StateMachine.add('C', Noted('C', diary, points), ENDS)
+    return machine
+
+
+def tree(diary, points):
+    """A machine in a machine, a Concurrence of a state and a machine, Iterators of both."""
+    def noted(name, *keys):
+        return Noted(name, diary, points, keys=('done', *keys))
+
+    def two(first, second, *keys):
+        inner = smach.StateMachine(['succeeded', 'aborted'], ['done', *keys], ['done'])
+        with inner:
+            smach.StateMachine.add(first, noted(first, *keys), {'succeeded': second})
+            smach.StateMachine.add(second, noted(second, *keys), ENDS)
+        return inner
+
+    both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', ['done'], ['done'],
+                             outcome_map={'succeeded': {'LEFT': 'succeeded',
+                                                        'RIGHT': 'succeeded'}})
+    with both:
+        smach.Concurrence.add('LEFT', noted('LEFT'))
+        smach.Concurrence.add('RIGHT', two('M1', 'M2'))
+    plain = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=range(3),
+                           it_label='item', exhausted_outcome='succeeded')
+    with plain:
+        smach.Iterator.set_contained_state('I', noted('I', 'item'), loop_outcomes=['succeeded'])
+    nested = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=[1, 2],
+                            it_label='item', exhausted_outcome='succeeded')
+    with nested:
+        smach.Iterator.set_contained_state('JK', two('J', 'K', 'item'),
+                                           loop_outcomes=['succeeded'])
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('A', noted('A'), {'succeeded': 'XY'})
+        smach.StateMachine.add('XY', two('X', 'Y'), {'succeeded': 'BOTH'})
+        smach.StateMachine.add('BOTH', both, {'succeeded': 'PLAIN'})
+        smach.StateMachine.add('PLAIN', plain, {'succeeded': 'NESTED'})
+        smach.StateMachine.add('NESTED', nested, {'succeeded': 'B'})
+        smach.StateMachine.add('B', noted('B'), ENDS)
+    return machine
+
+
+def points_of(tmp_path, build):
+    return KilledMachine(make(tmp_path / 'whole'), build).run()['points']
+
+
+def make(folder):
+    if folder.exists():
+        shutil.rmtree(str(folder))
+    folder.mkdir()
+    return folder
+
+
+def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_again(tmp_path):
+    for point in range(1, points_of(tmp_path, tree) + 1):
+        killed = KilledMachine(make(tmp_path / 'killed'), tree)
+        assert killed.run(kill_at=point) is None
+        told = killed.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        begun, ended = killed.diary.count('begins'), killed.diary.count('ends')
+        assert not set(ALL).difference(ended), point
+        # before the two branches one state is in doubt; beside each other two can be
+        again = {name for name in begun if begun[name] > 1}
+        assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, again)
+        assert all(begun[name] <= 2 for name in begun), point
+        assert [name for name in told['done'] if name not in ('LEFT', 'M1', 'M2')] == [
+            name for name in ALL if name not in ('LEFT', 'M1', 'M2')], point
+
+
+def test_killed_again_and_again_it_comes_to_its_end(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), tree)
+    told, times = None, 0
+    while told is None:
+        told = killed.run(kill_at=16)
+        times += 1
+        assert times < 100
+    assert times > 5
+    assert told['outcome'] == 'succeeded'
+    assert set(ALL) == set(killed.diary.count('ends'))
+
+
+def test_rates_of_a_resumed_trial_are_those_of_one_that_was_not_killed(tmp_path):
+    """A kill teaches nothing: neither the state in doubt nor any other state."""
+    whole = KilledMachine(make(tmp_path / 'whole'), tree).run()
+    for point in (5, 12, 23, 31, 44, 57, 80):
+        killed = KilledMachine(make(tmp_path / 'killed'), tree)
+        assert killed.run(kill_at=point) is None
+        assert killed.run()['rates'] == whole['rates'], point
+
+
+def test_no_number_of_an_event_is_used_twice(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=8)
+    kinds = killed.run()['events']
+    assert kinds[0][0] == 'RESUMED'
+    assert kinds[0][1] >= 8
+    assert [seq for _, seq, _ in kinds] == sorted({seq for _, seq, _ in kinds})
+
+
+def test_the_state_in_doubt_is_a_failure_of_its_own_kind(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=4)
+    events = killed.run()['events']
+    assert [name for name, _, state in events if state == 'A'][:4] == [
+        'CONTAINER_START', 'FAILURE', 'TRANSITION', 'DECISION']
+
+
+def test_a_state_that_is_never_repeated_is_not(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat, states={'A': {'on_retry': 'never'}})
+    killed.run(kill_at=4)
+    assert 'could' not in str(killed.run())
+    assert killed.diary.count('begins')['A'] == 1
+
+
+def test_a_finished_trial_is_not_resumed(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    assert killed.run()['outcome'] == 'succeeded'
+    assert killed.run()['events'][0][0] == 'TRIAL_START'
+    assert killed.diary.count('begins')['A'] == 2
+
+
+def test_asked_first_nothing_moves_without_an_expert(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
+    for point in (6, 30):
+        killed.run(kill_at=point)
+        begun = killed.diary.count('begins')
+        killed.run()
+        assert killed.diary.count('begins') == begun
+        make(tmp_path / 'killed')
+
+
+def test_restart_begins_anew(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=12)
+    told = killed.run(on_resume='restart')
+    assert told['events'][0][0] == 'TRIAL_START' and told['done'] == ['A', 'B', 'C']
+    assert killed.diary.count('begins')['A'] == 2
+
+
+def test_it_can_be_sent_to_a_state(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), tree)
+    killed.run(kill_at=40)
+    assert killed.diary.count('begins')['Y'] == killed.diary.count('begins')['X'] == 1
+    told = killed.run(on_resume='state:XY/Y')
+    assert told['outcome'] == 'succeeded'
+    assert killed.diary.count('begins')['Y'] == 2
+    assert killed.diary.count('begins')['X'] == 1
+
+
+def test_a_state_that_is_not_there_is_named(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=12)
+    assert "on_resume: 'state:NOWHERE'" in killed.run(on_resume='state:NOWHERE')['error']
+    assert killed.run()['outcome'] == 'succeeded'
+
+
+def test_a_changed_script_is_not_guessed_about(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=8)
+
+    def changed(diary, points):
+        machine = flat(diary, points)
+        with machine:
+            smach.StateMachine.add('D', Noted('D', diary, points), ENDS)
+        return machine
+
+    other = KilledMachine(tmp_path / 'killed', changed)
+    begun = killed.diary.count('begins')
+    told = other.run()
+    assert told['outcome'] == 'aborted'  # nobody was there to ask
+    assert killed.diary.count('begins') == begun
+
+
+@pytest.mark.parametrize('value', ['now', 'state:', 3, 'ask:A'])
+def test_what_on_resume_may_be_is_said(tmp_path, value):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    assert 'ask, recover, restart or state:LABEL' in killed.run(on_resume=value)['error']
+
+
+def moments_of(killed):
+    store = StoreFile(killed.store, read_only=True)
+    return [each for trial in store.trials() for each in store.moments(trial.number)]
+
+
+def test_it_goes_on_from_an_earlier_moment(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=20)
+    assert killed.diary.count('begins')['B'] == 2  # it had failed once
+    before = moments_of(killed)
+    first = next(each for each in before if each.label == 'B' and each.kind == 'STATE_START')
+    told = killed.run(resume_from=first.number)
+    assert told['done'] == ['A', 'B', 'C']
+    assert killed.diary.count('begins')['A'] == 1
+    after = moments_of(killed)
+    assert after[:len(before)] == before  # those behind it stay
+    assert after[len(before)].after == first.number
+    assert min(seq for _, seq, _ in told['events']) > max(each.seq for each in before)
+
+
+def test_killed_once_more_it_goes_on_behind_the_moment_that_it_was_sent_to(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=20)
+    first = next(each for each in moments_of(killed) if each.kind == 'STATE_START')
+    killed.run(kill_at=1, resume_from=first.number)  # at its RESUMED event
+    assert moments_of(killed)[-1].kind == 'RESUMED'
+    assert killed.run()['done'] == ['A', 'B', 'C']
+    assert killed.diary.count('begins')['A'] == 2
+
+
+def test_a_moment_that_is_not_there_is_refused(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=12)
+    begun = killed.diary.count('begins')
+    assert 'resume_from: 999' in killed.run(resume_from=999)['error']
+    assert killed.diary.count('begins') == begun
+    assert killed.run()['outcome'] == 'succeeded'
+    ended = moments_of(killed)[2].number
+    assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
+
+
+def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
+    def iterated(items):
+        iterator = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=items,
+                                  it_label='item', exhausted_outcome='succeeded')
+        with iterator:
+            smach.Iterator.set_contained_state(
+                'I', Noted('I', Diary(str(tmp_path / 'diary')), lambda: None,
+                           keys=('done', 'item')), loop_outcomes=['succeeded'])
+        return iterator
+
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'ONCE'})
+        smach.StateMachine.add('ONCE', iterated(iter([1, 2])), ENDS)
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named = [text for level, text in log if level == 'warn' and 'begins again' in text]
+    assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')

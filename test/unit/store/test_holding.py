@@ -1,0 +1,49 @@
+"""A machine of a store is held by one process at a time."""
+import os
+import signal
+
+import pytest
+
+from smach_oracle.store.errors import StoreError
+from smach_oracle.store.holding import Held, MachineLock
+
+
+@pytest.fixture
+def path(tmp_path):
+    return str(tmp_path / 'robot.db')
+
+
+def test_a_second_holder_is_told_who_holds_it(path):
+    lock, other = MachineLock(path, 'TASK'), MachineLock(path, 'TASK')
+    lock.take()
+    with pytest.raises(Held, match='machine TASK is held by process {}'.format(os.getpid())):
+        other.take()
+    assert other.is_held_elsewhere() and not lock.is_held_elsewhere()
+    lock.release()
+    assert not other.is_held_elsewhere()
+    other.take()
+
+
+def test_machines_are_held_apart(path):
+    MachineLock(path, 'ONE').take()
+    assert MachineLock(path, 'ONE').is_held_elsewhere()
+    assert not MachineLock(path, 'TWO').is_held_elsewhere()
+
+
+def test_the_lock_of_a_killed_process_is_free(path):
+    reader, writer = os.pipe()
+    child = os.fork()
+    if not child:
+        MachineLock(path, 'TASK').take()
+        os.write(writer, b'!')
+        signal.pause()
+    os.read(reader, 1)
+    assert MachineLock(path, 'TASK').is_held_elsewhere()
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    MachineLock(path, 'TASK').take()
+
+
+def test_where_no_lock_can_be_is_named(tmp_path):
+    with pytest.raises(StoreError, match='cannot be locked'):
+        MachineLock(str(tmp_path / 'no' / 'robot.db'), 'TASK').take()

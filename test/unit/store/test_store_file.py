@@ -1,0 +1,160 @@
+"""The database of a store."""
+import os
+import sqlite3
+
+import pytest
+
+from smach_oracle.store.codecs import Codecs
+from smach_oracle.store.errors import StoreDamaged, StoreError
+from smach_oracle.store.rows import Fact, NewMoment
+from smach_oracle.store.store_file import NewTrial, StoreFile
+
+TRIAL = NewTrial('TASK', 'abc', ('id', 'description'), 5.0)
+
+
+def moment(seq, *facts):
+    codecs = Codecs()
+    return NewMoment(float(seq), seq, 'STATE_START', 'TASK', 'A', tuple(
+        Fact('TASK', name, None if value is None else codecs.encode(value))
+        for name, value in facts))
+
+
+def held(store, trial, until=None):
+    found = {}
+    for fact in store.facts(trial, until):
+        found[fact.name] = Codecs().decode(*fact.value, store.part) if fact.value.is_there else None
+    return found
+
+
+@pytest.fixture
+def path(tmp_path):
+    return str(tmp_path / 'robot.db')
+
+
+def test_what_was_committed_is_there_in_another_program(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    store.add(number, [moment(0, ('key:a', 1), ('key:b', 'x' * 1000)), moment(3, ('key:a', 2))])
+    other = StoreFile(path, read_only=True)
+    trial, = other.trials('TASK')
+    assert (trial.trial_id, trial.moments, trial.ended) == ('abc', 2, None)
+    assert held(other, number) == {'key:a': 2, 'key:b': 'x' * 1000}
+    assert other.description('id') == 'description'
+    assert other.trials('OTHER') == []
+
+
+def test_every_moment_can_be_gone_back_to(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    store.add(number, [moment(0, ('key:a', 1)), moment(1, ('key:a', None)), moment(2)])
+    first, second, third = store.moments(number)
+    assert held(store, number, first.number) == {'key:a': 1}
+    assert held(store, number, second.number) == {'key:a': None}
+    assert [each.seq for each in (first, second, third)] == [0, 1, 2]
+
+
+def test_large_values_are_kept_once(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    for seq in range(20):
+        store.add(number, [moment(seq, ('key:image', b'i' * 100000))])
+    store.close()
+    assert os.path.getsize(path) < 300000
+
+
+def test_moments_are_added_all_or_none(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    with pytest.raises(sqlite3.Error):
+        store.add(number, [moment(0, ('key:a', 1)), moment(1)._replace(kind=None)])
+    assert store.moments(number) == []
+    store.add(number, [moment(0)])
+    assert len(store.moments(number)) == 1
+
+
+def test_a_trial_that_has_ended_says_so(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    store.end_trial(number, 9.0, 'succeeded')
+    assert store.trials()[0][5:7] == (9.0, 'succeeded')
+
+
+def test_an_edit_is_logged(path):
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    store.edit(number, moment(0, ('key:a', 7))._replace(kind='EDIT'), 'anna', 'a = 7')
+    assert held(store, number) == {'key:a': 7}
+    line, = store.log()
+    assert (line.who, line.what) == ('anna', 'a = 7')
+
+
+def test_two_programs_write_one_store(path):
+    one, other = StoreFile(path), StoreFile(path)
+    first = one.begin_trial(TRIAL)
+    second = other.begin_trial(TRIAL._replace(machine='OTHER', trial_id='def'))
+    one.add(first, [moment(0)])
+    other.add(second, [moment(0)])
+    assert [trial.moments for trial in one.trials()] == [1, 1]
+
+
+def test_what_is_no_store_is_refused_and_left_alone(tmp_path):
+    other = tmp_path / 'notes.txt'
+    other.write_text('These are my notes, and they are longer than a hundred letters. ' * 10)
+    with pytest.raises(StoreDamaged, match='notes.txt: is damaged, or no store'):
+        StoreFile(str(other))
+    assert other.read_text().startswith('These are my notes')
+    database = tmp_path / 'other.db'
+    with sqlite3.connect(str(database)) as connection:
+        connection.execute('CREATE TABLE mine (a)')
+    with pytest.raises(StoreError, match='is no store of smach_oracle'):
+        StoreFile(str(database))
+
+
+@pytest.mark.parametrize('where', ['no/such/folder/robot.db', '.'])
+def test_a_place_where_none_can_be_is_named(tmp_path, where):
+    with pytest.raises(StoreError, match=str(tmp_path)):
+        StoreFile(str(tmp_path / where))
+
+
+def test_a_reader_makes_no_store(path):
+    with pytest.raises(StoreError, match='there is no such store'):
+        StoreFile(path, read_only=True)
+    assert not os.path.exists(path)
+
+
+def test_a_later_format_is_refused(path):
+    StoreFile(path).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute('PRAGMA user_version = 99')
+    with pytest.raises(StoreError, match='has format 99, and this program knows 1'):
+        StoreFile(path)
+
+
+def test_a_store_cut_off_anywhere_has_what_was_committed_before(path, tmp_path):
+    """Of the last write any part may be missing, as after a power cut: it is there, or not."""
+    store = StoreFile(path, 'FULL')
+    number = store.begin_trial(TRIAL)
+    store.add(number, [moment(0, ('key:a', 0))])
+    log = path + '-wal'
+    before = os.path.getsize(log)
+    store.add(number, [moment(1, ('key:a', 1), ('key:b', 'x' * 2000))])
+    whole = open(log, 'rb').read()
+    database = open(path, 'rb').read()
+    assert len(whole) > before
+    found = set()
+    for length in sorted({*range(before, len(whole), 97), before + 1, len(whole) - 1, len(whole)}):
+        copy = tmp_path / 'cut.db'
+        for end in ('', '-wal', '-shm'):
+            if os.path.exists(str(copy) + end):
+                os.remove(str(copy) + end)
+        copy.write_bytes(database)
+        (tmp_path / 'cut.db-wal').write_bytes(whole[:length])
+        cut = StoreFile(str(copy))
+        seqs = [each.seq for each in cut.moments(number)]
+        values = held(cut, number)
+        assert (seqs, values) in [([0], {'key:a': 0}),
+                                  ([0, 1], {'key:a': 1, 'key:b': 'x' * 2000})]
+        found.add(len(seqs))
+        cut.add(number, [moment(2)])
+        cut.close()
+    assert found == {1, 2}

@@ -1,0 +1,110 @@
+"""Machines that are killed at a chosen point and begun again, each in a process of its own."""
+import collections
+import json
+import os
+import signal
+import threading
+import traceback
+
+import smach
+from smach_oracle.oracle import OracleContainer
+
+
+class Points:
+    """Counts the points that a machine passes, and kills its process at one of them."""
+
+    def __init__(self, kill_at):
+        self._kill_at = kill_at
+        self.passed = 0
+        self._lock = threading.Lock()
+
+    def __call__(self, *_):
+        with self._lock:
+            self.passed += 1
+            if self.passed == self._kill_at:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Diary:
+    """What the states of all processes have done, in a file."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def write(self, what, name):
+        with open(self._path, 'a') as stream:
+            stream.write('{} {}\n'.format(what, name))
+
+    def count(self, what):
+        """How often each state has done it."""
+        with open(self._path) as stream:
+            lines = [line.split(None, 1) for line in stream]
+        return collections.Counter(name.strip() for found, name in lines if found == what)
+
+
+class Noted(smach.State):
+    """Appends its name to the userdata key `done`; fails the first `failures` times."""
+
+    def __init__(self, name, diary, points, failures=0, keys=('done',)):
+        smach.State.__init__(self, ['succeeded', 'aborted'], list(keys), ['done'])
+        self._name, self._diary, self._points, self._failures = name, diary, points, failures
+        self._keys = keys
+
+    def execute(self, userdata):
+        name = self._name + (str(userdata.item) if 'item' in self._keys else '')
+        self._diary.write('begins', name)
+        self._points()
+        userdata.done = list(userdata.done) + [name]
+        self._points()
+        self._diary.write('ends', name)
+        self._failures -= 1
+        return 'aborted' if self._failures >= 0 else 'succeeded'
+
+
+def in_a_process(work):
+    """Run `work(tell)` in a process of its own; return what it has told, None if it was killed."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            told = work()
+        except BaseException:
+            told = {'error': traceback.format_exc()}
+        os.write(writer, json.dumps(told).encode())
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, 'rb') as stream:
+        told = stream.read()
+    _, status = os.waitpid(child, 0)
+    assert os.WIFEXITED(status) or os.WTERMSIG(status) == signal.SIGKILL
+    return json.loads(told) if told else None
+
+
+class KilledMachine:
+    """A machine with a store; `build(diary, points)` makes it anew for each process."""
+
+    def __init__(self, folder, build, **settings):
+        self.store = str(folder / 'robot.db')
+        self.diary = Diary(str(folder / 'diary'))
+        self._build = build
+        self._settings = dict({'checkpoint': self.store, 'checkpoint_synchronous': 'OFF',
+                               'on_resume': 'recover'}, **settings)
+
+    def run(self, kill_at=0, expert=None, **settings):
+        """Execute it in a process of its own, killed at a point, 0: at none."""
+        def work():
+            points = Points(kill_at)
+            machine = OracleContainer.wrap(self._build(self.diary, points), name='TOP',
+                                           settings=dict(self._settings, **settings),
+                                           expert=expert)
+            kinds = []
+            machine._oracle.events.observers.append(points)
+            machine._oracle.events.observers.append(
+                lambda event: kinds.append((event.kind.name, event.seq, event.state)))
+            outcome = machine.execute()
+            return {'outcome': outcome, 'points': points.passed, 'events': kinds,
+                    'done': machine.userdata.done, 'rates': [
+                        [row.path, row.state, row.successes, row.failures]
+                        for row in machine.rates()]}
+
+        return in_a_process(work)
