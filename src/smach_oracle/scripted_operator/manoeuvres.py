@@ -22,6 +22,7 @@ _PITCHES = (0.45, 0.9, 0.15)  # rad downwards
 _LEVEL = (0.1, 0.3)  # the same, inside a shelf
 _WAYS = 3  # of taking a thing, that are tried one after the other, where the arm gets stuck
 _OFF_SHELF = 0.03  # m that a thing is lifted inside a shelf
+_GRIP = 100.0  # N, on a table
 _SQUEEZE = 90.0  # N: the robot, which grips with less, may have lost it before
 OUT = 0.28  # m straight back out of a shelf
 
@@ -66,6 +67,13 @@ class Attempt(NamedTuple):
         """Whether there is something between the fingers."""
         return HELD[0] < self.watcher.gap(self.driver.hand.arm) < HELD[1]
 
+    def feels(self, effort: float) -> bool:
+        """Whether the hand still holds something once it is closed with `effort` N.
+
+        Fingers that stand half open show the same gap as fingers with a thing between them.
+        """
+        return self.holds and self.driver.close(effort).stalled and self.holds
+
 
 Target = Callable[[SeenScene], Optional[SeenThing]]
 
@@ -96,7 +104,7 @@ def pick(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     :raises ManoeuvreError: where it is not in the hand in the end.
     :raises StuckError: where the hand does not get there.
     """
-    if not attempt.holds:
+    if not attempt.feels(_GRIP):
         _fetch(attempt, *found(attempt, target, about))
     attempt.driver.shift(z=LIFT, share=0.5)
     attempt.driver.rest(10)
@@ -116,7 +124,7 @@ def _fetch(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
         except StuckError:
             if last == 0:
                 raise
-    grip = driver.close()
+    grip = driver.close(_GRIP)
     if not grip.stalled or not attempt.holds:
         driver.open()
         driver.back(BEFORE)
@@ -230,7 +238,7 @@ def put_down(attempt: Attempt, place: np.ndarray, surface: Optional[float]) -> N
     :raises StuckError: where the hand does not get there.
     """
     driver = attempt.driver
-    if not attempt.holds:
+    if not attempt.feels(_GRIP):
         raise ManoeuvreError('the hand holds nothing')
     held = _look_at_hand(attempt)
     level = surface if surface is not None else float(place[2]) - held.half
@@ -342,7 +350,7 @@ def pull_out(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     :raises StuckError: where the hand does not get there.
     """
     driver = attempt.driver
-    if not attempt.holds:
+    if not attempt.feels(_SQUEEZE):
         _reach_in(attempt, *found(attempt, target, about))
     as_far_as_it_goes(lambda: driver.shift(z=_OFF_SHELF, share=0.3))
     as_far_as_it_goes(lambda: driver.shift(x=-OUT, share=0.4))

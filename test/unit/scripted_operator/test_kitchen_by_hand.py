@@ -65,6 +65,17 @@ def test_a_drink_that_two_fingers_press_on_counts_as_held(world, seed):
     assert world.holding('drink_0') == 'right'
 
 
+def test_a_hand_that_stands_half_open_is_felt_to_hold_nothing(world):
+    """As it does when it has let go of the door's handle."""
+    world.reset(before_the_shelf(3))
+    DirectRobot(world).gripper('right', 0.045)
+    with pytest.raises(ManoeuvreError, match='holds nothing'):
+        put_down(attempt(world), PALM, float(PALM[2]))
+    DirectRobot(world).gripper('right', 0.045)
+    pull_out(attempt(world), SeenScene.wanted, SHELF)
+    assert world.holding('drink_0') == 'right'
+
+
 def test_a_hand_that_misses_in_the_fridge_comes_out_open(world):
     world.reset(before_the_shelf(3))
     at = attempt(world)._replace(slip=lambda: np.array([0.0, 0.0, 0.10]))

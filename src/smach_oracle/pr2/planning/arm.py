@@ -145,6 +145,8 @@ class Arm:
         :raises SkillError: where the arm does not get there.
         """
         positions, times = timed(self.chain, path, speed)
+        # encoders err: at a stop they may read a little beyond it, where nothing can be sent
+        positions = self.chain.clip(positions)
         self._spend()
         try:
             self._robot.follow(ARM_JOINTS[self.name], positions, times)

@@ -12,6 +12,7 @@ from smach_oracle.pr2.planning.arm import READY, Arm, SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import CollisionWorld, model_from
 from smach_oracle.pr2.planning.collision_body import BodyPool
 from smach_oracle.pr2.planning.planner import ACCELERATION, PlanningError, plan, straight, timed
+from smach_oracle.pr2.robot import ARM_JOINTS
 from smach_oracle.pr2.skills.arms_aside import ASIDE
 
 # stands in the way from the robot's side to its front
@@ -191,3 +192,22 @@ def test_what_cannot_be_built_leaves_no_physics_client_behind(monkeypatch):
     with pytest.raises(SkillError, match='robot description: Cannot load'):
         Arm(SkillContext(robot, model()), 'left', {}, 1)
     assert clients() == before
+
+
+def test_an_arm_whose_encoder_reads_beyond_a_stop_is_sent_within_its_limits():
+    """Encoders err; a controller takes no position beyond a joint's limits."""
+    flex = ARM_JOINTS['right'].index('r_wrist_flex_joint')
+    beyond = np.array(ASIDE['right'])
+    sent = []
+    robot = SimpleNamespace(
+        joints=lambda: dict(REST, **dict(zip(ARM_JOINTS['right'], beyond))),
+        follow=lambda joints, positions, times: sent.append(positions),
+        spend=lambda what, work: None)
+    with Arm(SkillContext(robot, model()), 'right', {}, 1) as arm:
+        goal = np.array(ASIDE['right']) + [0.5, 0, 0, 0, 0, 0, 0]
+        goal[flex] = arm.chain.lower[flex]
+        beyond[flex] = goal[flex] - 0.003
+        arm.follow(np.array([arm.now(), goal]))
+        assert len(sent[0]) > 2
+        assert (sent[0] >= arm.chain.lower).all() and (sent[0] <= arm.chain.upper).all()
+        assert np.allclose(sent[0][-1], goal)
