@@ -212,6 +212,20 @@ def test_one_look_at_the_fridge_sets_right_where_the_robot_believes_to_stand(deg
     world.close()
 
 
+@pytest.mark.parametrize('degrees', [21, 28, 35])
+def test_a_door_that_hides_the_rest_of_the_fridge_does_not_lead_the_localisation_astray(degrees):
+    world = World(door_at(degrees, base=(0.58, -0.05, 0.03)))
+    robot = DirectRobot(world)
+    robot.localise(world.true_base() @ from_rpy((0.03, -0.02, 0.0), yaw=-0.02))  # it is wrong
+    skills = KitchenSkills(SkillContext(robot, installed_model()), Kitchen())
+    skills.localise_at_fridge(LocaliseAtFridgeGoal(), lambda status: None)
+    believed = base_from_fridge(Kitchen(), robot.odom_from_base())
+    truth = base_from_fridge(true_kitchen(world.scene.seed), world.true_base())
+    off = np.linalg.inv(truth) @ believed
+    assert np.hypot(*off[:2, 3]) < 0.025 and abs(off[1, 0]) < 0.045
+    world.close()
+
+
 def test_a_door_that_is_found_half_open_after_the_push_is_a_failure(monkeypatch):
     world = World(door_at(60, base=(0.4, -0.1, 0.0)))
     monkeypatch.setattr(door, '_push_open', lambda *_: door.WIDE)  # the arm felt no resistance

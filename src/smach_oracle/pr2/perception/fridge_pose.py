@@ -17,8 +17,12 @@ LOOSE = 0.01  # m from a face from which points count less and less
 LEAST_POINTS = 400
 MOST_POINTS = 800
 STARTS = (0.0, -0.05, -0.025, 0.025, 0.05)  # m, along the depth
+# rad and m, sigmas of what the robot believed before, and how much that counts: where a door that
+# is half open hides the rest, a turn of the fridge and one of its door look the same
+BELIEVED, BELIEF = np.array([0.10, 0.10, 0.03]), 0.1
 MOST_OFF = 0.008  # m, in the median, from the faces
-SHUT = np.radians(8.0)  # a door that is open by less is taken to be shut
+# a door that is open by less is taken to be shut, unless the fridge had to be turned by more
+SHUT, LIKELY = np.radians(8.0), 0.07  # rad
 # lowest and highest corner, m, in the fridge's frame, of what is looked at
 REGION = (np.array([-0.75, -0.55, 0.25]), np.array([0.55, 0.55, 1.6]))
 
@@ -41,28 +45,51 @@ def find_fridge(image: CameraImage, kitchen: Kitchen, expected: np.ndarray) -> F
     if len(points) < LEAST_POINTS:
         raise DoorNotSeen('too little of the refrigerator is in view: {} points'.format(
             len(points)))
-    moves = bool(door.angle > SHUT)
+    found = _fitted(kitchen, points, door, expected, bool(door.angle > SHUT))
+    if abs(found.turned) > LIKELY and door.angle <= SHUT:
+        found = _fitted(kitchen, points, door, expected, True)  # it stands ajar after all
+    if found.median > MOST_OFF:
+        raise DoorNotSeen('what is seen of the refrigerator is {:.0f} mm off its map'.format(
+            1000 * found.median))
+    return found.view
 
+
+class _Fit(NamedTuple):
+    view: FridgeView
+    median: float  # m that points are off the faces
+    turned: float  # rad, against what was expected
+
+
+def _fitted(kitchen: Kitchen, points: np.ndarray, door: DoorView, expected: np.ndarray,
+            moves: bool) -> _Fit:
+    """Fit the map to points.
+
+    :param points: (n, 3) m, in the fridge's frame as the door has it.
+    :param moves: whether the door's angle is fitted, too; else it is shut.
+    """
     def off(values: np.ndarray) -> np.ndarray:
         angle = values[3] if moves else 0.0
         there = apply(inverse(_moved(values)), points)
         boxes = fridge_boxes(kitchen, np.eye(4), float(angle))
         return np.asarray(np.min([np.abs(_distance(there, box)) for box in boxes], axis=0))
 
-    # thin walls have two faces, and the first fit may take one for the other
     mapped = inverse(door.base_from_fridge) @ expected
+    believed = np.array([mapped[0, 3], mapped[1, 3], yaw_of(mapped)])
+    weight = BELIEF * LOOSE * np.sqrt(len(points)) / BELIEVED
+
+    def unlikely(values: np.ndarray) -> np.ndarray:
+        return np.append(off(values), weight * (values[:3] - believed))
+
+    # thin walls have two faces, and the first fit may take one for the other
     starts = [[x, 0.0, 0.0] for x in (STARTS if moves else (0.0,))]
-    starts += [[mapped[0, 3], mapped[1, 3], yaw_of(mapped)]] * moves
+    starts += [believed.tolist()] * moves
     scale = [0.01, 0.01, 0.01] + [0.02] * moves
-    found = min((least_squares(off, start + [door.angle] * moves, loss='soft_l1', f_scale=LOOSE,
-                               max_nfev=25, x_scale=scale) for start in starts),
+    found = min((least_squares(unlikely, start + [door.angle] * moves, loss='soft_l1',
+                               f_scale=LOOSE, max_nfev=25, x_scale=scale) for start in starts),
                 key=lambda fit: float(fit.cost))
-    median = float(np.median(off(found.x)))
-    if median > MOST_OFF:
-        raise DoorNotSeen('what is seen of the refrigerator is {:.0f} mm off its map'.format(
-            1000 * median))
-    return FridgeView(door.base_from_fridge @ _moved(found.x),
+    view = FridgeView(door.base_from_fridge @ _moved(found.x),
                       float(found.x[3]) if moves else 0.0)
+    return _Fit(view, float(np.median(off(found.x))), float(found.x[2] - believed[2]))
 
 
 def _moved(values: np.ndarray) -> np.ndarray:

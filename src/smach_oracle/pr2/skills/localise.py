@@ -14,7 +14,7 @@ from .door import DOOR_LOOK, stand_before
 
 LOOKS = 2  # from different head poses
 ASIDE = np.array([0.10, -0.20, 0.10])  # m, in the fridge's frame: where the second look goes
-FARTHEST, MOST_TURNED = 0.35, 0.25  # m, rad: a correction beyond that is taken for a mistake
+FARTHEST, MOST_TURNED = 0.35, 0.12  # m, rad: a correction beyond that is taken for a mistake
 
 
 class Correction(NamedTuple):
