@@ -7,6 +7,7 @@ that changed with it. What is large is kept once, by its content.
 import os
 import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from urllib.parse import quote
 
 from .errors import StoreDamaged, StoreError
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
@@ -53,7 +54,8 @@ class StoreFile:
         `synchronous`: FULL survives a power cut, NORMAL may lose the last moments by one, OFF by a
         crash of the operating system may be damaged.
 
-        :raises StoreError: where it cannot be opened, or is no store, or of a later version.
+        :raises StoreError: where it cannot be opened or written, is no store, or of a later
+            version.
         :raises StoreDamaged: where SQLite says so.
         """
         self.path = path
@@ -67,8 +69,17 @@ class StoreFile:
         where = os.path.abspath(self.path)
         if self.read_only and not os.path.exists(where):
             raise StoreError('{}: there is no such store'.format(self.path))
+        try:
+            return self._connected(where, synchronous)
+        except sqlite3.OperationalError:
+            if not self.read_only or os.path.exists(where + '-wal'):
+                raise
+        # such as on a medium that is read only, where SQLite can put no log beside it
+        return self._connected('file:{}?immutable=1'.format(quote(where)), synchronous)
+
+    def _connected(self, where: str, synchronous: str) -> sqlite3.Connection:
         database = sqlite3.connect(where, timeout=BUSY_S, isolation_level=None,
-                                   check_same_thread=False)
+                                   check_same_thread=False, uri=where.startswith('file:'))
         try:
             self._check(database)
             if self.read_only:
@@ -77,6 +88,7 @@ class StoreFile:
                 database.execute('PRAGMA journal_mode = WAL')
                 database.execute('PRAGMA synchronous = ' + synchronous)
                 self._make(database)
+                _try_to_write(database)
             return database
         except BaseException:
             database.close()
@@ -270,6 +282,15 @@ class StoreFile:
             yield from self._db.execute(query, given)
         except sqlite3.Error as err:
             raise _told(self.path, err) from err
+
+
+def _try_to_write(database: sqlite3.Connection) -> None:
+    """Find out whether it can be written; changes nothing."""
+    database.execute('BEGIN IMMEDIATE')
+    try:
+        database.execute('PRAGMA user_version = {}'.format(FORMAT))
+    finally:
+        database.execute('ROLLBACK')
 
 
 class _Transaction:

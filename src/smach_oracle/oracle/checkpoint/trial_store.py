@@ -1,9 +1,11 @@
 """The store of one trial: opened before it begins, held while it runs."""
 import os
+import sqlite3
 import time
 from typing import Optional, Set, Tuple
 
 import smach
+from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
 from smach_oracle.store.names import ENDED, GOAL
 from smach_oracle.store.rows import StoredTrial
@@ -11,7 +13,7 @@ from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
 from ..branches.items import can_be_indexed
-from ..errors import SettingsError
+from ..errors import CheckpointError, SettingsError
 from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.facts import TrialEnd
@@ -49,9 +51,16 @@ class TrialStore:
         self._structure = structure_of(top)
 
     def to_resume(self) -> Optional[Resumption]:
-        """Return the trial that goes on, None where a new one begins."""
+        """Return the trial that goes on, None where a new one begins.
+
+        :raises CheckpointError: where the store cannot be read or written.
+        :raises SettingsError: for a moment to go on from that is none of the trial.
+        """
         try:
             return self._to_resume()
+        except (StoreError, sqlite3.Error) as err:
+            self._let_go()
+            raise _refused(err, self._top) from err
         except BaseException:
             self._let_go()
             raise
@@ -115,11 +124,18 @@ class TrialStore:
                           asks or bool(changes), changes, is_earlier=bool(earlier))
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
-        """Store the trial from now on, and set the tree to where it was where it is resumed."""
+        """Store the trial from now on, and set the tree to where it was where it is resumed.
+
+        :raises SettingsError: where it is to go on in a state that is not there.
+        """
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            go_on(top, resumed)
+            try:
+                go_on(top, resumed)
+            except BaseException:
+                self._let_go()
+                raise
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
@@ -156,6 +172,14 @@ def _tell_what_begins_anew(top: TreeNode) -> None:
 def open_store(top: TreeNode) -> Optional[TrialStore]:
     """Return the store that the settings name, None where they name none.
 
-    :raises StoreError: where it cannot be opened, or another process holds the machine.
+    :raises CheckpointError: where it cannot be opened, or another process holds the machine.
     """
-    return TrialStore(top) if top.settings.checkpoint else None
+    try:
+        return TrialStore(top) if top.settings.checkpoint else None
+    except StoreError as err:
+        raise _refused(err, top) from err
+
+
+def _refused(err: Exception, top: TreeNode) -> CheckpointError:
+    return CheckpointError('{} does not begin, as its store cannot be used: {}'.format(
+        top.path, err))

@@ -183,6 +183,8 @@ def check(invocation: Invocation) -> None:
         settings = Settings.from_dict(loaded, partial(_check_name, invocation.script))
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
+        if settings.checkpoint:
+            check_writable('checkpoint', settings.checkpoint, replaced=True)
     if invocation.options.record and not invocation.only_check:
         from ..recorder import prepare_folder
         prepare_folder(invocation.options.record)
@@ -337,6 +339,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)
     refusal = Refusal(guard, tell)
+    attachment.attachments().refusing = refusal.of_errors
     Interception(MachineWrapper(invocation, refusal)).install()
     with refusal.decides_exit_code():
         run_script(invocation.script, invocation.script_args)
