@@ -10,6 +10,8 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tu
 from urllib.parse import quote
 
 from .errors import StoreDamaged, StoreError
+from .names import RENAMED
+from .renaming import Renaming, containers_of, told_renaming
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
 
 FORMAT = 1
@@ -134,6 +136,14 @@ class StoreFile:
                 (trial.machine, trial.trial_id, trial.structure[0], trial.begun))
             return int(row.lastrowid or 0)
 
+    def keep_structure(self, structure: Tuple[str, str]) -> None:
+        """Keep the id and the description of a structure that a trial goes on with.
+
+        :raises sqlite3.Error: where it cannot be written.
+        """
+        with _Transaction(self._db):
+            self._db.execute('INSERT OR IGNORE INTO structures VALUES (?, ?)', structure)
+
     def add(self, trial: int, moments: Sequence[NewMoment]) -> None:
         """Commit moments of a trial, all or none.
 
@@ -237,11 +247,13 @@ class StoreFile:
 
         `until`: the last moment that counts; by default the last one of all. Of those before it
         the ones count that it has followed. A moment without any fact is yielded once, with an
-        empty name.
+        empty name. All names are those that the states have at the end.
 
         :raises StoreDamaged: where it cannot be read.
         """
-        for first, last in self._stretches(trial, LAST if until is None else until):
+        stretches = self._stretches(trial, LAST if until is None else until)
+        renamings = self._renamings(trial, stretches)
+        for position, (first, last) in enumerate(stretches):
             for row in self._read(
                     'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
                     'name, text, whole FROM moments LEFT JOIN facts '
@@ -249,8 +261,30 @@ class StoreFile:
                     'AND moments.number BETWEEN ? AND ? ORDER BY moments.number, facts.rowid',
                     (trial, first, last)):
                 number, kind, path, label, of, name, text, whole = row
-                yield StoredFact(number, kind, path, label, of or '', name or '',
-                                 StoredValue(text, whole))
+                fact = StoredFact(number, kind, path, label, of or '', name or '',
+                                  StoredValue(text, whole))
+                for behind, renaming in renamings:
+                    if (position, number) < behind:
+                        fact = renaming(fact)
+                yield fact
+
+    def _renamings(self, trial: int, stretches: List[Tuple[int, int]]
+                   ) -> List[Tuple[Tuple[int, int], Renaming]]:
+        """Return by which names the states go from certain moments on, oldest first.
+
+        A moment is told by the position of its stretch, and its number.
+        """
+        found = []
+        for position, (first, last) in enumerate(stretches):
+            for number, machine, text in self._read(
+                    'SELECT moment, machine, text FROM facts JOIN moments ON moment = '
+                    'moments.number JOIN trials ON trial = trials.number WHERE trial = ? AND '
+                    "facts.path = '' AND name = ? AND moment BETWEEN ? AND ? ORDER BY moment",
+                    (trial, RENAMED, first, last)):
+                structure, names = told_renaming(StoredValue(text, None))
+                found.append(((position, number), Renaming(
+                    machine, names, containers_of(self.description(structure)))))
+        return found
 
     def _stretches(self, trial: int, until: int) -> List[Tuple[int, int]]:
         """Return the first and last numbers of the moments that lead to `until`, oldest first."""

@@ -68,8 +68,8 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
-        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file', 'rows',
-        {'codecs', 'errors', 'names'}
+        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file',
+        'renaming', 'rows', {'codecs', 'errors', 'names'}
     ],
     'pr2': [
         'nodes', {'skills', 'ros_robot'}, {'planning', 'ros_senses'}, 'perception',

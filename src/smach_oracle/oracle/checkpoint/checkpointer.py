@@ -1,6 +1,6 @@
 """Stores where every container of a tree stands, before each state begins."""
 import time
-from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Set, Tuple
+from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
 
 import smach
 from smach_oracle.store.codecs import Codecs
@@ -38,17 +38,19 @@ class Checkpointer:
     """
 
     def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
-                 before: Optional[StoredTree] = None, behind: Optional[int] = None) -> None:
+                 before: Optional[StoredTree] = None, behind: Optional[int] = None,
+                 first: Sequence[Fact] = ()) -> None:
         """`before`: what is stored of the trial, where it is resumed.
 
-        `behind`: the moment that it goes on from, where that is not the last one.
+        `behind`: the moment that it goes on from, where that is not the last one. `first`: what
+        its first moment has besides.
         """
         self._before, self._behind = before, behind
         self._top, self._writer, self._codecs = top, writer, codecs
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
         self._userdata: Dict[str, UserdataFacts] = {}
-        self._pending: List[Fact] = []
+        self._pending: List[Fact] = list(first)
         self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._seq_stored = -1

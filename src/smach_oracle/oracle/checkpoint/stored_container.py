@@ -1,7 +1,7 @@
 """What a store says of one container at one moment."""
 from typing import Any, Dict, List, Mapping
 
-from smach_oracle.store.names import BEFORE
+from smach_oracle.store.names import BEFORE, MOVED
 
 from ..records.visits import Visit
 
@@ -35,6 +35,11 @@ class StoredContainer:
     def phase(self) -> str:
         """The phase, '' where it has not begun."""
         return str(self.at[1]) if self.at else ''
+
+    @property
+    def moved_to(self) -> str:
+        """Path of the state at which it stood, where that is in another container now, else ''."""
+        return str(self.at[2]) if self.phase == MOVED else ''
 
     @property
     def jumped_to(self) -> str:

@@ -2,13 +2,13 @@
 import os
 import sqlite3
 import time
-from typing import Optional, Set, Tuple
+from typing import List, Optional, Set, Tuple
 
 import smach
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED, GOAL
-from smach_oracle.store.rows import StoredTrial
+from smach_oracle.store.names import ENDED, GOAL, RENAMED, STRUCTURE
+from smach_oracle.store.rows import Fact, StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
@@ -19,11 +19,13 @@ from ..machine.tree_node import TreeNode
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
+from .changed_script import changed_script
 from .checkpointer import Checkpointer
+from .container_facts import fact_of
 from .resuming import Resumption, go_on
 from .storable import CODECS
 from .stored_tree import StoredTree, read_tree
-from .structure import differences, structure_of
+from .structure import structure_of
 
 # what may be resumed: the program was stopped, and the task was not done
 _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
@@ -77,13 +79,14 @@ class TrialStore:
         top = tree.container(self._top.key)
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
-        if earlier:
-            return self._resumption(last, tree, word == ASK, earlier)
-        if top.phase in ('', ENDED) or word == RESTART:
+        if not earlier and (top.phase in ('', ENDED) or word == RESTART):
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None
-        return self._resumption(last, tree, word == ASK)._replace(begins_at=path)
+        resumed = self._resumption(last, tree, word == ASK, earlier)
+        if resumed.renamed:
+            self._store.keep_structure(self._structure)
+        return resumed if earlier else resumed._replace(begins_at=path)
 
     def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
         """Return the number of the moment that the settings name, 0 for the last one.
@@ -108,20 +111,21 @@ class TrialStore:
     def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
                     earlier: int = 0) -> Resumption:
         """Return how a trial goes on; `tree`: what its last moment says."""
-        changes = []
-        if trial.structure != self._structure.id:
-            changes = differences(self._store.description(trial.structure),
-                                  self._structure.description)
         moments = self._store.moments(trial.number)
+        # what runs elsewhere, and what was asked, has not become undone
+        kept = {name: value for name, value in tree.whole.items()
+                if name.startswith(GOAL) or name == 'questions'}
         if earlier:
-            # what runs elsewhere, and what was asked, has not become undone
-            kept = {name: value for name, value in tree.whole.items()
-                    if name.startswith(GOAL) or name == 'questions'}
             tree = read_tree(self._store, trial.number, CODECS, earlier)
-            tree.whole.update(kept)
+        changed = changed_script(self._top, self._store, trial, tree, self._structure)
+        if changed.renaming is not None:
+            tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
+        tree.whole.update(kept)
         return Resumption(trial, tree, earlier or moments[-1].number,
                           max(each.seq for each in moments), moments[-1].at,
-                          asks or bool(changes), changes, is_earlier=bool(earlier))
+                          asks or bool(changed.changes and changed.renaming is None),
+                          changed.changes, is_earlier=bool(earlier), renamed=changed.names,
+                          structure=changed.before)
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
         """Store the trial from now on, and set the tree to where it was where it is resumed.
@@ -141,9 +145,17 @@ class TrialStore:
                                    settings.checkpoint_wait_s, smach.logwarn)
         self._observer = Checkpointer(top, self._writer, CODECS,
                                       None if resumed is None else resumed.tree,
-                                      resumed.moment if resumed and resumed.is_earlier else None)
+                                      resumed.moment if resumed and resumed.is_earlier else None,
+                                      self._facts_of_new_names(resumed))
         GOALS.observers.append(self._observer.goal_begins)
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
+
+    def _facts_of_new_names(self, resumed: Optional[Resumption]) -> List[Fact]:
+        """Return what is stored of a trial that goes on with other names of states."""
+        if resumed is None or not resumed.renamed:
+            return []
+        return [fact_of('', STRUCTURE, self._structure.id),
+                fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
