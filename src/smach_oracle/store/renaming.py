@@ -9,7 +9,7 @@ from .names import ASKED, AT, EDIT, ENDED, HISTORY, MOVED, STATE, VISIT
 from .rows import StoredFact, StoredValue
 
 
-class Place(NamedTuple):
+class StatePath(NamedTuple):
     """A state: its container, below the top machine, and its label there."""
 
     container: str
@@ -88,23 +88,23 @@ class Renaming:
         place = self._place(path, label)
         return place.label if self._is_here(path, place) else None
 
-    def _is_here(self, path: str, place: Place) -> bool:
+    def _is_here(self, path: str, place: StatePath) -> bool:
         return self._is_branch(path) or place.container == self._path(path)
 
     def _is_branch(self, path: str) -> bool:
         """Whether that is the path of a plain state that has an oracle of its own."""
         return path not in self._containers
 
-    def _place(self, path: str, label: str) -> Place:
+    def _place(self, path: str, label: str) -> StatePath:
         """Return where a state of a container, or of a branch, stands now."""
         if not label:
-            return Place(self._path(path), label)
+            return StatePath(self._path(path), label)
         parent, _, last = path.rpartition('/')
         if self._is_branch(path) and last == label:
             path = parent
         container, _, now = self._path('{}/{}'.format(path, label) if path else label
                                        ).rpartition('/')
-        return Place(container, now)
+        return StatePath(container, now)
 
     def _path(self, path: str) -> str:
         """Return the path of a state or container now."""

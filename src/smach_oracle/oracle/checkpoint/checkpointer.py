@@ -9,6 +9,7 @@ from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
 from ..branches.around import borders_around
+from ..branches.border import Border
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
@@ -53,6 +54,9 @@ class Checkpointer:
         self._pending: List[Fact] = list(first)
         self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        # by key of a container: its node, and what stands around it
+        self._borders: Dict[str, Tuple[TreeNode, List[Tuple[str, Border]]]] = {}
+        self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
         self._told: Set[Tuple[str, str]] = set()
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
@@ -169,9 +173,16 @@ class Checkpointer:
             return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
         return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
 
+    def _borders_around(self, node: TreeNode) -> List[Tuple[str, Border]]:
+        """Return what `borders_around` does, looked for once for each container."""
+        kept = self._borders.get(node.key)
+        if kept is None or kept[0] is not node:
+            kept = self._borders[node.key] = node, borders_around(node)
+        return kept[1]
+
     def _items_around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield which items the Iterators around a container have come to."""
-        for path, border in borders_around(node):
+        for path, border in self._borders_around(node):
             number = getattr(border, 'item_number', 0)
             if number and self._items.get(path) != number:
                 self._items[path] = number
@@ -180,13 +191,23 @@ class Checkpointer:
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending + list(self._collected(node)) + list(self._ended_goals())
-        facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
+        facts += self._spent()
         self._pending = []
         self._seq_stored = event.seq
         behind, self._behind = self._behind, None
         self._writer.commit(
             NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
                       tuple(facts), behind), lambda: must_stop(node))
+
+    def _spent(self) -> Iterator[Fact]:
+        """Yield what has changed of what is spent, the time of the budget in whole seconds."""
+        spent = self._top.tree.spent()
+        recoveries, questions, time_s = spent['budget']
+        spent['budget'] = [recoveries, questions, int(time_s)]
+        for name, plain in spent.items():
+            if self._spent_stored.get(name) != plain:
+                self._spent_stored[name] = plain
+                yield fact_of('', name, plain)
 
     def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
         """Yield what is new of a container."""
@@ -207,7 +228,7 @@ class Checkpointer:
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata into which the outputs of a container have gone."""
-        for path, border in borders_around(node):
+        for path, border in self._borders_around(node):
             yield from self._keys(path, border.container.userdata._data, None)
         if node.parent is not None and len(node.below) == 1:
             yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)

@@ -239,6 +239,20 @@ def test_a_moment_that_is_not_there_is_refused(tmp_path):
     assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
 
 
+def test_what_is_spent_is_stored_where_it_has_changed(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), tree)
+    killed.run(kill_at=60)
+    store = StoreFile(killed.store, read_only=True)
+    facts = [fact for fact in store.facts(1) if fact.name in ('questions', 'budget')]
+    moments = len(store.moments(1))
+    assert moments > 20
+    assert len({fact.name for fact in facts}) == 2
+    for name in ('questions', 'budget'):
+        values = [fact.value.text for fact in facts if fact.name == name]
+        assert all(one != other for one, other in zip(values, values[1:])), name
+    assert len(facts) < moments  # the time of the budget is in whole seconds
+
+
 def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     def iterated(items):
         iterator = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=items,
