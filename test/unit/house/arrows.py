@@ -19,7 +19,7 @@ ARROWS: Dict[str, Set[str]] = {
                  'packages'},
     'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
     'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
-               'geometry', 'analysis', 'interfaces', 'packages'},
+               'geometry', 'analysis', 'interfaces', 'packages', 'store'},
     'pr2': {'oracle.errors', 'oracle.number_checks', 'oracle.settings', 'ros', 'geometry'},
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert'},
