@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """A killed and resumed program: its bags are one trial, an earlier moment, roslaunch's respawn."""
+import glob
 import json
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
 import xmlrpc.client
 
+import rosbag
 import rosgraph
-import rosnode
 import rospy
 import rostest
 from oracle_support import FrontEnd, Process, script
@@ -16,10 +18,8 @@ from smach_ros_action_node import Behaviour
 from survive_support import EXPERTS, SurvivingCase, Traffic
 from waiting import wait_for
 
-from smach_oracle.analysis.bag_events import BagError
-from smach_oracle.analysis.reading import read_bags
-from smach_oracle.msg import ExpertDecision
-from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.msg import ExpertDecision, OracleEvent
+from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.srv import AnswerQueryRequest
 from smach_oracle.store.store_file import StoreFile
 
@@ -101,17 +101,21 @@ class PartsTest(SurvivingCase):
 
 
 def entered(folder):
-    """The states that a trial has entered, as far as its bags say it."""
-    try:
-        return [event.state for _, content in read_bags([folder], []) for event in content.events
-                if event.kind is EventKind.STATE_START]
-    except BagError:  # there is none yet
-        return []
+    """The states that a trial has entered, as its bag would say if the program were killed now."""
+    with tempfile.TemporaryDirectory() as copies:
+        for path in glob.glob(os.path.join(folder, '*.bag.active')):
+            shutil.copy(path, copies)
+        found = []
+        for path in recover_folder(copies, lambda text: None, lambda text: None):
+            with rosbag.Bag(path) as bag:
+                found += [event.state for _, event, _ in bag.read_messages('/task/oracle/events')
+                          if event.kind == OracleEvent.STATE_START]
+        return found
 
 
 def pid_of(node):
     """The number of the process of a node."""
-    uri = rosnode.get_api_uri(rosgraph.Master('/survive_parts'), node, skip_cache=True)
+    uri = rosgraph.Master('/survive_parts').lookupNode(node)
     with xmlrpc.client.ServerProxy(uri) as proxy:
         return proxy.getPid('/survive_parts')[2]
 

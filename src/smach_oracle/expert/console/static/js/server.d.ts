@@ -3,6 +3,7 @@
 // the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 import { Colour, Vector } from './drawing/types';
+import { DownMachine } from './down';
 import { HeldMachine } from './holding';
 
 export type Role = 'viewer' | 'operator' | 'teleoperator';
@@ -53,20 +54,6 @@ export interface Sections {
   interface_output: ByKey<InterfaceOutput>;
   [name: `live ${string}`]: LiveMachines; // by robot
   [name: `graph ${string}`]: Graph; // by robot and container path
-}
-
-/** A machine whose program has stopped, as its store has it; or why a store cannot be read. */
-export interface DownMachine {
-  key: string; // of the store and the trial
-  store: string; // its file
-  machine: string;
-  since: number; // when it was stored last
-  stood: string[]; // where, in sentences
-  questions: string[]; // that were open
-  userdata: [container: string, key: string, json: string][];
-  more_userdata: number; // keys that are left out
-  command: string; // that shows more
-  problem: string; // why the store cannot be read; '': it can, and all else is filled
 }
 
 /** By the key of a question. */

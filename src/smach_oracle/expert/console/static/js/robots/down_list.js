@@ -5,7 +5,7 @@ import { clock, duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
 /** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').DownMachine} DownMachine */
+/** @typedef {import('../down').DownMachine} DownMachine */
 
 const GOES_ON = 'Goes on when its program is started again. By default it asks a person first.';
 const TO_CHANGE = 'To look, and to change it before that (edit, goto, drop), on the computer of '
