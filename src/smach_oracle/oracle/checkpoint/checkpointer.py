@@ -29,6 +29,7 @@ _COMMITTED = frozenset((
     EventKind.HOLD_START, EventKind.SENT))
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
                      EventKind.QUERY_CANCELLED))
+_HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
 
@@ -56,6 +57,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         # by key of a container: its node, and what stands around it
         self._borders: Dict[str, Tuple[TreeNode, List[Tuple[str, Border]]]] = {}
+        self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
         self._told: Set[Tuple[str, str]] = set()
@@ -72,6 +74,8 @@ class Checkpointer:
         self._pending += self._where(event, node)
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
+            if event.kind in _HAS_RUN:
+                self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
         if event.kind is EventKind.CONTAINER_START and node.resuming is None:
             self._pending += self._facts_of(node).begin_execution()
         if event.kind is EventKind.CONTAINER_END:
@@ -215,8 +219,7 @@ class Checkpointer:
         yield from self._facts_of(node).changed(list(labels))
         reached = None if all_keys else frozenset().union(
             *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
-        yield from self._keys(node.path if node.branch is not None else node.key,
-                              node.machine.userdata._data, reached)
+        yield from self._keys(_userdata_path(node), node.machine.userdata._data, reached)
 
     def _keys(self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
               ) -> Iterator[Fact]:
@@ -229,16 +232,24 @@ class Checkpointer:
     def _around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata into which the outputs of a container have gone."""
         for path, border in self._borders_around(node):
+            self._wrote[path] = node.key
             yield from self._keys(path, border.container.userdata._data, None)
         if node.parent is not None and len(node.below) == 1:
+            self._wrote[node.parent.key] = node.key
             yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         if (path, out.key) in self._told:
             return
         self._told.add((path, out.key))
-        smach.logwarn('{}: userdata key {!r} ({}) cannot be stored: {}. It will be missing where '
-                      'the machine is resumed'.format(path, out.key, out.kind, out.why))
+        smach.logwarn('{}: userdata key {!r} ({}) of {} cannot be stored: {}. It will be missing '
+                      'where the machine is resumed'.format(
+                          path, out.key, out.kind, self._wrote.get(path, 'the script'), out.why))
+
+
+def _userdata_path(node: TreeNode) -> str:
+    """Return the path of the container whose userdata a node's states work on."""
+    return node.path if node.branch is not None else node.key
 
 
 def must_stop(node: TreeNode) -> bool:

@@ -239,6 +239,38 @@ def test_a_moment_that_is_not_there_is_refused(tmp_path):
     assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
 
 
+class Opens(smach.State):
+    """Writes an open file, which no codec knows."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded'], [], ['file'])
+
+    def execute(self, userdata):
+        userdata.file = open('/dev/null')
+        return 'succeeded'
+
+
+def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp_path, log):
+    inner = smach.StateMachine(['succeeded'], [], ['file'])
+    with inner:
+        smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'succeeded'})
+    machine = smach.StateMachine(['succeeded'])
+    machine.userdata.mine = open('/dev/null')
+    with machine:
+        smach.StateMachine.add('A', Opens(), {'succeeded': 'AGAIN'}, remapping={'file': 'other'})
+        smach.StateMachine.add('AGAIN', Opens(), {'succeeded': 'IN'}, remapping={'file': 'other'})
+        smach.StateMachine.add('IN', inner, {'succeeded': 'succeeded'})
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named = [text.split(' cannot be stored')[0] for level, text in log
+             if level == 'warn' and 'cannot be stored' in text]
+    kind = '(_io.TextIOWrapper)'
+    assert named == ["TOP: userdata key 'mine' {} of the script".format(kind),
+                     "TOP: userdata key 'other' {} of TOP/A".format(kind),
+                     "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind),
+                     "TOP: userdata key 'file' {} of TOP/IN".format(kind)]
+
+
 def test_what_is_spent_is_stored_where_it_has_changed(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), tree)
     killed.run(kill_at=60)
