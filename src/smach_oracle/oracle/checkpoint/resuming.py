@@ -104,6 +104,7 @@ class EntryPoint:
             node.warn('userdata key {!r} {}'.format(key, 'has the value that the script gives it, '
                                                     'as {}'.format(why) if key in data
                                                     else 'is missing, as ' + why))
+        stored.complete_snapshots(data)
         for label, snapshot in stored.snapshots.items():
             if label in machine._states and not node.is_oracle(label):
                 node.record(label).snapshot = snapshot
@@ -210,7 +211,7 @@ class _Setting:
             return
         for path, border in borders_in(node, stored.label):
             told = self._resumption.tree.container(path)
-            border.resume(told.keys, told.gone, told.item)
+            border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
         for each in inside:
             self._set(each)
 

@@ -31,6 +31,13 @@ class StoredContainer:
         self.item = 0
         self.gone: List[str] = []
 
+    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+        """Have in the snapshots what could not be stored, as the userdata have it now."""
+        for key in self.missing:
+            if key in data:
+                for snapshot in self.snapshots.values():
+                    snapshot.setdefault(key, data[key])
+
     @property
     def phase(self) -> str:
         """The phase, '' where it has not begun."""

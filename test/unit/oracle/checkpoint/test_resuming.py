@@ -271,6 +271,40 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
                      "TOP: userdata key 'file' {} of TOP/IN".format(kind)]
 
 
+class Looks(smach.State):
+    """Notes which keys it finds."""
+
+    def __init__(self, diary):
+        smach.State.__init__(self, ['succeeded'], ['file', 'mine', 'cup'])
+        self._diary = diary
+
+    def execute(self, userdata):
+        self._diary.write('finds', ','.join(
+            key for key in ('file', 'mine', 'cup') if userdata._ud._data.get(key) is not None))
+        return 'succeeded'
+
+
+def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
+    def build(diary, points):
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        machine.userdata.mine = open('/dev/null')
+        machine.userdata.cup = 'red'
+        with machine:
+            smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'A'})
+            smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'LOOK'})
+            smach.StateMachine.add('LOOK', Looks(diary), {'succeeded': 'succeeded'})
+        return machine
+
+    for is_killed, found in ((False, 'file,mine,cup'), (True, 'mine,cup')):
+        killed = KilledMachine(make(tmp_path / 'killed'), build)
+        if is_killed:
+            assert killed.run(kill_at=6) is None
+            assert killed.diary.count('begins')['A'] == 1
+        assert killed.run(states={'LOOK': {}})['outcome'] == ('succeeded')
+        assert list(killed.diary.count('finds')) == [found]
+
+
 def test_what_is_spent_is_stored_where_it_has_changed(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), tree)
     killed.run(kill_at=60)
