@@ -1,13 +1,16 @@
 """A machine that was killed goes on in a script whose states have other names or places."""
 import contextlib
 import io
+import json
 import os
+import re
 import shutil
 
 import pytest
 from killed_machines import KilledMachine, Noted
 
 import smach
+from smach_oracle.oracle import Expert
 from smach_oracle.store.state_command import main
 from smach_oracle.store.store_file import StoreFile
 
@@ -219,6 +222,29 @@ def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
     begun = before.diary.count('begins')
     assert after.run()['outcome'] == 'aborted'
     assert before.diary.count('begins') == begun
+
+
+def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
+    before, after = both_scripts(folder, flat_before, nested_after)
+    killed_while_it_runs(folder, before, 'D')
+    noted = folder / 'question'
+
+    class Noting(Expert):
+        def ask(self, question, cancelled, progress):
+            noted.write_text(json.dumps([question.failed_state, question.reason + question.text,
+                                         question.userdata['done']]))
+
+        def run_interface(self, offer, question, cancelled, progress):
+            return None
+
+    told = after.run(expert=Noting())
+    assert noted.exists(), told
+    state, text, done = json.loads(noted.read_text())
+    assert (state, done) == ('D', ['A', 'B', 'C'])
+    assert re.search(r'the program was stopped \d+ s ago', text)
+    for change in ('container IN is new', 'state B is gone', 'state C is gone', 'state IN is new',
+                   'state A: succeeded led to B, and leads to IN'):
+        assert change in text
 
 
 def test_in_the_same_script_the_map_is_of_no_effect(folder):
