@@ -12,7 +12,7 @@ ROSTESTS = [
     'console_browser', 'expert_interface', 'expert_own_script', 'expert_paused', 'fault_*',
     'interface_on_demand', 'oracle_*', 'pr2_pick_and_place', 'record_topics',
     'second_robot', 'smach_ros_action_state', 'smach_ros_introspection*', 'smach_ros_states',
-    'smach_ros_wrapper', 'still_running', 'task_recoveries', 'testing_bench'
+    'smach_ros_wrapper', 'still_running', 'survive_*', 'task_recoveries', 'testing_bench'
 ]
 
 

@@ -76,8 +76,8 @@ def _variant_lines(variant: VariantCounts) -> List[str]:
         lines.append('  how a trial truly ended is known of {} of {}'.format(
             variant.truth_known, variant.trials))
     if variant.resumed:
-        lines.append('  {} trials were resumed after their program was stopped'.format(
-            variant.resumed))
+        lines.append('  {} trials were resumed after their program was stopped; it was down for '
+                     '{:.0f} s in all'.format(variant.resumed, variant.down_s))
     if variant.lost_events:
         lines.append(
             '  {} events are missing in {} trials (gaps in their numbering): these figures are '
@@ -148,17 +148,18 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
     """Write one line a trial, for a spreadsheet or for statistics of one's own."""
     plain = [name for name in TrialSummary._fields
              if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth', 'unwell_s',
-                             'resumed')]
+                             'resumed', 'down_s')]
     writer = csv.writer(target, lineterminator='\n')
     writer.writerow(plain + ['seed', 'causes', 'true_success', 'why', 'sim_s', 'wall_s',
-                             'unwell_s', 'resumed', 'wrong_object', 'damage'])
+                             'unwell_s', 'resumed', 'down_s', 'wrong_object', 'damage'])
     for trial in trials:
         data = _trial_data(trial)
         cause, truth = trial.cause, trial.truth
         world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
         world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
         writer.writerow(['' if data[name] is None else data[name] for name in plain] + world
-                        + [trial.unwell_s, trial.resumed] + _harm(truth))
+                        + [trial.unwell_s, trial.resumed, trial.down_s]
+                        + _harm(truth))
 
 
 def _harm(truth: Optional[Truth]) -> List[Any]:

@@ -37,8 +37,9 @@ class TrialCounter:
         self._failing = failing
         self._start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
-        self._earliest_s = self._latest_s = 0.0
+        self._earliest_s = self._latest_s = self._before_s = 0.0
         self.resumed = 0  # how often it went on after its program was stopped
+        self.down_s = 0.0  # between its last event, recorded or stored, and that it went on
         self._count = 0
         self._last_seq = -1
         self._left_out = 0  # numbers that no event has, as a resumed trial numbers on
@@ -69,7 +70,7 @@ class TrialCounter:
 
     @property
     def duration_s(self) -> float:
-        """s from the first to the last recorded event."""
+        """s from the first to the last recorded event; `down_s` of it its program did not run."""
         return self._latest_s - self._earliest_s
 
     @property
@@ -121,6 +122,7 @@ class TrialCounter:
             self._start = event.data if isinstance(event.data, Mapping) else {}
         elif event.kind == EventKind.RESUMED:
             self.resumed += 1
+            self._count_down_time(event)
             self._end = None  # it was stopped, and has not ended
         elif event.kind == EventKind.TRIAL_END:
             self._end = self._end or event
@@ -144,10 +146,22 @@ class TrialCounter:
         if event.kind == EventKind.RESUMED:
             stored = event.data.get('last_seq', -1) if isinstance(event.data, Mapping) else -1
             self._left_out += max(0, event.seq - 1 - max(stored, self._last_seq))
+        self._before_s = self._latest_s  # that of the events before this one
         self._count += 1
         self._last_seq = max(self._last_seq, event.seq)
         self._earliest_s = min(self._earliest_s, event.wall_time)
         self._latest_s = max(self._latest_s, event.wall_time)
+
+    def _count_down_time(self, event: Event) -> None:
+        """Count the time from the last event that is known of, until the trial went on.
+
+        The program died in that time, and nobody knows when.
+        """
+        down_s = event.wall_time - self._before_s
+        told = event.data.get('stopped_s') if isinstance(event.data, Mapping) else None
+        if isinstance(told, (int, float)):
+            down_s = min(down_s, told)
+        self.down_s += max(0.0, down_s)
 
     def _count_wait(self, event: Event) -> None:
         if event.kind == EventKind.HEALTH_WAIT_START:

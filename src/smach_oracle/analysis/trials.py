@@ -34,6 +34,7 @@ class TrialSummary(NamedTuple):
     truth: Optional[Truth] = None  # how it ended, by the judge of a simulated world
     unwell_s: float = 0.0  # in which it waited until the robot was well
     resumed: int = 0  # how often it went on after its program was stopped
+    down_s: float = 0.0  # of `duration_s`: in which its program did not run
 
     @property
     def replicate(self) -> str:
@@ -111,4 +112,4 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
         questions=counter.questions, answered=counter.answered,
         failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
         settings=counter.settings, unwell_s=counter.unwell_s,
-        resumed=counter.resumed)
+        resumed=counter.resumed, down_s=counter.down_s)

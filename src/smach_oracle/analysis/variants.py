@@ -61,6 +61,7 @@ class VariantCounts(NamedTuple):
     replicates: int = 1
     truth_known: int = 0  # trials whose true end a world has recorded
     resumed: int = 0  # trials that went on after their program was stopped
+    down_s: float = 0.0  # in which it did not run, all together
 
     def of(self, name: str) -> Count:
         """The count of that name."""
@@ -171,7 +172,8 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
     return VariantCounts(variant.experiment, variant.name, len(trials), tuple(counts),
                          sum(1 for trial in trials if trial.lost_events),
                          sum(trial.lost_events for trial in trials), len(parts), len(known),
-                         sum(1 for trial in trials if trial.resumed))
+                         sum(1 for trial in trials if trial.resumed),
+                         sum(trial.down_s for trial in trials))
 
 
 def _by_events(name: str, number: Callable[[TrialSummary], int], trials: Sequence[TrialSummary],

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .asking.question import Answer, AnswerKind, Expert, Question
     from .checkpoint.storable import register_codec
     from .container import OracleContainer
+    from .errors import CheckpointError
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
     from .execution.unwrapping import unwrap
     from .machine.oracle import oracle_of
@@ -25,11 +26,12 @@ _LAZY = {
     'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
     'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question',
     'OperatorHand': 'operator_hand', 'register_codec': 'checkpoint.storable',
-    'unwrap': 'execution.unwrapping'
+    'unwrap': 'execution.unwrapping',
+    'CheckpointError': 'errors'
 }
-__all__ = ['Answer', 'AnswerKind', 'Expert', 'ExponentialFailureRate', 'FailureClass',
-           'FailureRate', 'OperatorHand', 'OracleContainer', 'Question', 'Settings',
-           'oracle_of', 'register_codec', 'unwrap']
+__all__ = ['Answer', 'AnswerKind', 'CheckpointError', 'Expert', 'ExponentialFailureRate',
+           'FailureClass', 'FailureRate', 'OperatorHand', 'OracleContainer', 'Question',
+           'Settings', 'oracle_of', 'register_codec', 'unwrap']
 
 
 def __getattr__(name: str) -> object:

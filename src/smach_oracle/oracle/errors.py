@@ -5,6 +5,7 @@
     +-- AnswerError (also a ValueError): an expert's answer does not fit its question
     |     +-- InterfaceError: the interface that an expert chose cannot be used
     +-- OperatorError (also a ValueError): an operator's command cannot be obeyed
+    +-- CheckpointError: the store of a machine cannot be used
     +-- TrialError: the executive was used out of order
 """
 import warnings
@@ -34,6 +35,13 @@ class OperatorError(OracleError, ValueError):
 
 class InterfaceError(AnswerError):
     """The interface that an expert chose cannot be used now; the text says why."""
+
+
+class CheckpointError(OracleError):
+    """The store that the setting `checkpoint` names cannot be used; the text says which and why.
+
+    Nothing of the machine has run.
+    """
 
 
 class TrialError(OracleError):

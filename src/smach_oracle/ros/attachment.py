@@ -10,10 +10,11 @@ import os
 import threading
 import time
 import weakref
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import (
     Any,
     Callable,
+    ContextManager,
     Dict,
     Iterator,
     List,
@@ -70,6 +71,8 @@ class Attachments:
 
     def __init__(self) -> None:
         self.options = RecordingOptions()
+        # a top-level machine executes within it: what becomes of an error that it begins with
+        self.refusing: Callable[[], ContextManager[object]] = nullcontext
         self._lock = threading.RLock()
         self._machines: MutableSet[OracleContainer] = weakref.WeakSet()  # all that ever ran
         self._trials: List[OracleContainer] = []  # within execute, their last events included

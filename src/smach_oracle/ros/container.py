@@ -91,13 +91,14 @@ class OracleContainer(BareContainer):
         """Run the machine; a top-level one is attached to its node first.
 
         :raises SettingsError: where the parameters of the node are wrong.
+        :raises CheckpointError: where the store that `checkpoint` names cannot be used.
         :raises OSError: where the folder for the bags cannot be made or written.
         """
         oracle = oracle_of(self)
         if not oracle.is_top or self.is_running():
             return super().execute(*args, **kwargs)
         oracle.describe_failure = describe_failure
-        with machine_names().running(self):
+        with attachments().refusing(), machine_names().running(self):
             if not attachments().has(self):
                 self._attach()
             with attachments().trial(self):

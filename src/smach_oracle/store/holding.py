@@ -2,9 +2,12 @@
 import fcntl
 import hashlib
 import os
+import time
 from typing import Optional
 
 from .errors import StoreError
+
+TAKE_S = 0.2  # who only looks whether it is held has it for less than this
 
 
 class Held(StoreError):
@@ -33,16 +36,17 @@ class MachineLock:
             descriptor = os.open(self._file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as err:
             raise StoreError('{}: cannot be locked: {}'.format(self._path, err)) from err
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not _locked(descriptor, fcntl.LOCK_EX, TAKE_S):
             holder = os.read(descriptor, 100).decode('ascii', 'replace').strip() or 'unknown'
             os.close(descriptor)
             raise Held('{}: machine {} is held by process {}'.format(
-                self._path, self._machine, holder)) from None
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, '{}\n'.format(os.getpid()).encode('ascii'), 0)
+                self._path, self._machine, holder))
         self._descriptor = descriptor
+        try:
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, '{}\n'.format(os.getpid()).encode('ascii'), 0)
+        except OSError:  # such as a full disk: it is held, and nobody is told by whom
+            pass
 
     def release(self) -> None:
         """Let go of it."""
@@ -51,12 +55,32 @@ class MachineLock:
             self._descriptor = None
 
     def is_held_elsewhere(self) -> bool:
-        """Whether another process holds it now."""
+        """Whether another process holds it now; makes and changes no file.
+
+        :raises StoreError: where the file cannot be read.
+        """
         if self._descriptor is not None:
             return False
         try:
-            self.take()
-        except Held:
+            descriptor = os.open(self._file, os.O_RDONLY | os.O_CLOEXEC)
+        except FileNotFoundError:
+            return False
+        except OSError as err:
+            raise StoreError('{}: its lock cannot be read: {}'.format(self._path, err)) from err
+        try:
+            return not _locked(descriptor, fcntl.LOCK_SH)
+        finally:
+            os.close(descriptor)
+
+
+def _locked(descriptor: int, kind: int, wait_s: float = 0.0) -> bool:
+    """Lock a file if that can be done in time; return whether it is locked."""
+    until_s = time.monotonic() + wait_s
+    while True:
+        try:
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             return True
-        self.release()
-        return False
+        except OSError:
+            if time.monotonic() >= until_s:
+                return False
+        time.sleep(0.01)

@@ -5,7 +5,10 @@ AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
 ASKED, ITEMS = 'asked', 'items'
 # how the names of such facts begin: of a visit, a state, a userdata key, one that was kept out
 VISIT, STATE, KEY, KEPT_OUT = 'visit:', 'state:', 'key:', 'out:'
+# of the whole tree: the id of its structure, and names that states have from then on
+STRUCTURE, RENAMED = 'structure', 'renamed'
 GOAL = 'goal:'  # and of one of the whole tree that has a goal's server
 # phases: of the state at which a container stands, or of itself
 BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
+MOVED = 'moved'  # the state at which it stands is in another container now
 EDIT = 'EDIT'  # kind of a moment that somebody has made by hand

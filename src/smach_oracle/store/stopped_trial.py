@@ -1,12 +1,13 @@
 """A stored trial, looked at and changed by hand."""
 import json
 import time
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from .codecs import Codecs, NotStorable
 from .errors import StoreError
 from .holding import MachineLock
-from .names import ASKED, AT, BEFORE, EDIT, ENDED, FAILED, KEPT_OUT, KEY, STATE
+from .names import ASKED, AT, BEFORE, EDIT, ENDED, FAILED, KEPT_OUT, KEY, MOVED, STATE, STRUCTURE
+from .renaming import containers_of, states_of
 from .rows import Fact, NewMoment, StoredTrial, StoredValue
 from .store_file import StoreFile
 
@@ -40,6 +41,8 @@ class StoppedTrial:
         """Return where the containers stand that had begun, the outermost first."""
         found = []
         for path, at in sorted(self._named(AT)):
+            if at and at[1] == MOVED:
+                path, at = at[2].rpartition('/')[0], at[3]
             if at:
                 text = ' '.join(filter(None, map(str, at[3:5]))) if at[1] == FAILED else ''
                 found.append(Standing(path, str(at[0]), str(at[1]), text))
@@ -153,16 +156,15 @@ class StoppedTrial:
 
     def _containers(self) -> List[str]:
         top = self.trial.machine
-        return [top + ('/' + path if path else '') for path in self._structure()]
+        return [top + ('/' + path if path else '') for path in containers_of(self._structure())]
 
     def _states(self) -> List[str]:
-        return ['/'.join(filter(None, (path, label)))
-                for path, container in self._structure().items()
-                for label in container.get('states', {})]
+        return states_of(self._structure())
 
-    def _structure(self) -> Mapping[str, Any]:
-        found = json.loads(self._store.description(self.trial.structure) or '{}')
-        return found if isinstance(found, dict) else {}
+    def _structure(self) -> str:
+        latest = self._facts.get(('', STRUCTURE))
+        return self._store.description(
+            self.trial.structure if latest is None else json.loads(latest.text or '""'))
 
 
 def in_words(standing: Standing) -> str:

@@ -7,8 +7,11 @@ that changed with it. What is large is kept once, by its content.
 import os
 import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from urllib.parse import quote
 
 from .errors import StoreDamaged, StoreError
+from .names import RENAMED
+from .renaming import Renaming, containers_of, told_renaming
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
 
 FORMAT = 1
@@ -53,7 +56,8 @@ class StoreFile:
         `synchronous`: FULL survives a power cut, NORMAL may lose the last moments by one, OFF by a
         crash of the operating system may be damaged.
 
-        :raises StoreError: where it cannot be opened, or is no store, or of a later version.
+        :raises StoreError: where it cannot be opened or written, is no store, or of a later
+            version.
         :raises StoreDamaged: where SQLite says so.
         """
         self.path = path
@@ -67,8 +71,17 @@ class StoreFile:
         where = os.path.abspath(self.path)
         if self.read_only and not os.path.exists(where):
             raise StoreError('{}: there is no such store'.format(self.path))
+        try:
+            return self._connected(where, synchronous)
+        except sqlite3.OperationalError:
+            if not self.read_only or os.path.exists(where + '-wal'):
+                raise
+        # such as on a medium that is read only, where SQLite can put no log beside it
+        return self._connected('file:{}?immutable=1'.format(quote(where)), synchronous)
+
+    def _connected(self, where: str, synchronous: str) -> sqlite3.Connection:
         database = sqlite3.connect(where, timeout=BUSY_S, isolation_level=None,
-                                   check_same_thread=False)
+                                   check_same_thread=False, uri=where.startswith('file:'))
         try:
             self._check(database)
             if self.read_only:
@@ -77,6 +90,7 @@ class StoreFile:
                 database.execute('PRAGMA journal_mode = WAL')
                 database.execute('PRAGMA synchronous = ' + synchronous)
                 self._make(database)
+                _try_to_write(database)
             return database
         except BaseException:
             database.close()
@@ -121,6 +135,14 @@ class StoreFile:
                 'INSERT INTO trials (machine, trial_id, structure, begun) VALUES (?, ?, ?, ?)',
                 (trial.machine, trial.trial_id, trial.structure[0], trial.begun))
             return int(row.lastrowid or 0)
+
+    def keep_structure(self, structure: Tuple[str, str]) -> None:
+        """Keep the id and the description of a structure that a trial goes on with.
+
+        :raises sqlite3.Error: where it cannot be written.
+        """
+        with _Transaction(self._db):
+            self._db.execute('INSERT OR IGNORE INTO structures VALUES (?, ?)', structure)
 
     def add(self, trial: int, moments: Sequence[NewMoment]) -> None:
         """Commit moments of a trial, all or none.
@@ -225,11 +247,13 @@ class StoreFile:
 
         `until`: the last moment that counts; by default the last one of all. Of those before it
         the ones count that it has followed. A moment without any fact is yielded once, with an
-        empty name.
+        empty name. All names are those that the states have at the end.
 
         :raises StoreDamaged: where it cannot be read.
         """
-        for first, last in self._stretches(trial, LAST if until is None else until):
+        stretches = self._stretches(trial, LAST if until is None else until)
+        renamings = self._renamings(trial, stretches)
+        for position, (first, last) in enumerate(stretches):
             for row in self._read(
                     'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
                     'name, text, whole FROM moments LEFT JOIN facts '
@@ -237,8 +261,30 @@ class StoreFile:
                     'AND moments.number BETWEEN ? AND ? ORDER BY moments.number, facts.rowid',
                     (trial, first, last)):
                 number, kind, path, label, of, name, text, whole = row
-                yield StoredFact(number, kind, path, label, of or '', name or '',
-                                 StoredValue(text, whole))
+                fact = StoredFact(number, kind, path, label, of or '', name or '',
+                                  StoredValue(text, whole))
+                for behind, renaming in renamings:
+                    if (position, number) < behind:
+                        fact = renaming(fact)
+                yield fact
+
+    def _renamings(self, trial: int, stretches: List[Tuple[int, int]]
+                   ) -> List[Tuple[Tuple[int, int], Renaming]]:
+        """Return by which names the states go from certain moments on, oldest first.
+
+        A moment is told by the position of its stretch, and its number.
+        """
+        found = []
+        for position, (first, last) in enumerate(stretches):
+            for number, machine, text in self._read(
+                    'SELECT moment, machine, text FROM facts JOIN moments ON moment = '
+                    'moments.number JOIN trials ON trial = trials.number WHERE trial = ? AND '
+                    "facts.path = '' AND name = ? AND moment BETWEEN ? AND ? ORDER BY moment",
+                    (trial, RENAMED, first, last)):
+                structure, names = told_renaming(StoredValue(text, None))
+                found.append(((position, number), Renaming(
+                    machine, names, containers_of(self.description(structure)))))
+        return found
 
     def _stretches(self, trial: int, until: int) -> List[Tuple[int, int]]:
         """Return the first and last numbers of the moments that lead to `until`, oldest first."""
@@ -270,6 +316,15 @@ class StoreFile:
             yield from self._db.execute(query, given)
         except sqlite3.Error as err:
             raise _told(self.path, err) from err
+
+
+def _try_to_write(database: sqlite3.Connection) -> None:
+    """Find out whether it can be written; changes nothing."""
+    database.execute('BEGIN IMMEDIATE')
+    try:
+        database.execute('PRAGMA user_version = {}'.format(FORMAT))
+    finally:
+        database.execute('ROLLBACK')
 
 
 class _Transaction:

@@ -1,4 +1,5 @@
 """What is told of a trial from its events, and which bags are used."""
+import io
 import os
 import shutil
 import subprocess
@@ -9,8 +10,10 @@ from fake_trials import FakeMachine
 from std_msgs.msg import String
 
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
+from smach_oracle.analysis.table import format_text, write_csv
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import load_trials, summarise
+from smach_oracle.analysis.variants import count_variants
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind, FailureKind
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording import bag_format
@@ -261,6 +264,33 @@ def test_a_resumed_trial_is_one_and_has_lost_nothing():
     trial = summarise(resumed_story())
     assert (trial.resumed, trial.lost_events, trial.failures) == (1, 0, 0)
     assert trial.ending is TrialEnding.SUCCESS
+
+
+@pytest.mark.parametrize('stopped_s, down_s', [
+    (500.0, 400.0),  # what was recorded last was not stored
+    (300.0, 300.0),  # what was stored last was not recorded
+    (-3.0, 0.0),  # the clock was put back
+    (None, 400.0),
+])
+def test_the_time_in_which_its_program_was_down_is_told_apart(stopped_s, down_s):
+    events = story(START, ENTERED)
+    data = {'last_seq': 1} if stopped_s is None else {'last_seq': 1, 'stopped_s': stopped_s}
+    later = story((EventKind.RESUMED, {'data': data}), ENTERED, END)
+    events += [event._replace(seq=event.seq + 1002, wall_time=501.0 + event.seq)
+               for event in later]
+    trial = summarise(events)
+    assert (trial.down_s, trial.duration_s) == (down_s, 403.0)
+    assert summarise(events[2:]).down_s == 0.0  # what came before is in no bag
+
+
+def test_down_time_is_in_the_table_and_in_the_csv():
+    trial = summarise(resumed_story())._replace(down_s=7.5)
+    text = io.StringIO()
+    write_csv(text, [trial])
+    header, row = text.getvalue().splitlines()
+    assert header.endswith('unwell_s,resumed,down_s') and row.endswith(',1,7.5')
+    told = format_text(count_variants([trial, trial]))
+    assert '2 trials were resumed after their program was stopped; it was down for 15 s' in told
 
 
 def test_what_a_killed_program_had_stored_and_not_recorded_is_lost():

@@ -19,7 +19,7 @@ ARROWS: Dict[str, Set[str]] = {
                  'packages'},
     'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
     'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
-               'geometry', 'analysis', 'interfaces', 'packages'},
+               'geometry', 'analysis', 'interfaces', 'packages', 'store'},
     'pr2': {'oracle.errors', 'oracle.number_checks', 'oracle.settings', 'ros', 'geometry'},
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert',
@@ -69,8 +69,8 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
-        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file', 'rows',
-        {'codecs', 'errors', 'names'}
+        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file',
+        'renaming', 'rows', {'codecs', 'errors', 'names'}
     ],
     'pr2': [
         'nodes', {'skills', 'ros_robot'}, {'planning', 'pose_teller', 'ros_senses', 'ros_time'},

@@ -153,5 +153,20 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'escalate', 'step_back_across', 'still_running_s', 'still_running_factor',
         'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
         'interfaces', 'states', 'healthy', 'health_settle_s', 'checkpoint', 'checkpoint_wait_s',
-            'checkpoint_synchronous', 'on_resume', 'resume_from'
+            'checkpoint_synchronous', 'on_resume', 'resume_from', 'resume_map'
     }
+
+
+def test_a_map_of_states_may_be_nested_as_the_parameter_server_has_it():
+    settings = Settings.from_dict({'resume_map': {'LOOK': 'SEE', 'KITCHEN': {'A': {'B': 'C/D'}}}})
+    assert settings.resume_map == {'LOOK': 'SEE', 'KITCHEN/A/B': 'C/D'}
+
+
+@pytest.mark.parametrize('given, named', [
+    ('LOOK=SEE', "resume_map: 'LOOK=SEE'"), ({'LOOK': 3}, 'resume_map.LOOK: 3'),
+    ({'K': {'LOOK': ''}}, "resume_map.K/LOOK: ''"), ({7: 'A'}, 'resume_map: 7'),
+    ({'A//B': 'A'}, "resume_map: 'A//B'")])
+def test_a_wrong_map_of_states_is_named(given, named):
+    with pytest.raises(SettingsError) as caught:
+        Settings.from_dict({'resume_map': given})
+    assert named in str(caught.value) and 'KITCHEN/LOOK: SEARCH' in str(caught.value)

@@ -1,6 +1,7 @@
 """A machine of a store is held by one process at a time."""
 import os
 import signal
+import threading
 
 import pytest
 
@@ -22,6 +23,31 @@ def test_a_second_holder_is_told_who_holds_it(path):
     lock.release()
     assert not other.is_held_elsewhere()
     other.take()
+
+
+def test_who_only_looks_makes_no_file_and_refuses_nobody(path):
+    looks, lock = MachineLock(path, 'TASK'), MachineLock(path, 'TASK')
+    assert not looks.is_held_elsewhere()
+    assert not os.listdir(os.path.dirname(path))
+    lock.take()
+    lock.release()
+    looking = threading.Event()
+
+    def look():
+        while not looking.is_set():
+            looks.is_held_elsewhere()
+    threads = [threading.Thread(target=look) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    try:
+        for _ in range(50):
+            lock.take()
+            assert MachineLock(path, 'TASK').is_held_elsewhere()
+            lock.release()
+    finally:
+        looking.set()
+        for thread in threads:
+            thread.join()
 
 
 def test_machines_are_held_apart(path):

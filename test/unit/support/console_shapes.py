@@ -1,6 +1,7 @@
 """Every shape of JSON that the console's server sends, made by the server's own code."""
 import json
 import math
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,6 +30,7 @@ from smach_oracle.expert.console.graphs.container_graph import (
     GraphLayout,
     drawing,
 )
+from smach_oracle.expert.console.robots.down_machines import DownMachines
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.sensors import sample_handlers
 from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
@@ -61,6 +63,9 @@ from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.images import cloud_message, colour_image, depth_image, mask_image
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.srv import SegmentObjectResponse
+from smach_oracle.store.codecs import Codecs
+from smach_oracle.store.rows import Fact, NewMoment
+from smach_oracle.store.store_file import NewTrial, StoreFile
 
 KEY = '/robot/expert_query q1'
 URDF = '''<robot name="arm">
@@ -126,6 +131,19 @@ def put_people(sections):
               lambda: {'/robot': ['/node']}, lambda: None).write_sections(sections)
 
 
+def put_down(sections):
+    """A machine whose program has stopped, in the middle of a question."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = folder + '/robot.db'
+        store = StoreFile(path)
+        number = store.begin_trial(NewTrial('TASK', 't', ('id', '{}'), 5.0))
+        store.add(number, [NewMoment(6.0, 0, 'QUERY_OPENED', 'TASK', 'A', tuple(
+            Fact('TASK', name, Codecs().encode(value)) for name, value in (
+                ('at', ['A', 'in']), ('asked', ['A', 't-1']), ('key:cup', 'red'))))])
+        store.close()
+        DownMachines([path, folder + '/none.db'], sections).look()
+
+
 def put_machines(sections):
     """A robot that is only heard, without a layout, and one container with it."""
     alpha = FollowedRobot('/alpha')
@@ -139,6 +157,7 @@ def put_machines(sections):
         'TASK', True, True, 'breakpoint A', [ActiveState('TASK', 'A', 'breakpoint', True)], ['A'],
         [], [], [], [])]))
     alpha.write_sections(sections, NoLayouter())
+    put_down(sections)
     structure = ContainerGraph('TASK', ('A',), ('done',), (GraphEdge('A', 'ok', 'done'),), 'ORACLE')
     place = (1.0, 2.0, 3.0, 4.0)
     curve = ([(1.0, 2.0), (3.0, 4.0)], (5.0, 6.0))

@@ -29,6 +29,7 @@ from .feeds.node_pulse import NodePulse
 from .feeds.repeating import repeat
 from .graphs.layout_worker import LayoutWorker
 from .page_socket import OpenPages, PageSocket
+from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
 from .robots.machine_hand import MachineHand
 from .sensors.question_images import ImageStore, QuestionImages
@@ -101,6 +102,7 @@ class Console:
         layouts = LayoutWorker()
         self._clocks = RobotClocks()
         self._robots = FollowedRobots(self._sections, self._log, layouts, self._clocks)
+        self._down = DownMachines(settings.stores, self._sections)
         self._front_end = FrontEnd('expert_console')
         self._discovery = SensorDiscovery(self._sections, self._front_end, settings.cameras)
         self._preconditions = PreconditionStatuses()
@@ -139,6 +141,7 @@ class Console:
         self._teleoperation.start()
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
         repeat(self._machine_hand.look_up, ROBOTS_PERIOD_S)
+        repeat(self._down.look, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
         threading.Thread(target=self._catalogue.run, name='bags', daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()
@@ -217,7 +220,8 @@ def main() -> None:
     parameters_only(
         'Node: a web page from which people watch robots and answer their questions. Parameters: '
         '~address, '
-        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~cameras; '
+        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
+        '~cameras; '
         'see doc/console.md.'
     )
     rospy.init_node('expert_console')

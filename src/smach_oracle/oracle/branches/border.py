@@ -1,6 +1,18 @@
 """Concurrences and Iterators of a wrapped tree: their branches, and where an Iterator goes on."""
 import threading
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, cast
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Tuple,
+    cast,
+)
 
 import smach
 
@@ -13,6 +25,15 @@ from .branch import loops
 from .branch_machine import BranchMachine
 from .items import TrackedItems
 from .stand_in import StandIn, real
+
+
+class _Resumed(NamedTuple):
+    """How a container goes on that was under way; see `Border.resume`."""
+
+    keys: Dict[str, Any]
+    gone: Tuple[str, ...]
+    item: int
+    tell: Callable[[Mapping[str, Any]], None]
 
 
 class Border:
@@ -29,7 +50,7 @@ class Border:
         self.below: Tuple[str, ...] = ()  # labels that lead to it from there
         self._lock = threading.Lock()
         self._is_in_use = False
-        self._resumed: Optional[Tuple[Dict[str, Any], Tuple[str, ...], int]] = None
+        self._resumed: Optional[_Resumed] = None
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
@@ -57,22 +78,24 @@ class Border:
 
     # -- going on after the program was stopped
 
-    def resume(self, keys: Mapping[str, Any], gone: Iterable[str], item: int) -> None:
+    def resume(self, keys: Mapping[str, Any], gone: Iterable[str], item: int,
+               tell: Callable[[Mapping[str, Any]], None]) -> None:
         """Have this userdata at the next execution, once its inputs are copied.
 
         `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1;
-        0: the first.
+        0: the first. `tell`: takes the userdata as they are then.
         """
-        self._resumed = dict(keys), tuple(gone), item
+        self._resumed = _Resumed(dict(keys), tuple(gone), item, tell)
 
     def take_over_userdata(self) -> None:
         """Have the userdata that `resume` was given, at the first execution after it."""
         resumed, self._resumed = self._resumed, None
         if resumed is not None:
             data = self.container.userdata._data
-            for key in resumed[1]:
+            for key in resumed.gone:
                 data.pop(key, None)
-            data.update(resumed[0])
+            data.update(resumed.keys)
+            resumed.tell(data)
 
     def _runs_in_tree(self) -> bool:
         top = self.top
@@ -200,7 +223,7 @@ class IteratorBorder(Border):
         if items is None or items.given is not iterator._items:
             items = TrackedItems(iterator._items, self._tell)
         self.goes_on = items.goes_on = may and items.has_rest()
-        items.begins_with = 1 if self._resumed is None else self._resumed[2]
+        items.begins_with = 1 if self._resumed is None else self._resumed.item
         if self.goes_on:
             self._pass_on(dict(self.states()))
         else:

@@ -1,6 +1,6 @@
 """Stores where every container of a tree stands, before each state begins."""
 import time
-from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Set, Tuple
+from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
 
 import smach
 from smach_oracle.store.codecs import Codecs
@@ -9,6 +9,7 @@ from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
 from ..branches.around import borders_around
+from ..branches.border import Border
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind
@@ -28,6 +29,7 @@ _COMMITTED = frozenset((
     EventKind.HOLD_START, EventKind.SENT))
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
                      EventKind.QUERY_CANCELLED))
+_HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
 
@@ -38,19 +40,25 @@ class Checkpointer:
     """
 
     def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
-                 before: Optional[StoredTree] = None, behind: Optional[int] = None) -> None:
+                 before: Optional[StoredTree] = None, behind: Optional[int] = None,
+                 first: Sequence[Fact] = ()) -> None:
         """`before`: what is stored of the trial, where it is resumed.
 
-        `behind`: the moment that it goes on from, where that is not the last one.
+        `behind`: the moment that it goes on from, where that is not the last one. `first`: what
+        its first moment has besides.
         """
         self._before, self._behind = before, behind
         self._top, self._writer, self._codecs = top, writer, codecs
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
         self._userdata: Dict[str, UserdataFacts] = {}
-        self._pending: List[Fact] = []
+        self._pending: List[Fact] = list(first)
         self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        # by key of a container: its node, and what stands around it
+        self._borders: Dict[str, Tuple[TreeNode, List[Tuple[str, Border]]]] = {}
+        self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
+        self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
         self._told: Set[Tuple[str, str]] = set()
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
@@ -66,6 +74,8 @@ class Checkpointer:
         self._pending += self._where(event, node)
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
+            if event.kind in _HAS_RUN:
+                self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
         if event.kind is EventKind.CONTAINER_START and node.resuming is None:
             self._pending += self._facts_of(node).begin_execution()
         if event.kind is EventKind.CONTAINER_END:
@@ -167,9 +177,16 @@ class Checkpointer:
             return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
         return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
 
+    def _borders_around(self, node: TreeNode) -> List[Tuple[str, Border]]:
+        """Return what `borders_around` does, looked for once for each container."""
+        kept = self._borders.get(node.key)
+        if kept is None or kept[0] is not node:
+            kept = self._borders[node.key] = node, borders_around(node)
+        return kept[1]
+
     def _items_around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield which items the Iterators around a container have come to."""
-        for path, border in borders_around(node):
+        for path, border in self._borders_around(node):
             number = getattr(border, 'item_number', 0)
             if number and self._items.get(path) != number:
                 self._items[path] = number
@@ -178,7 +195,7 @@ class Checkpointer:
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending + list(self._collected(node)) + list(self._ended_goals())
-        facts += (fact_of('', name, plain) for name, plain in self._top.tree.spent().items())
+        facts += self._spent()
         self._pending = []
         self._seq_stored = event.seq
         behind, self._behind = self._behind, None
@@ -186,14 +203,23 @@ class Checkpointer:
             NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
                       tuple(facts), behind), lambda: must_stop(node))
 
+    def _spent(self) -> Iterator[Fact]:
+        """Yield what has changed of what is spent, the time of the budget in whole seconds."""
+        spent = self._top.tree.spent()
+        recoveries, questions, time_s = spent['budget']
+        spent['budget'] = [recoveries, questions, int(time_s)]
+        for name, plain in spent.items():
+            if self._spent_stored.get(name) != plain:
+                self._spent_stored[name] = plain
+                yield fact_of('', name, plain)
+
     def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
         """Yield what is new of a container."""
         labels = self._ran.pop(node.key, set())
         yield from self._facts_of(node).changed(list(labels))
         reached = None if all_keys else frozenset().union(
             *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
-        yield from self._keys(node.path if node.branch is not None else node.key,
-                              node.machine.userdata._data, reached)
+        yield from self._keys(_userdata_path(node), node.machine.userdata._data, reached)
 
     def _keys(self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
               ) -> Iterator[Fact]:
@@ -205,17 +231,25 @@ class Checkpointer:
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata into which the outputs of a container have gone."""
-        for path, border in borders_around(node):
+        for path, border in self._borders_around(node):
+            self._wrote[path] = node.key
             yield from self._keys(path, border.container.userdata._data, None)
         if node.parent is not None and len(node.below) == 1:
+            self._wrote[node.parent.key] = node.key
             yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         if (path, out.key) in self._told:
             return
         self._told.add((path, out.key))
-        smach.logwarn('{}: userdata key {!r} ({}) cannot be stored: {}. It will be missing where '
-                      'the machine is resumed'.format(path, out.key, out.kind, out.why))
+        smach.logwarn('{}: userdata key {!r} ({}) of {} cannot be stored: {}. It will be missing '
+                      'where the machine is resumed'.format(
+                          path, out.key, out.kind, self._wrote.get(path, 'the script'), out.why))
+
+
+def _userdata_path(node: TreeNode) -> str:
+    """Return the path of the container whose userdata a node's states work on."""
+    return node.path if node.branch is not None else node.key
 
 
 def must_stop(node: TreeNode) -> bool:

@@ -1,6 +1,6 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 import time
-from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Sequence
 
 import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
@@ -22,6 +22,7 @@ from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
+GONE = 'the program was stopped at {}, which is not there any more'
 NOT_BEGUN = 'the program was stopped before it began'
 
 
@@ -37,6 +38,8 @@ class Resumption(NamedTuple):
     changes: List[str]  # how the script differs from the one that was stopped
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
     is_earlier: bool = False  # whether later moments of the trial are stored
+    renamed: Mapping[str, str] = {}  # paths of states by those that they had
+    structure: str = ''  # id of that which was stopped
 
     @property
     def age_s(self) -> float:
@@ -51,6 +54,8 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
             resumption.moment) if resumption.is_earlier else '', resumption.age_s))
     for change in resumption.changes:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
+    for old, new in resumption.renamed.items():
+        smach.logwarn('{}: goes on with {} as {}'.format(top.path, old, new))
     _end_goals(top, resumption)
     top.emit(EventKind.RESUMED, data={
         'last_seq': resumption.seq, 'moment': resumption.moment,
@@ -86,7 +91,7 @@ class EntryPoint:
         stored = self._stored
         if stored.history:
             node.records.history.take_over(stored.visits, stored.visits_of_execution,
-                                           stored.history)
+                                           _of_states(node, stored.history))
 
     def enter(self, node: TreeNode) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
@@ -99,12 +104,23 @@ class EntryPoint:
             node.warn('userdata key {!r} {}'.format(key, 'has the value that the script gives it, '
                                                     'as {}'.format(why) if key in data
                                                     else 'is missing, as ' + why))
+        stored.complete_snapshots(data)
         for label, snapshot in stored.snapshots.items():
             if label in machine._states and not node.is_oracle(label):
                 node.record(label).snapshot = snapshot
         machine._set_current_state(stored.label)
         if self._down:
             node.record(stored.label).go_down(self._down)
+
+
+def _of_states(node: TreeNode, told: List[Any]) -> List[Any]:
+    """Return what a history told, without the states that are gone."""
+    def there(label: Any) -> Any:
+        return label if label in node.machine._states else None
+
+    return [there(each) for each in told[:3]] + [
+        [there(state), successes, there(anchor), is_anchored]
+        for state, successes, anchor, is_anchored in told[3:]]
 
 
 def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
@@ -124,7 +140,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
             if label in node.machine._states and not node.is_oracle(label):
                 latest = max(latest, _restore(node, node.record(label), told))
         if stored.history:
-            node.records.history.take_over([], 0, stored.history)
+            node.records.history.take_over([], 0, _of_states(node, stored.history))
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
     if resumption.begins_at:
@@ -167,6 +183,13 @@ class _Setting:
     def activate(self, node: TreeNode) -> None:
         """Set a container that was under way, and what is in its state."""
         stored = self._resumption.tree.container(node.key)
+        moved = stored if stored.moved_to else self._left_below(node, stored)
+        if moved is not None:
+            self._go_on_elsewhere(node, moved)
+            return
+        if stored.label not in node.machine._states:
+            self._ask_at_beginning(node, stored, stored.label)
+            return
         if node.branch is None:
             node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
         record = node.record(stored.label)
@@ -188,7 +211,7 @@ class _Setting:
             return
         for path, border in borders_in(node, stored.label):
             told = self._resumption.tree.container(path)
-            border.resume(told.keys, told.gone, told.item)
+            border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
         for each in inside:
             self._set(each)
 
@@ -196,11 +219,57 @@ class _Setting:
         """Set a container in a state that was under way."""
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
-            node.ended_before = stored.label
+            if stored.label in node.machine.get_registered_outcomes():
+                node.ended_before = stored.label
+            else:
+                self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
             self.activate(node)
         else:
             self._ask_before(node, node.machine._initial_state_label or '')
+
+    def _left_below(self, node: TreeNode, stored: StoredContainer) -> Optional[StoredContainer]:
+        """Return the container in a state under way whose own states are elsewhere now."""
+        key = '{}/{}'.format(node.key, stored.label)
+        below = self._resumption.tree.container(key)
+        is_gone = stored.phase == IN and all(each.key != key for each in self._nodes)
+        return below if is_gone and below.moved_to else None
+
+    def _go_on_elsewhere(self, node: TreeNode, stored: StoredContainer) -> None:
+        """Send the machine to where the state stands now that was under way in a container."""
+        top = node.top()
+        place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
+        way = None if place is None else way_to(top, place)
+        # beside it others may run, which would be left
+        if place is None or way is None or any(
+                len(each.below) > 1 or each.branch is not None for each in _up_from(node)):
+            self._ask_at_beginning(node, stored, stored.label)
+            return
+        stood = self._resumption.tree.container(top.key)
+        stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at[3]
+        top.resuming = EntryPoint(stood, way.down[1:])
+        there = StoredContainer()
+        there.at = at
+        record = place.node.record(place.label)
+        if asked and asked[0] == place.label and not self._resumption.is_earlier:
+            record.open_question = asked[1]
+        if there.phase == IN:
+            self._go_on_in(place.node, there, record)
+        elif there.phase == FAILED or self._resumption.asks:
+            record.resume(self._unfinished(place.node, there))
+
+    def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
+        """Have a person asked before a container begins that stood where it cannot go on."""
+        label = node.machine._initial_state_label
+        if label not in node.machine._states:
+            label = next(iter(node.labels()), '')
+        if not label:
+            return
+        stored.at, stored.asked = [label, BEFORE], []
+        if node.branch is None:
+            node.resuming = EntryPoint(stored)
+        node.record(label).resume(Unfinished(
+            FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption)))
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
@@ -215,6 +284,9 @@ class _Setting:
         snapshots = self._resumption.tree.container(node.path).snapshots
         if stored.phase == FAILED:
             kind, outcome, text = stored.at[2:5]
+            if outcome and outcome not in node.machine._transitions.get(stored.label, ()):
+                kind, text = FailureKind.INTERRUPTED, GONE.format('outcome ' + outcome)
+                outcome = ''
             return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label))
         return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label))
 
@@ -223,6 +295,13 @@ class _Setting:
         inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
         state = node.machine._states.get(label)
         return inside if inside and _is_wrapped_through(state) else None
+
+
+def _up_from(node: TreeNode) -> Iterator[TreeNode]:
+    """Yield a container and those above it, but the top one."""
+    while node.parent is not None:
+        yield node
+        node = node.parent
 
 
 def _is_wrapped_through(state: object) -> bool:

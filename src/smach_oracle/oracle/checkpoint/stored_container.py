@@ -1,7 +1,7 @@
 """What a store says of one container at one moment."""
 from typing import Any, Dict, List, Mapping
 
-from smach_oracle.store.names import BEFORE
+from smach_oracle.store.names import BEFORE, MOVED
 
 from ..records.visits import Visit
 
@@ -31,10 +31,22 @@ class StoredContainer:
         self.item = 0
         self.gone: List[str] = []
 
+    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+        """Have in the snapshots what could not be stored, as the userdata have it now."""
+        for key in self.missing:
+            if key in data:
+                for snapshot in self.snapshots.values():
+                    snapshot.setdefault(key, data[key])
+
     @property
     def phase(self) -> str:
         """The phase, '' where it has not begun."""
         return str(self.at[1]) if self.at else ''
+
+    @property
+    def moved_to(self) -> str:
+        """Path of the state at which it stood, where that is in another container now, else ''."""
+        return str(self.at[2]) if self.phase == MOVED else ''
 
     @property
     def jumped_to(self) -> str:

@@ -1,6 +1,6 @@
 """Reads what a store says of the containers of a tree at one moment."""
 import json
-from typing import Any, Dict, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple
 
 from smach_oracle.store.codecs import Codecs, NotReadable
 from smach_oracle.store.errors import StoreDamaged
@@ -17,6 +17,7 @@ from smach_oracle.store.names import (
     STATE,
     VISIT,
 )
+from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
 from smach_oracle.store.store_file import StoreFile
 
@@ -44,13 +45,16 @@ class StoredTree(NamedTuple):
         return self.containers.get(key) or StoredContainer()
 
 
-def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int] = None
-              ) -> StoredTree:
+def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int] = None,
+              renaming: Optional[Renaming] = None) -> StoredTree:
     """Return what a store says at a moment of a trial, by default the last one.
+
+    `renaming`: to names that states have got since.
 
     :raises StoreDamaged: where the store cannot be read.
     """
-    return _Reading(store, codecs).read(trial, until)
+    facts = store.facts(trial, until)
+    return _Reading(store, codecs).read(facts if renaming is None else map(renaming, facts))
 
 
 class _Reading:
@@ -64,9 +68,9 @@ class _Reading:
         self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
         self._decoded: Dict[StoredValue, Any] = {}
 
-    def read(self, trial: int, until: Optional[int]) -> StoredTree:
+    def read(self, facts: Iterable[StoredFact]) -> StoredTree:
         before: Optional[StoredFact] = None
-        for fact in self._store.facts(trial, until):
+        for fact in facts:
             if before is not None and before.moment != fact.moment:
                 self._note_entry(before)
             before = fact

@@ -1,27 +1,31 @@
 """The store of one trial: opened before it begins, held while it runs."""
 import os
+import sqlite3
 import time
-from typing import Optional, Set, Tuple
+from typing import List, Optional, Set, Tuple
 
 import smach
+from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED, GOAL
-from smach_oracle.store.rows import StoredTrial
+from smach_oracle.store.names import ENDED, GOAL, RENAMED, STRUCTURE
+from smach_oracle.store.rows import Fact, StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
 from ..branches.items import can_be_indexed
-from ..errors import SettingsError
+from ..errors import CheckpointError, SettingsError
 from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
+from .changed_script import changed_script
 from .checkpointer import Checkpointer
+from .container_facts import fact_of
 from .resuming import Resumption, go_on
 from .storable import CODECS
 from .stored_tree import StoredTree, read_tree
-from .structure import differences, structure_of
+from .structure import structure_of
 
 # what may be resumed: the program was stopped, and the task was not done
 _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
@@ -49,9 +53,16 @@ class TrialStore:
         self._structure = structure_of(top)
 
     def to_resume(self) -> Optional[Resumption]:
-        """Return the trial that goes on, None where a new one begins."""
+        """Return the trial that goes on, None where a new one begins.
+
+        :raises CheckpointError: where the store cannot be read or written.
+        :raises SettingsError: for a moment to go on from that is none of the trial.
+        """
         try:
             return self._to_resume()
+        except (StoreError, sqlite3.Error) as err:
+            self._let_go()
+            raise _refused(err, self._top) from err
         except BaseException:
             self._let_go()
             raise
@@ -68,13 +79,14 @@ class TrialStore:
         top = tree.container(self._top.key)
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
-        if earlier:
-            return self._resumption(last, tree, word == ASK, earlier)
-        if top.phase in ('', ENDED) or word == RESTART:
+        if not earlier and (top.phase in ('', ENDED) or word == RESTART):
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None
-        return self._resumption(last, tree, word == ASK)._replace(begins_at=path)
+        resumed = self._resumption(last, tree, word == ASK, earlier)
+        if resumed.renamed:
+            self._store.keep_structure(self._structure)
+        return resumed if earlier else resumed._replace(begins_at=path)
 
     def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
         """Return the number of the moment that the settings name, 0 for the last one.
@@ -99,35 +111,51 @@ class TrialStore:
     def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
                     earlier: int = 0) -> Resumption:
         """Return how a trial goes on; `tree`: what its last moment says."""
-        changes = []
-        if trial.structure != self._structure.id:
-            changes = differences(self._store.description(trial.structure),
-                                  self._structure.description)
         moments = self._store.moments(trial.number)
+        # what runs elsewhere, and what was asked, has not become undone
+        kept = {name: value for name, value in tree.whole.items()
+                if name.startswith(GOAL) or name == 'questions'}
         if earlier:
-            # what runs elsewhere, and what was asked, has not become undone
-            kept = {name: value for name, value in tree.whole.items()
-                    if name.startswith(GOAL) or name == 'questions'}
             tree = read_tree(self._store, trial.number, CODECS, earlier)
-            tree.whole.update(kept)
+        changed = changed_script(self._top, self._store, trial, tree, self._structure)
+        if changed.renaming is not None:
+            tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
+        tree.whole.update(kept)
         return Resumption(trial, tree, earlier or moments[-1].number,
                           max(each.seq for each in moments), moments[-1].at,
-                          asks or bool(changes), changes, is_earlier=bool(earlier))
+                          asks or bool(changed.changes and changed.renaming is None),
+                          changed.changes, is_earlier=bool(earlier), renamed=changed.names,
+                          structure=changed.before)
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
-        """Store the trial from now on, and set the tree to where it was where it is resumed."""
+        """Store the trial from now on, and set the tree to where it was where it is resumed.
+
+        :raises SettingsError: where it is to go on in a state that is not there.
+        """
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            go_on(top, resumed)
+            try:
+                go_on(top, resumed)
+            except BaseException:
+                self._let_go()
+                raise
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
         self._observer = Checkpointer(top, self._writer, CODECS,
                                       None if resumed is None else resumed.tree,
-                                      resumed.moment if resumed and resumed.is_earlier else None)
+                                      resumed.moment if resumed and resumed.is_earlier else None,
+                                      self._facts_of_new_names(resumed))
         GOALS.observers.append(self._observer.goal_begins)
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
+
+    def _facts_of_new_names(self, resumed: Optional[Resumption]) -> List[Fact]:
+        """Return what is stored of a trial that goes on with other names of states."""
+        if resumed is None or not resumed.renamed:
+            return []
+        return [fact_of('', STRUCTURE, self._structure.id),
+                fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
@@ -156,6 +184,14 @@ def _tell_what_begins_anew(top: TreeNode) -> None:
 def open_store(top: TreeNode) -> Optional[TrialStore]:
     """Return the store that the settings name, None where they name none.
 
-    :raises StoreError: where it cannot be opened, or another process holds the machine.
+    :raises CheckpointError: where it cannot be opened, or another process holds the machine.
     """
-    return TrialStore(top) if top.settings.checkpoint else None
+    try:
+        return TrialStore(top) if top.settings.checkpoint else None
+    except StoreError as err:
+        raise _refused(err, top) from err
+
+
+def _refused(err: Exception, top: TreeNode) -> CheckpointError:
+    return CheckpointError('{} does not begin, as its store cannot be used: {}'.format(
+        top.path, err))

@@ -15,7 +15,7 @@ from .budget import Budget, checked_budget
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
-from .on_resume import checked_on_resume
+from .on_resume import checked_on_resume, checked_resume_map
 from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .policy_choice import checked_policy
 from .preconditions import PreconditionSpec, Resolver, parse_preconditions
@@ -80,6 +80,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
     'on_resume': checked_on_resume,
     'resume_from': values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62),
+    'resume_map': checked_resume_map,
     'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
@@ -130,6 +131,8 @@ class Settings:
     # what is done about a stored trial that was not finished, and for STATE the path of a state
     on_resume: Tuple[str, str] = ('ask', '')
     resume_from: int = 0  # number of the stored moment, 0: the last one of a trial
+    # paths of states by those that they had in the script that was stopped
+    resume_map: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

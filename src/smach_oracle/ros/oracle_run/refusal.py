@@ -1,4 +1,4 @@
-"""Ends a script's process with exit code 2 where the settings do not fit one of its machines."""
+"""Ends a script's process with exit code 2 where one of its machines cannot begin."""
 import sys
 import threading
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from typing import Callable, Iterator
 
 import rospy
 
-from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.errors import CheckpointError, OracleError, SettingsError
 
 from ..shutdown import ShutdownGuard
 
@@ -28,7 +28,9 @@ class Refusal:
 
     @contextmanager
     def of_errors(self) -> Iterator[None]:
-        """Refuse a machine on a SettingsError, and every machine after that.
+        """Refuse a machine where its settings do not fit, or its store cannot be used.
+
+        Every machine after that is refused as well.
 
         :raises SystemExit: where it is refused.
         """
@@ -36,7 +38,7 @@ class Refusal:
             raise SystemExit(USAGE_ERROR)
         try:
             yield
-        except SettingsError as err:
+        except (SettingsError, CheckpointError) as err:
             self._refuse(err)
             raise SystemExit(USAGE_ERROR) from None
 
@@ -49,7 +51,7 @@ class Refusal:
             if self._refused:
                 sys.exit(USAGE_ERROR)
 
-    def _refuse(self, err: SettingsError) -> None:
+    def _refuse(self, err: OracleError) -> None:
         with self._lock:
             is_first, self._refused = not self._refused, True
         if not is_first:
@@ -59,5 +61,5 @@ class Refusal:
         if threading.current_thread() is not threading.main_thread() and (
                 rospy.core.is_initialized()):
             # a hook of the script may wait for this very thread
-            threading.Thread(target=rospy.signal_shutdown, args=('the settings do not fit',),
+            threading.Thread(target=rospy.signal_shutdown, args=('a machine cannot begin',),
                              name='refusal', daemon=True).start()

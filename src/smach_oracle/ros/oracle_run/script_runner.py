@@ -40,7 +40,7 @@ from .refusal import USAGE_ERROR, Refusal
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--record',
-                      '--record-topic', '--checkpoint', '--from')
+                      '--record-topic', '--checkpoint', '--from', '--resume-map')
 
 
 class CommandLine(NamedTuple):
@@ -106,7 +106,21 @@ def make_parser() -> argparse.ArgumentParser:
                         '(default), ask, restart or state:LABEL')
     parser.add_argument('--from', metavar='NUMBER', type=int, dest='moment',
                         help='go on from an earlier stored moment of it: its number in the store')
+    parser.add_argument('--resume-map', metavar='OLD=NEW', action='append', default=[],
+                        type=_renamed, help='where the script has changed: the state that was OLD '
+                        'is NEW now, each a label or a path (repeatable)')
     return parser
+
+
+def _renamed(text: str) -> List[str]:
+    """Return both names of a state.
+
+    :raises argparse.ArgumentTypeError: where they are not there.
+    """
+    names = [name.strip() for name in text.split('=')]
+    if len(names) != 2 or not all(names):
+        raise argparse.ArgumentTypeError('{!r}: OLD=NEW is wanted'.format(text))
+    return names
 
 
 class Invocation(NamedTuple):
@@ -158,6 +172,8 @@ def _stored(given: argparse.Namespace) -> Dict[str, Any]:
         found['on_resume'] = given.resume or 'recover'
     if given.moment is not None:
         found['resume_from'] = given.moment
+    if given.resume_map:
+        found['resume_map'] = dict(given.resume_map)
     return found
 
 
@@ -183,6 +199,8 @@ def check(invocation: Invocation) -> None:
         settings = Settings.from_dict(loaded, partial(_check_name, invocation.script))
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
+        if settings.checkpoint:
+            check_writable('checkpoint', settings.checkpoint, replaced=True)
     if invocation.options.record and not invocation.only_check:
         from ..recorder import prepare_folder
         prepare_folder(invocation.options.record)
@@ -337,6 +355,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     guard.install()
     atexit.register(attachment.attachments().close, 1.0)
     refusal = Refusal(guard, tell)
+    attachment.attachments().refusing = refusal.of_errors
     Interception(MachineWrapper(invocation, refusal)).install()
     with refusal.decides_exit_code():
         run_script(invocation.script, invocation.script_args)

@@ -21,8 +21,8 @@ from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials
 ROOT = Path(__file__).resolve().parents[4]
 SHAPES = server.STATIC / 'js' / 'server'
 SECTIONS = {'heard', 'onlookers', 'cameras', 'questions', 'servers', 'preconditions', 'images',
-            'robots', 'trials', 'bags', 'sensors', 'manipulation', 'interface_output', 'live',
-            'graph'}
+            'robots', 'down', 'trials', 'bags', 'sensors', 'manipulation', 'interface_output',
+            'live', 'graph'}
 BEGINNING = '''import * as server from {};
 export type Taken = {{ [Name in keyof server.Commands]:
   {{ [Argument in keyof server.Commands[Name]]-?: true }} }};

@@ -1,11 +1,16 @@
 """The command oracle_state, on the store of a machine that was killed."""
+import contextlib
+import os
+
 import pytest
 from killed_machines import KilledMachine, Noted
 
 import smach
 from smach_oracle.store.holding import MachineLock
 from smach_oracle.store.state_command import main
+from smach_oracle.store.store_file import StoreFile
 
+NOBODY = 65534
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
 
 
@@ -30,6 +35,28 @@ def killed(tmp_path):
     assert machine.run(kill_at=11) is None
     assert machine.diary.count('begins')['X'] == 1
     return machine
+
+
+@contextlib.contextmanager
+def read_only(folder):
+    """Within it nothing in a folder can be written, not even by root."""
+    names = [folder] + [os.path.join(folder, name) for name in os.listdir(folder)]
+    modes = {name: os.stat(name).st_mode for name in names}
+    user = os.geteuid()
+    os.chmod(folder, 0o555)
+    for name in names[1:]:
+        os.chmod(name, 0o444)
+    above = os.path.dirname(folder)
+    os.chmod(above, os.stat(above).st_mode | 0o055)
+    if user == 0:
+        os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(user)
+        for name, mode in modes.items():
+            if os.path.exists(name):
+                os.chmod(name, mode)
 
 
 def told(capsys, *arguments):
@@ -109,6 +136,51 @@ def test_a_wrong_change_is_refused_with_what_is_allowed(killed, capsys, change, 
 def test_a_trial_that_has_ended_is_not_changed(killed, capsys):
     killed.run()
     assert 'has ended (succeeded)' in refused(capsys, killed.store, 'goto', 'A')
+
+
+EVERY = [[], ['show'], ['moments'], ['log'], ['edit', 'done=[]'], ['goto', 'A'], ['drop']]
+
+
+@pytest.mark.parametrize('command', EVERY)
+def test_what_cannot_be_opened_is_told_in_one_line(tmp_path, capsys, command):
+    notes = tmp_path / 'notes.txt'
+    notes.write_text('These are my notes, and no store of a machine. ' * 20)
+    for path, why in ((tmp_path / 'none' / 'robot.db', 'there is no such store'),
+                      (tmp_path, 'unable to open'), (notes, 'is damaged, or no store')):
+        said = refused(capsys, path, *command)
+        assert said.count('\n') == 1 and why in said and str(path) in said
+
+
+@pytest.mark.parametrize('command', EVERY)
+def test_a_damaged_store_is_told_in_one_line(killed, capsys, command):
+    StoreFile(killed.store).close()  # its log goes into the database
+    with open(killed.store, 'r+b') as stream:
+        stream.seek(0, 2)
+        size = stream.tell()
+        stream.seek(100)
+        stream.write(b'\xa5' * (size - 100))
+    said = refused(capsys, killed.store, *command)
+    assert said.count('\n') == 1 and 'is damaged' in said
+
+
+@pytest.mark.parametrize('command', EVERY)
+def test_a_store_that_cannot_be_written_is_looked_at_and_not_changed(killed, capsys, command):
+    """As from a medium that is read only, and with no file of the log beside it."""
+    StoreFile(killed.store).close()
+    folder = os.path.dirname(killed.store)
+    before = sorted(os.listdir(folder))
+    with read_only(folder):
+        try:
+            code = main([killed.store, *command])
+        except SystemExit as err:
+            code = err.code
+    said = capsys.readouterr()
+    if command and command[0] in ('edit', 'goto', 'drop'):
+        assert code == 2 and said.err.count('\n') == 1 and killed.store in said.err
+    else:
+        assert code == 0, said.err
+    assert sorted(os.listdir(folder)) == before
+    assert told(capsys, killed.store, 'log') == ''
 
 
 def test_looking_for_a_store_makes_none(tmp_path, capsys):

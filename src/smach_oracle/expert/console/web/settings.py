@@ -27,6 +27,7 @@ class ConsoleSettings(NamedTuple):
     certificate: str  # '' without TLS
     private_key: str
     bags: Tuple[str, ...] = ()  # folders
+    stores: Tuple[str, ...] = ()  # files in which programs keep where their machines stand
     # by robot: topics, or names above them
     cameras: Mapping[str, Tuple[str, ...]] = MappingProxyType({})
 
@@ -58,7 +59,9 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
     return ConsoleSettings(address, _port('~port', get('port', DEFAULT_PORT)),
                            load_tokens(token_file) if token_file else None,
                            AllowedHosts(_hosts(get, remote), addresses=remote), certificate, key,
-                           _folders(get('bags', [])), _cameras(get('cameras', {})))
+                           _paths('~bags', get('bags', []), 'folders'),
+                           _paths('~stores', get('stores', []), 'files'),
+                           _cameras(get('cameras', {})))
 
 
 def _hosts(get: GetParameter, remote: bool) -> List[str]:
@@ -71,12 +74,12 @@ def _hosts(get: GetParameter, remote: bool) -> List[str]:
     return names + ([own, own.split('.')[0], own.split('.')[0] + '.local'] if remote else [])
 
 
-def _folders(value: object) -> Tuple[str, ...]:
-    folders = value.split(os.pathsep) if isinstance(value, str) else value
-    if not isinstance(folders, list) or not all(isinstance(folder, str) for folder in folders):
-        raise SettingsError('~bags', value,
-                          'folders separated by {}, or a list of folders'.format(os.pathsep))
-    return tuple(os.path.abspath(path_of(folder)) for folder in folders if folder not in ('', NONE))
+def _paths(name: str, value: object, what: str) -> Tuple[str, ...]:
+    paths = value.split(os.pathsep) if isinstance(value, str) else value
+    if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
+        raise SettingsError(name, value, '{} separated by {}, or a list of {}'.format(
+            what, os.pathsep, what))
+    return tuple(os.path.abspath(path_of(path)) for path in paths if path not in ('', NONE))
 
 
 def _cameras(value: object) -> Dict[str, Tuple[str, ...]]:

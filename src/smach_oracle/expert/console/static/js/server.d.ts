@@ -3,6 +3,7 @@
 // the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 import { Colour, Vector } from './drawing/types';
+import { DownMachine } from './down';
 import { HeldMachine } from './holding';
 
 export type Role = 'viewer' | 'operator' | 'teleoperator';
@@ -45,6 +46,7 @@ export interface Sections {
   images: ByKey<KeptImage[]>;
   cameras: { [robot: string]: string[] | undefined }; // topics of its own, the likeliest first
   robots: string[]; // names of their nodes
+  down: DownMachine[];
   trials: TrialOverview;
   bags: BagOverview;
   sensors: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };

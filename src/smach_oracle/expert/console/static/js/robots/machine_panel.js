@@ -5,6 +5,7 @@ import { aged } from '../page/liveness.js';
 import { remember, remembered } from '../page/preferences.js';
 import { arrange, redraw } from '../page/redraw.js';
 import { takeArrowKeys } from '../page/tree_keys.js';
+import { DownList } from './down_list.js';
 import { MachineHand } from './machine_hand.js';
 import { MachineView, machinesNow } from './machine_view.js';
 
@@ -48,6 +49,7 @@ class MachinePanel {
       h('div', { class: 'row head' }, this.title, this.state, h('span', { class: 'spacer' }),
         this.toggle), this.hand.root, this.view.root, legend());
     this.root = h('div', { class: 'panel machines' }, this.picker, this.body);
+    this.down = new DownList(app);
     this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
     this.showToggle();
   }
@@ -77,14 +79,17 @@ class MachinePanel {
 
   /** @param {string[]} names */
   update(names) {
-    if (names.some((name) => name === 'robots' || name === 'questions' || name.startsWith('live ')
+    if (names.some((name) => name === 'robots' || name === 'questions'
+      || name === 'down' || name.startsWith('live ')
       || name.startsWith('graph '))) this.show();
   }
 
   show() {
     const robots = (this.app.store.get('robots') || []).filter((robot) => this.paths(robot).length);
     this.settle(robots);
-    arrange(this.root, robots.length ? [this.picker, this.body] : this.empty);
+    this.down.show();
+    arrange(this.root, robots.length ? [this.picker, this.body, this.down.root]
+      : [this.empty, this.down.root]);
     this.showPicker(robots);
     setText(this.title, this.path || this.robot);
     const { alive, unwell } = this.source.state(this.robot);

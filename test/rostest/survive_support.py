@@ -1,0 +1,96 @@
+"""What the rostests of killed programs share: a task, and what its action server says."""
+import os
+import signal
+import tempfile
+import unittest
+
+import rospy
+from actionlib.msg import TestActionResult
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from oracle_support import oracle_run, script
+from smach_ros_support import ActionNodeProcess
+from waiting import wait_for
+
+from smach_oracle.ros.expert.server import ExpertQueryServer
+
+SCRIPT = '''
+import sys, numpy, rospy, smach, smach_ros
+from actionlib.msg import TestAction, TestGoal
+from geometry_msgs.msg import PointStamped
+rospy.init_node('task')
+class Look(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded'], [], ['seen', 'image'])
+    def execute(self, userdata):
+        print('LOOKS', flush=True)
+        seen = PointStamped()
+        seen.point.x = 1.5
+        userdata.seen = seen
+        userdata.image = numpy.arange(6).reshape(2, 3)
+        return 'succeeded'
+class Tell(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded', 'aborted'], ['seen', 'image'])
+    def execute(self, userdata):
+        print('SEEN', userdata.seen.point.x, userdata.image.tolist(), flush=True)
+        return sys.argv[2]
+sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+with sm:
+    smach.StateMachine.add('LOOK', Look(), {'succeeded': 'MOVE'})
+    smach.StateMachine.add('MOVE', smach_ros.SimpleActionState(
+        'arm', TestAction, goal=TestGoal(int(sys.argv[1]))), {'succeeded': 'TELL'})
+    smach.StateMachine.add('TELL', Tell())
+print('OUTCOME', sm.execute(), flush=True)
+'''
+SUCCEED = 150  # number of a goal
+EXPERTS = '/experts'
+ASKS = 'max_recoveries: 0\npolicy: prose\n'
+
+
+class Traffic:
+    """What the action server, which is never killed, says of its goals."""
+
+    def __init__(self, test):
+        self.results = []
+        self.active = set()  # ids of all that ever were
+        for end, kind, note in (('status', GoalStatusArray, self._status),
+                                ('result', TestActionResult, self.results.append)):
+            subscriber = rospy.Subscriber('/arm/' + end, kind, note, queue_size=10)
+            test.addCleanup(subscriber.unregister)
+            test.assertTrue(wait_for(subscriber.get_num_connections))
+
+    def _status(self, message):
+        self.active.update(each.goal_id.id for each in message.status_list
+                           if each.status == GoalStatus.ACTIVE)
+
+
+class SurvivingCase(unittest.TestCase):
+    """Runs the task with a store, and kills it."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.server = ActionNodeProcess('arm').start()
+        cls.experts = ExpertQueryServer(EXPERTS)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.stop()
+        cls.experts.stop()
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.store = os.path.join(folder.name, 'robot.db')
+        self.script = script(self, SCRIPT)
+        for name in ('checkpoint', 'expert_query_server'):  # of an earlier process
+            if rospy.has_param('/task/' + name):
+                rospy.delete_param('/task/' + name)
+        self.settings = script(self, ASKS, 'oracle.yaml')
+
+    def run_task(self, *words, goal=SUCCEED, told='succeeded'):
+        return oracle_run(self, '--checkpoint', self.store, *words, self.script, str(goal), told,
+                          '_expert_query_server:=' + EXPERTS)
+
+    def kill(self, task):
+        task.signal(signal.SIGKILL)
+        self.assertEqual(task.wait(), -signal.SIGKILL)

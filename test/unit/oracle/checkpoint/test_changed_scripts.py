@@ -1,0 +1,272 @@
+"""A machine that was killed goes on in a script whose states have other names or places."""
+import contextlib
+import io
+import json
+import os
+import re
+import shutil
+
+import pytest
+from killed_machines import KilledMachine, Noted
+
+import smach
+from smach_oracle.oracle import Expert
+from smach_oracle.store.state_command import main
+from smach_oracle.store.store_file import StoreFile
+
+ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+MAP = {'A': 'START', 'KITCHEN': 'GALLEY', 'KITCHEN/LOOK': 'GALLEY/SEE', 'BOTH/LEFT': 'BOTH/PORT',
+       'BOTH/LAST': 'BOTH/END', 'Z': 'Y'}
+OUTCOMES = ['succeeded', 'aborted']
+
+
+def task(**names):
+    """A builder of a task, some of whose labels are others. What the states note stays."""
+    def build(diary, points):
+        def name(label):
+            return names.get(label, label)
+
+        def noted(label, **options):
+            return Noted(label, diary, points, **options)
+
+        def pair(first, second):
+            machine = smach.StateMachine(OUTCOMES, ['done'], ['done'])
+            with machine:
+                machine.add(name(first), noted(first), {'succeeded': name(second)})
+                machine.add(name(second), noted(second), ENDS)
+            return machine
+
+        both = smach.Concurrence(OUTCOMES, 'aborted', ['done'], ['done'], outcome_map={
+            'succeeded': {name('LEFT'): 'succeeded', name('LAST'): 'succeeded'}})
+        with both:
+            both.add(name('LEFT'), noted('LEFT'))
+            both.add(name('LAST'), pair('M1', 'M2'))
+        machine = smach.StateMachine(OUTCOMES)
+        machine.userdata.done = []
+        with machine:
+            machine.add(name('A'), noted('A', failures=1), {'succeeded': name('KITCHEN')})
+            machine.add(name('KITCHEN'), pair('LOOK', 'PICK'), {'succeeded': 'BOTH'})
+            machine.add('BOTH', both, {'succeeded': name('Z')})
+            machine.add(name('Z'), noted('Z'), ENDS)
+        return machine
+    return build
+
+
+BEFORE = task()
+RENAMED = task(A='START', KITCHEN='GALLEY', LOOK='SEE', LEFT='PORT', LAST='END', Z='Y')
+
+
+def flat_before(diary, points):
+    machine = smach.StateMachine(OUTCOMES)
+    machine.userdata.done = []
+    with machine:
+        for label, follows in (('A', 'B'), ('B', 'C'), ('C', 'D'), ('D', 'succeeded')):
+            machine.add(label, Noted(label, diary, points), {'succeeded': follows})
+    return machine
+
+
+def nested_after(diary, points):
+    """B and C stand in a machine of their own."""
+    inner = smach.StateMachine(OUTCOMES, ['done'], ['done'])
+    with inner:
+        inner.add('B', Noted('B', diary, points), {'succeeded': 'C'})
+        inner.add('C', Noted('C', diary, points), ENDS)
+    machine = smach.StateMachine(OUTCOMES)
+    machine.userdata.done = []
+    with machine:
+        machine.add('A', Noted('A', diary, points), {'succeeded': 'IN'})
+        machine.add('IN', inner, {'succeeded': 'D'})
+        machine.add('D', Noted('D', diary, points), ENDS)
+    return machine
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path
+
+
+def points_of(folder, build):
+    number = KilledMachine(folder, build).run()['points']
+    anew(folder)
+    return number
+
+
+def anew(folder):
+    shutil.rmtree(str(folder))
+    folder.mkdir()
+
+
+def killed_while_it_runs(folder, machine, name):
+    """Kill a machine while a state is under way for the first time."""
+    for point in range(1, 100):
+        anew(folder)
+        machine.run(kill_at=point)
+        if os.path.exists(str(folder / 'diary')) and machine.diary.count('begins')[name]:
+            return
+    raise AssertionError(name + ' never ran')
+
+
+def both_scripts(folder, before, after, **settings):
+    return KilledMachine(folder, before), KilledMachine(folder, after, **settings)
+
+
+def test_renamed_states_go_on_wherever_it_was_killed(folder):
+    whole = KilledMachine(folder, RENAMED).run()
+    anew(folder)
+    for point in range(1, points_of(folder, BEFORE) + 1):
+        before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+        assert before.run(kill_at=point) is None
+        told = after.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        begun, ended = after.diary.count('begins'), after.diary.count('ends')
+        # A fails the first time in each process, and may be in doubt
+        most = {name: 2 for name in begun}
+        most['A'] = 4
+        assert all(begun[name] <= most[name] for name in begun), (point, begun)
+        assert set(ended) == {'A', 'LOOK', 'PICK', 'LEFT', 'M1', 'M2', 'Z'}, point
+        if begun['A'] == 2:  # it had failed once, and then succeeded: that is kept
+            assert told['rates'] == whole['rates'], point
+        anew(folder)
+
+
+def test_what_has_moved_into_another_container_goes_on_there(folder):
+    names = {'B': 'IN/B', 'C': 'IN/C'}
+    for point in range(1, points_of(folder, flat_before) + 1):
+        before, after = both_scripts(folder, flat_before, nested_after, resume_map=names)
+        before.run(kill_at=point)
+        told = after.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        begun = after.diary.count('begins')
+        assert sum(begun[name] > 1 for name in begun) <= 1 and max(begun.values()) <= 2, point
+        assert told['done'][-1] == 'D', point
+        anew(folder)
+
+
+def test_what_has_moved_out_of_a_container_goes_on_there(folder):
+    names = {'IN': 'B', 'IN/B': 'B', 'IN/C': 'C'}
+    for point in range(1, points_of(folder, nested_after) + 1):
+        before, after = both_scripts(folder, nested_after, flat_before, resume_map=names)
+        before.run(kill_at=point)
+        told = after.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        begun = after.diary.count('begins')
+        assert sum(begun[name] > 1 for name in begun) <= 1 and max(begun.values()) <= 2, point
+        anew(folder)
+
+
+def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
+    before, after = both_scripts(folder, flat_before, nested_after, resume_map={
+        'B': 'IN/B', 'C': 'IN/C'}, states={'IN/C': {'on_retry': 'never'}})
+    killed_while_it_runs(folder, before, 'C')
+    after.run()
+    assert after.diary.count('begins')['C'] == 1
+
+
+def test_killed_once_more_it_still_goes_on(folder):
+    """The names are kept from the first moment of the second part on."""
+    points = points_of(folder, BEFORE)
+    for point in range(5, points, 7):
+        before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+        before.run(kill_at=point)
+        for _ in range(3):
+            after.run(kill_at=1)  # at its RESUMED event
+        told = after.run()
+        assert told['outcome'] == 'succeeded', (point, told)
+        anew(folder)
+
+
+def test_an_earlier_moment_of_before_can_still_be_gone_back_to(folder):
+    before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+    before.run(kill_at=40)
+    after.run(kill_at=4)
+    store = StoreFile(after.store, read_only=True)
+    first = next(each for each in store.moments(1)
+                 if each.kind == 'STATE_START' and each.label == 'PICK')
+    told = after.run(resume_from=first.number)
+    assert told['outcome'] == 'succeeded'
+    assert after.diary.count('begins')['LOOK'] == 1
+    assert after.diary.count('begins')['PICK'] >= 2
+
+
+@pytest.mark.parametrize('names, why', [
+    ({'NOWHERE': 'Y'}, "resume_map.NOWHERE: 'NOWHERE' is not allowed; allowed: a state of the "
+                       'machine that was stopped: A, BOTH'),
+    ({'A': 'NOWHERE'}, "resume_map.A: 'NOWHERE' is not allowed; allowed: a state of the machine: "
+                       'BOTH'),
+    ({'KITCHEN/A': 'Y'}, "resume_map.KITCHEN/A: 'KITCHEN/A'"),
+])
+def test_a_label_that_is_not_there_is_named_before_anything_moves(folder, names, why):
+    before, after = both_scripts(folder, BEFORE, RENAMED)
+    before.run(kill_at=12)
+    begun = before.diary.count('begins')
+    assert why in after.run(resume_map=names)['error']
+    assert before.diary.count('begins') == begun
+    assert after.run(resume_map=MAP)['outcome'] == 'succeeded'
+
+
+def test_without_a_map_a_person_decides_also_where_its_state_is_gone(folder):
+    for point in range(4, points_of(folder, BEFORE), 5):
+        before, after = both_scripts(folder, BEFORE, RENAMED)
+        before.run(kill_at=point)
+        begun = before.diary.count('begins')
+        told = after.run()
+        assert told.get('outcome') == 'aborted', (point, told)  # nobody was there to ask
+        assert before.diary.count('begins') == begun, point
+        anew(folder)
+
+
+def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
+    names = {old: new for old, new in MAP.items() if old != 'KITCHEN/LOOK'}
+    before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=names)
+    killed_while_it_runs(folder, before, 'LOOK')
+    begun = before.diary.count('begins')
+    assert after.run()['outcome'] == 'aborted'
+    assert before.diary.count('begins') == begun
+
+
+def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
+    before, after = both_scripts(folder, flat_before, nested_after)
+    killed_while_it_runs(folder, before, 'D')
+    noted = folder / 'question'
+
+    class Noting(Expert):
+        def ask(self, question, cancelled, progress):
+            noted.write_text(json.dumps([question.failed_state, question.reason + question.text,
+                                         question.userdata['done']]))
+
+        def run_interface(self, offer, question, cancelled, progress):
+            return None
+
+    told = after.run(expert=Noting())
+    assert noted.exists(), told
+    state, text, done = json.loads(noted.read_text())
+    assert (state, done) == ('D', ['A', 'B', 'C'])
+    assert re.search(r'the program was stopped \d+ s ago', text)
+    for change in ('container IN is new', 'state B is gone', 'state C is gone', 'state IN is new',
+                   'state A: succeeded led to B, and leads to IN'):
+        assert change in text
+
+
+def test_in_the_same_script_the_map_is_of_no_effect(folder):
+    before, after = both_scripts(folder, BEFORE, BEFORE, resume_map={'A': 'Z'})
+    before.run(kill_at=14)
+    assert after.run()['outcome'] == 'succeeded'
+
+
+def test_oracle_state_tells_the_new_names(folder):
+    before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+    killed_while_it_runs(folder, before, 'LOOK')
+    assert 'TOP/KITCHEN/LOOK was under way' in shown(before.store)
+    after.run(kill_at=1)
+    assert 'TOP/GALLEY/SEE was under way' in shown(before.store)
+    assert 'KITCHEN' not in shown(before.store)
+    assert main([after.store, 'goto', 'GALLEY/PICK']) == 0
+    told = after.run()
+    assert told['outcome'] == 'succeeded'
+    assert after.diary.count('begins')['LOOK'] == 1
+
+
+def shown(store):
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert main([store, 'show']) == 0
+    return out.getvalue()

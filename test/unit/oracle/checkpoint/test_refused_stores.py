@@ -1,0 +1,95 @@
+"""A store that cannot be used: what a program that wraps its machine itself gets."""
+import os
+
+import pytest
+
+import smach
+from smach_oracle.oracle import CheckpointError, OracleContainer
+from smach_oracle.oracle.errors import OracleError, SettingsError
+from smach_oracle.store.errors import StoreError
+from smach_oracle.store.holding import MachineLock
+from smach_oracle.store.store_file import StoreFile
+
+NOBODY = 65534
+
+
+class Moving(smach.State):
+    def __init__(self, moved):
+        smach.State.__init__(self, ['succeeded'])
+        self._moved = moved
+
+    def execute(self, userdata):
+        self._moved.append(1)
+        return 'succeeded'
+
+
+def wrapped(store, moved, **settings):
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        smach.StateMachine.add('MOVE', Moving(moved), {'succeeded': 'succeeded'})
+    return OracleContainer.wrap(machine, name='TOP', settings=dict(settings, checkpoint=str(store)))
+
+
+def no_folder(path):
+    return path / 'none' / 'robot.db', 'cannot be locked'
+
+
+def notes(path):
+    (path / 'notes.txt').write_text('These are my notes, and they are long enough. ' * 20)
+    return path / 'notes.txt', 'is damaged, or no store'
+
+
+def cut_off(path):
+    StoreFile(str(path / 'robot.db')).close()
+    os.truncate(str(path / 'robot.db'), 5000)
+    return path / 'robot.db', 'robot.db: '
+
+
+@pytest.mark.parametrize('make', [no_folder, notes, cut_off])
+def test_it_is_named_and_nothing_has_run(tmp_path, make):
+    store, why = make(tmp_path)
+    moved = []
+    with pytest.raises(CheckpointError, match='TOP does not begin') as caught:
+        wrapped(store, moved).execute()
+    assert why in str(caught.value) and isinstance(caught.value, OracleError)
+    assert not moved
+
+
+def test_a_machine_that_is_held_can_begin_once_it_is_free(tmp_path):
+    moved = []
+    lock = MachineLock(str(tmp_path / 'robot.db'), 'TOP')
+    lock.take()
+    machine = wrapped(tmp_path / 'robot.db', moved)
+    with pytest.raises(CheckpointError, match='held by process {}'.format(os.getpid())):
+        machine.execute()
+    assert not moved
+    lock.release()
+    assert machine.execute() == 'succeeded'
+
+
+def test_after_a_wrong_setting_the_machine_is_let_go(tmp_path):
+    store = StoreFile(str(tmp_path / 'robot.db'))
+    store.close()
+    with pytest.raises(SettingsError):
+        wrapped(tmp_path / 'robot.db', [], resume_from=7).execute()
+    assert wrapped(tmp_path / 'robot.db', []).execute() == 'succeeded'
+
+
+def test_a_store_that_cannot_be_written_is_found_out_when_it_is_opened(tmp_path):
+    path = str(tmp_path / 'robot.db')
+    StoreFile(path).close()
+    os.chmod(str(tmp_path), 0o777)
+    os.chmod(path, 0o444)
+    child = os.fork()
+    if not child:
+        code = 1
+        try:
+            if os.geteuid() == 0:
+                os.chdir(str(tmp_path))
+                os.setuid(NOBODY)
+            StoreFile('robot.db')
+        except StoreError:
+            code = 0
+        finally:
+            os._exit(code)
+    assert os.waitpid(child, 0)[1] == 0
