@@ -67,6 +67,7 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
     The outer face is known by its handle: edges of shelves and walls make planes, too.
     """
     best = (0.0, 0.0, 0)
+    bins = np.arange(-SLACK, SLACK + BIN, BIN)
     for angle in np.arange(0.0, MOST_OPEN, STEP):
         door_from_fridge = inverse(door_frame(kitchen, angle))
         local = apply(door_from_fridge, points)
@@ -75,7 +76,8 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
         face = kitchen.door_thickness if apply(door_from_fridge, eye)[0] > 0 else 0.0
         on_it = (local[:, 1] > 0.05) & (local[:, 1] < kitchen.width + 0.02)
         offsets = local[on_it, 0] - face
-        counts, edges = np.histogram(offsets, bins=np.arange(-SLACK, SLACK + BIN, BIN))
+        offsets = offsets[(offsets >= bins[0]) & (offsets <= bins[-1])]  # a histogram sorts them
+        counts, edges = np.histogram(offsets, bins=bins)
         pairs = counts[:-1] + counts[1:]
         peak = int(np.argmax(pairs))
         inside = offsets[(offsets >= edges[peak]) & (offsets < edges[peak + 2])]
