@@ -74,9 +74,6 @@ class Teleoperation(ConsolePage, unittest.TestCase):
                          tcp_nodelay=True)
         cls.begin('console_teleoperation_robot.py', size=(1360, 1000))
 
-    def setUp(self):
-        open('/tmp/cr_tele_progress','a').write('%.0f %s\n' % (time.time(), self.id()))
-
     @classmethod
     def heard(cls, command):
         cls.commands.append((time.monotonic(), command))
