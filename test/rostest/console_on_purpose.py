@@ -113,7 +113,7 @@ return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
     return shown.hint.textContent;
   });
 });'''
-# how a machine stands whose state ORACLE is its oracle by its graph, or is no other state, or is one
+# how a machine stands whose state ORACLE is its oracle, by its graph or as no other state, or not
 STANDING = '''
 return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
   const machine = { path: "TOP", running: true, paused: true, by: "ann", breakpoints: [], active: [
