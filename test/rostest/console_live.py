@@ -47,7 +47,14 @@ return import("/static/js/page/gate.js").then(({ Gate }) => {
 });'''
 STOPS = ['stop_hand', 'leave_wheel', 'release', 'stop_machine', 'pause_machine']
 ANSWERS = ['answer', 'hand_over', 'resume_machine', 'step_machine', 'confirm_state']
-GREY = 'return getComputedStyle(document.querySelector(".detail-body")).filter'
+GREY = 'return getComputedStyle(document.querySelector(".detail .answers")).filter'
+# what lies between the button that stops and the page, by how it is shown
+COLOURS_OF_STOP = '''
+let found = [];
+for (let it = document.querySelector(".detail .machine-hand .stop"); it; it = it.parentElement) {
+  found.push(getComputedStyle(it).filter);
+}
+return [...new Set(found)];'''
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -141,6 +148,7 @@ class Live(ConsolePage, unittest.TestCase):
         try:
             self.assertTrue(self.refused('/alpha'))
             self.assert_accessible('a robot that is silent')
+            self.assertEqual(self.browser.run(COLOURS_OF_STOP), ['none'], 'it keeps its colours')
             self.assertEqual(self.browser.text('#status'), LIVE, 'the others are heard')
             self.browser.click('#tab-machines')
             self.assertTrue(wait_for(lambda: self.browser.run(

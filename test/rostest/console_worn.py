@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import WITH_BROWSER, ConsolePage
 from page_growth import OPEN_AND_LEAVE, samples, slopes_of
 
-WARM_UP, QUESTIONS, EVERY = 10, 200, 20
+WARM_UP, QUESTIONS, EVERY = 10, 200, 40
 MOST = {'nodes': 1.0, 'listeners': 0.1}  # growth a question; it has some 400 and 60
 
 # everything that the page's sockets get
