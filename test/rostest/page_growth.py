@@ -6,7 +6,7 @@ import statistics
 import time
 
 METRICS = {'nodes': 'Nodes', 'listeners': 'JSEventListeners', 'heap bytes': 'JSHeapUsedSize'}
-READINGS, PAUSE_S = 3, 0.4  # what is held for a moment only is no growth
+READINGS, PAUSE_S = 3, 0.4
 # by keys: open the oldest question, until it is taken and drawn; leave it, until it waits again
 OPEN_AND_LEAVE = '''
 const [times, done] = arguments;
@@ -55,7 +55,7 @@ def numbers_of(driver):
     """What the browser holds after garbage collection: of each number the least of the readings."""
     readings = []
     for number in range(READINGS):
-        time.sleep(PAUSE_S if number else 0.0)
+        time.sleep(PAUSE_S if number else 0.0)  # what is held for a moment is let go meanwhile
         for _ in range(2):
             driver.execute_cdp_cmd('HeapProfiler.collectGarbage', {})
         readings.append({
