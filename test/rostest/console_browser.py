@@ -3,10 +3,8 @@
 oracle.
 """
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import rosbag
@@ -50,17 +48,12 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.bags = tempfile.mkdtemp()
+        cls.bags = cls.make_folder()
         rospy.set_param('/alpha/record', cls.bags)
         cls.audited, cls.events = [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
         cls.begin('console_robot.py', 'PICK', '0.1', '0', '4')
-
-    @classmethod
-    def tearDownClass(cls):
-        super().tearDownClass()
-        shutil.rmtree(cls.bags, ignore_errors=True)
 
     @staticmethod
     def token_of(role, path):

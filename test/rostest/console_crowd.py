@@ -6,10 +6,8 @@ import http.client
 import json
 import os
 import resource
-import shutil
 import socket
 import sys
-import tempfile
 import unittest
 
 import rospy
@@ -35,16 +33,11 @@ class Crowd(ConsolePage, unittest.TestCase):
     def setUpClass(cls):
         most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(4 * CROWD, most), most))
-        cls.folder = tempfile.mkdtemp()
+        cls.folder = cls.make_folder()
         cls.tokens = os.path.join(cls.folder, 'tokens')
         cls.events = []
         rospy.Subscriber('/alpha/oracle/events', OracleEvent, cls.events.append)
         cls.begin('console_robot.py', 'PICK', '0.05', '0', '1')
-
-    @classmethod
-    def tearDownClass(cls):
-        super().tearDownClass()
-        shutil.rmtree(cls.folder, ignore_errors=True)
 
     @classmethod
     def start_console(cls, *more):

@@ -3,9 +3,7 @@
 replay, and old bags.
 """
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 
 import rosbag
@@ -42,7 +40,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.port = free_port()
-        cls.bags = tempfile.mkdtemp()
+        cls.bags = cls.make_folder()
         with open(os.path.join(cls.bags, 'torn.bag'), 'wb') as file:
             file.write(b'#ROSBAG V2.0\n' + b'\xff' * 200)
         rospy.set_param('/alpha/record', cls.bags)
@@ -58,11 +56,6 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get('http://localhost:{}/'.format(cls.port))
         cls.remember_name(cls.browser, 'operator')
-
-    @classmethod
-    def tearDownClass(cls):
-        super().tearDownClass()
-        shutil.rmtree(cls.bags, ignore_errors=True)
 
     @classmethod
     def start_console(cls, *more):

@@ -3,9 +3,7 @@
 paused, let go, with breakpoints and confirmations.
 """
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 
 import rospy
@@ -24,18 +22,6 @@ CONFIRM = '[data-action=confirm-state]'
 STANDING = '.machine-hand .standing'
 MACHINE = 'alpha'
 SETTINGS = '{states: {INNER/FOURTH: {autonomy: confirm}}}'
-# pressed in the very frame in which it comes: no wall clock has a part in it
-PRESS_AT_ONCE = '''
-const [selector, done] = arguments;
-const look = () => {
-  const button = [...document.querySelectorAll(selector)].find((each) => each.offsetParent);
-  if (!button || button.disabled) { requestAnimationFrame(look); return; }
-  const it = { bubbles: true, cancelable: true, detail: 1 };
-  button.dispatchEvent(new PointerEvent("pointerdown", it));
-  button.dispatchEvent(new MouseEvent("click", it));
-  done(Number(document.body.dataset.refused || 0));
-};
-look();'''
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -43,7 +29,7 @@ class Hold(ConsolePage, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp()
+        cls.folder = cls.make_folder()
         cls.tokens = os.path.join(cls.folder, 'tokens')
         cls.config = os.path.join(cls.folder, 'oracle.yaml')
         with open(cls.config, 'w') as file:
@@ -53,11 +39,6 @@ class Hold(ConsolePage, unittest.TestCase):
         rospy.Subscriber('/alpha/oracle/control', ControlStatus, cls.told.append)
         cls.begin('console_hold_script.py', name='')
         cls.browser.driver.set_script_timeout(60)
-
-    @classmethod
-    def tearDownClass(cls):
-        super().tearDownClass()
-        shutil.rmtree(cls.folder, ignore_errors=True)
 
     @classmethod
     def start_console(cls, *more):
@@ -74,10 +55,6 @@ class Hold(ConsolePage, unittest.TestCase):
         self.browser.find('#token').send_keys(token)
         self.browser.click('#sign-in')
         self.browser.click('#tab-machines')
-
-    def press_at_once(self, selector):
-        """As soon as it is there; how often the page has refused anything by then."""
-        return self.browser.driver.execute_async_script(PRESS_AT_ONCE, selector)
 
     def stands(self, words):
         self.assertTrue(self.browser.says(words, STANDING), self.browser.text())
@@ -135,6 +112,7 @@ class Hold(ConsolePage, unittest.TestCase):
     def test_4_breakpoints_steps_and_confirmations(self):
         browser = self.browser
         browser.click('.breakpoints summary')
+        self.assert_accessible('breakpoints')
         browser.find('.breakpoints input').send_keys('THIRD')
         browser.click('.breakpoints form button')
         browser.find('[data-breakpoint=THIRD]')

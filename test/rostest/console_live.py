@@ -37,7 +37,24 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
   tell(9);
   return [silent, liveness.gone({ server: "s", robot: "/r" })];
 });'''
-GREY = 'return getComputedStyle(document.querySelector(".detail-body")).filter'
+# which commands wait for nothing, where all are silent and the person has no name
+PASSES = '''
+return import("/static/js/page/gate.js").then(({ Gate }) => {
+  const silent = () => "silent";
+  const gate = new Gate({ store: { questions: [{ key: "q" }] }, refusal: silent,
+    refusalOfRobot: silent }, () => false, async () => false);
+  return arguments[0].filter((name) => gate.before(name, { question: "q", robot: "/r" }) === null);
+});'''
+STOPS = ['stop_hand', 'leave_wheel', 'release', 'stop_machine', 'pause_machine']
+ANSWERS = ['answer', 'hand_over', 'resume_machine', 'step_machine', 'confirm_state']
+GREY = 'return getComputedStyle(document.querySelector(".detail .answers")).filter'
+# what lies between the button that stops and the page, by how it is shown
+COLOURS_OF_STOP = '''
+let found = [];
+for (let it = document.querySelector(".detail .machine-hand .stop"); it; it = it.parentElement) {
+  found.push(getComputedStyle(it).filter);
+}
+return [...new Set(found)];'''
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -107,6 +124,9 @@ class Live(ConsolePage, unittest.TestCase):
         self.assertEqual(silent, '')
         self.assertIn('/r is gone', gone)
 
+    def test_2_what_stops_or_lets_go_waits_for_nothing(self):
+        self.assertEqual(self.browser.run(PASSES, STOPS + ANSWERS), STOPS)
+
     def test_3_with_a_dead_master_no_answer_is_sent(self):
         self.master.kill()
         try:
@@ -127,6 +147,8 @@ class Live(ConsolePage, unittest.TestCase):
         self.robot.freeze()
         try:
             self.assertTrue(self.refused('/alpha'))
+            self.assert_accessible('a robot that is silent')
+            self.assertEqual(self.browser.run(COLOURS_OF_STOP), ['none'], 'it keeps its colours')
             self.assertEqual(self.browser.text('#status'), LIVE, 'the others are heard')
             self.browser.click('#tab-machines')
             self.assertTrue(wait_for(lambda: self.browser.run(

@@ -178,6 +178,7 @@ class Marking(ConsolePage, unittest.TestCase):
                 '1).data[0] > 20'
             )))
         self.assertEqual(self.camera.viewers, 1)
+        self.assert_accessible('a camera')
         # as when a session has become too old while its page was open
         browser.driver.delete_all_cookies()
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])

@@ -20,8 +20,10 @@ from smach_oracle.srv import ClaimQuery, ClaimQueryRequest
 QUESTION = '.question-row[data-key^="/alpha/"]'
 OWN_SERVER = '/a_server_of_its_own'
 GO_TO_PLACE = '.choice.goto[data-name=PLACE]'
+PLACE_KEY = '3'
 GIVE_UP = '.choice.give_up[data-name=""]'
-# what a second tap does as soon as there is something to tap: no wall clock has a part in it
+# what a second tap, and then its key, do as soon as there is something to tap: no wall clock has a
+# part in it
 TAP_AT_ONCE = '''
 const [row, answer, done] = arguments;
 const tap = (element) => {
@@ -34,7 +36,9 @@ const look = () => {
   const button = document.querySelector(answer);
   if (!button || button.disabled) { requestAnimationFrame(look); return; }
   tap(button);
-  done();
+  const key = button.querySelector("kbd").textContent;
+  document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  done(key);
 };
 look();'''
 MOVE_AND_TAP = '''
@@ -109,6 +113,20 @@ return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
     return shown.hint.textContent;
   });
 });'''
+# how a machine stands whose state ORACLE is its oracle, by its graph or as no other state, or not
+STANDING = '''
+return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
+  const machine = { path: "TOP", running: true, paused: true, by: "ann", breakpoints: [], active: [
+    { path: "TOP", state: "ORACLE", held: "", confirm: false },
+    { path: "TOP", state: "PICK", held: "", confirm: false }] };
+  const asked = { robot: "/r", path: "TOP", state: "GRASP", interface: "hand" };
+  const words = (oracle, others, ...questions) => standingWords(machine, "/r", { questions,
+    get: (name) => (name === "graph /r TOP" ? { oracle, states: ["PICK", ...others].map(
+      (label) => ({ label })) } : undefined) });
+  return [words("", ["ORACLE"], { ...asked, status: "pending" }), words("ORACLE", []),
+    words("", [], { ...asked, status: "pending" }),
+    words("ORACLE", [], { ...asked, status: "interface" })];
+});'''
 REFUSED = 'the page had just changed there'
 
 
@@ -141,15 +159,18 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser = self.browser
         self.assertTrue(wait_for(lambda: browser.settled(browser.find(QUESTION))))
         browser.driver.set_script_timeout(40)
-        browser.driver.execute_async_script(TAP_AT_ONCE, QUESTION, GO_TO_PLACE)
+        key = browser.driver.execute_async_script(TAP_AT_ONCE, QUESTION, GO_TO_PLACE)
+        self.assertEqual(key, PLACE_KEY)
         self.assertTrue(browser.says(REFUSED), browser.text())
         self.assertEqual(self.answers(), [])
         self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
         browser.run(MOVE_AND_TAP, GO_TO_PLACE)
-        self.assertEqual(browser.run('return document.body.dataset.refused'), '2',
-                         'it has moved under the pointer')
+        self.assertEqual(browser.run('return document.body.dataset.refused'), '3',
+                         'the tap, the key, and what has moved under the pointer')
         self.assertTrue(browser.says('It is yours.'))
         self.assertEqual(self.answers(), [])
+        self.assertTrue(browser.says('Waits for an answer about PICK in KITCHEN/FETCH.',
+                                     '.detail .standing'), browser.text('.detail .standing'))
 
     def test_2_giving_up_is_confirmed_and_can_be_undone(self):
         browser = self.browser
@@ -193,6 +214,14 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.click('#keys')
         browser.press('n')
         browser.find('.detail')
+        self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
+        browser.click('#keys')
+        for key in (PLACE_KEY, 's', 'g'):
+            self.press(key)
+        self.assertTrue(stays(lambda: len(self.answers()) == 1
+                              and browser.find(GO_TO_PLACE).is_enabled(), 0.5))
+        self.assertNotIn('Give up?', browser.text())
+        browser.click('#keys')
         self.assertEqual(browser.errors(), [])
 
     def claim(self, action):
@@ -227,6 +256,12 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(browser.run(GO_BACK), 'TOP', 'the focus is where it was')
         waits = 'It waits until somebody lets it go on.'
         self.assertEqual(browser.run(HELD), [waits, 'gone', waits])
+        ends = 'Paused by ann. Runs to its end: PICK in TOP.'
+        self.assertEqual(browser.run(STANDING), [
+            'Paused by ann. Runs to its end: ORACLE in TOP, PICK in TOP.',
+            ends + ' The oracle of TOP decides what follows.',
+            ends + ' Waits for an answer about GRASP in TOP.',
+            ends + ' Interface hand runs for GRASP in TOP.'])
         self.assertEqual(browser.errors(), [])
 
     def test_6_a_machine_with_a_server_of_its_own_is_listed_once(self):

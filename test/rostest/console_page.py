@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 
 from roslib.packages import find_node
 from waiting import wait_for
@@ -15,6 +16,18 @@ from smach_oracle.experiment.launching import free_port
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 WITH_BROWSER = bool(shutil.which('chromedriver'))
+# pressed in the very frame in which it comes: no wall clock has a part in it
+PRESS_AT_ONCE = '''
+const [selector, done] = arguments;
+const look = () => {
+  const button = [...document.querySelectorAll(selector)].find((each) => each.offsetParent);
+  if (!button || button.disabled) { requestAnimationFrame(look); return; }
+  const it = { bubbles: true, cancelable: true, detail: 1 };
+  button.dispatchEvent(new PointerEvent("pointerdown", it));
+  button.dispatchEvent(new MouseEvent("click", it));
+  done(Number(document.body.dataset.refused || 0));
+};
+look();'''
 
 
 class Node:
@@ -45,6 +58,8 @@ class Node:
 
 class ConsolePage:
     """Beside unittest.TestCase."""
+
+    folders = ()  # that go when the class is done
 
     @classmethod
     def begin(cls, robot, *arguments, size=(), name='operator'):
@@ -77,6 +92,14 @@ class ConsolePage:
         cls.browser.close()
         cls.robot.stop()
         cls.console.stop()
+        for folder in cls.folders:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    @classmethod
+    def make_folder(cls):
+        """An empty one, for as long as the class runs."""
+        cls.folders += (tempfile.mkdtemp(),)
+        return cls.folders[-1]
 
     @classmethod
     def start_console(cls, *more):
@@ -92,3 +115,8 @@ class ConsolePage:
         """axe-core finds nothing wrong with what the page shows now, in any of its colours."""
         from accessibility import violations
         self.assertEqual([view] + violations(self.browser), [view])
+
+    def press_at_once(self, selector):
+        """As soon as it is there; how often the page has refused anything by then."""
+        self.browser.driver.set_script_timeout(60)
+        return self.browser.driver.execute_async_script(PRESS_AT_ONCE, selector)

@@ -60,6 +60,7 @@ class People(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         browser.find('.name-demand')
         self.assertEqual(self.holder(), '', 'nobody claims without a name')
+        self.assert_accessible('whose name is asked for')
         self.assertEqual(browser.run('return document.activeElement.id'), 'expert')
         self.assertTrue(browser.run('return document.querySelector(".name-demand")'
                                     '.getBoundingClientRect().top > innerHeight / 2'),

@@ -74,9 +74,6 @@ class Teleoperation(ConsolePage, unittest.TestCase):
                          tcp_nodelay=True)
         cls.begin('console_teleoperation_robot.py', size=(1360, 1000))
 
-    def setUp(self):
-        open('/tmp/cr_tele_progress','a').write('%.0f %s\n' % (time.time(), self.id()))
-
     @classmethod
     def heard(cls, command):
         cls.commands.append((time.monotonic(), command))
@@ -126,6 +123,10 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         browser = self.browser
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=manipulation]')
+        refused = browser.run('return Number(document.body.dataset.refused || 0)')
+        self.assertEqual(self.press_at_once('[data-action=stop-hand]'), refused,
+                         'nothing delays it')
+        self.assertTrue(wait_for(lambda: [told.ok for told in self.told('stop_hand')] == [True]))
         browser.find('.manipulation', 40.0)
         self.assertTrue(browser.says('was started for this question', '.output'),
                         'its output is there')
@@ -205,6 +206,10 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assert_moves_nothing(
             lambda: refused.append(browser.driver.execute_async_script(KEY_AT_ONCE)))
         self.assertEqual(refused, [1])
+        browser.click('#keys')
+        self.assert_moves_nothing(lambda: self.key(True))  # letters are turned off
+        self.key(False)
+        browser.click('#keys')
         self.hold_key()
         self.key(False)
 

@@ -163,8 +163,9 @@ class TestPages(console_case.ConsoleCase):
                 if 'frame' in info:
                     info['frame'] = FRAMES[name]
                 reply = await self.say(page, 5, do=name, **info)
-                assert (reply['ok'], 'may not'
-                        in reply['message']) == (False, True), (role, name, reply)
+                words = '{}s may not {} (sign in as {})'.format(
+                    role, name.replace('_', ' '), spec.role)
+                assert (reply['ok'], reply['message']) == (False, words)
         assert self.question_commands.done == [] and self.teleoperation.relayed == []
         assert not self.teleoperation.drivers
 

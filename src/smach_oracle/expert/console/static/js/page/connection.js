@@ -7,6 +7,12 @@
 /** @typedef {import('../server').Session} Session */
 /** @typedef {import('./store.js').Store} Store */
 /** @typedef {'connecting' | 'signed-out' | 'connected' | 'lost'} State */
+/**
+ * @typedef {object} Waiting
+ * @property {(reply: Reply) => void} resolve
+ * @property {(err: Error) => void} reject
+ * @property {number} timer for that no reply comes
+ */
 
 const SHORTEST_PAUSE_S = 0.3;
 const LONGEST_PAUSE_S = 4;
@@ -42,8 +48,8 @@ export class Connection {
     this.gate = null;
     this.onState = onState;
     this.onEnd = onEnd;
-    /** @type {Map<number, { resolve: (reply: Reply) => void, reject: (err: Error) => void }>} */
-    this.waiting = new Map();
+    /** @type {Map<number, Waiting>} */
+    this.waiting = new Map(); // for the reply to a command
     this.number = 0; // of the last command
     this.pause = SHORTEST_PAUSE_S;
     this.timer = 0;
@@ -160,8 +166,18 @@ export class Connection {
   fail() {
     this.connected = false;
     const lost = new ConnectionLost('the connection was lost');
-    for (const waiting of this.waiting.values()) waiting.reject(lost);
-    this.waiting.clear();
+    for (const number of [...this.waiting.keys()]) this.settle(number)?.reject(lost);
+  }
+
+  /**
+   * Wait no longer; who has waited, undefined for nobody.
+   * @param {number} number of the command
+   */
+  settle(number) {
+    const waiting = this.waiting.get(number);
+    this.waiting.delete(number);
+    clearTimeout(waiting?.timer);
+    return waiting;
   }
 
   /** @param {Batch | Reply} message */
@@ -170,9 +186,7 @@ export class Connection {
       this.store.receive(message);
       return;
     }
-    const waiting = this.waiting.get(message.re);
-    this.waiting.delete(message.re);
-    if (waiting) waiting.resolve(message);
+    this.settle(message.re)?.resolve(message);
   }
 
   /**
@@ -200,13 +214,13 @@ export class Connection {
     if (!socket) return Promise.reject(new ConnectionLost('not connected'));
     const number = ++this.number;
     return new Promise((resolve, reject) => {
-      const settle = /** @type {(reply: Reply) => void} */ (resolve);
-      this.waiting.set(number, { resolve: settle, reject });
-      setTimeout(() => {
-        if (!this.waiting.delete(number)) return;
+      const timer = setTimeout(() => {
+        this.waiting.delete(number);
         this.onNoReply(name, REQUEST_LIMIT_S);
         reject(new NoReply('no reply within ' + REQUEST_LIMIT_S + ' s'));
       }, REQUEST_LIMIT_S * 1000);
+      this.waiting.set(number, { reject, timer,
+        resolve: /** @type {(reply: Reply) => void} */ (resolve) });
       socket.send(JSON.stringify({ id: number, do: name, ...args, ...this.gate?.beside(name) }));
     });
   }

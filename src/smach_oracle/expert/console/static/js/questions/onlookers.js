@@ -28,10 +28,11 @@ export class Onlookers {
 
   /** @param {string} question */
   tell(question) {
+    const { connection } = this.app; // the timer holds nothing of what is shown
     wanted = question;
     timer = timer || setTimeout(() => {
       timer = 0;
-      this.app.connection.request('view', { question: wanted }).catch(() => {});
+      connection.request('view', { question: wanted }).catch(() => {});
     }, PAUSE_MS);
   }
 

@@ -283,8 +283,10 @@ export class QuestionDetail {
     if (changed('sensors')) this.showPerception();
     if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
-    if (machines || changed('questions')) this.machine.update();
-    if (machines) this.hand.update();
+    if (machines || changed('questions')) {
+      this.machine.update();
+      this.hand.update();
+    }
     if (this.followUp) this.followUp.update();
   }
 

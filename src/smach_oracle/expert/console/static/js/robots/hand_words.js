@@ -3,6 +3,7 @@
 
 /** @typedef {import('../server').ActiveState} ActiveState */
 /** @typedef {import('../server').HeldMachine} HeldMachine */
+/** @typedef {import('../page/store.js').Store} Store */
 
 /**
  * The machine to which a container belongs; undefined where it is of none.
@@ -51,10 +52,45 @@ export function byContainer(states) {
   return [...found];
 }
 
-/** @param {HeldMachine} machine */
-export function standingWords(machine) {
+/**
+ * Whether a state is the oracle of its container. One that has not been heard to act is the state
+ * that no rates are told of.
+ * @param {ActiveState} active
+ * @param {string} robot
+ * @param {Pick<Store, 'get'>} store
+ */
+function isOracle({ path, state }, robot, store) {
+  const graph = store.get(`graph ${robot} ${path}`);
+  if (!graph) return false;
+  return graph.oracle ? graph.oracle === state : !graph.states.some(({ label }) => label === state);
+}
+
+/**
+ * What the oracle of a container is at, as a sentence; '' where the state is no oracle.
+ * @param {ActiveState} active
+ * @param {string} robot
+ * @param {Pick<Store, 'get' | 'questions'>} store
+ */
+function oracleWords(active, robot, store) {
+  if (!isOracle(active, robot, store)) return '';
+  const { path } = active;
+  const asked = store.questions.find((each) => each.robot === robot && each.path === path);
+  if (!asked) return 'The oracle of ' + path + ' decides what follows.';
+  const about = asked.state + ' in ' + path + '.';
+  return asked.status === 'interface' ? 'Interface ' + asked.interface + ' runs for ' + about
+    : 'Waits for an answer about ' + about;
+}
+
+/**
+ * @param {HeldMachine} machine
+ * @param {string} robot
+ * @param {Pick<Store, 'get' | 'questions'>} store for what an oracle is at
+ */
+export function standingWords(machine, robot, store) {
   const waits = waiting(machine);
-  const runs = running(machine);
+  const active = running(machine);
+  const oracles = active.map((each) => oracleWords(each, robot, store));
+  const runs = active.filter((_, index) => !oracles[index]);
   const by = machine.by ? ' by ' + machine.by : '';
   if (!machine.running) {
     return 'It does not run.' + (machine.paused ? ' It is paused' + by
@@ -64,5 +100,5 @@ export function standingWords(machine) {
   if (waits.length) told.push('Waits before ' + listed(waits) + '.');
   const runsOn = machine.paused ? 'Runs to its end: ' : 'Runs: ';
   if (runs.length) told.push(runsOn + listed(runs) + '.');
-  return told.join(' ') || 'It runs.';
+  return told.concat(oracles.filter(Boolean)).join(' ') || 'It runs.';
 }

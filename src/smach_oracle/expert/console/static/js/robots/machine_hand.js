@@ -73,7 +73,7 @@ export class MachineHand {
     this.root.hidden = !machine;
     if (!machine) return;
     setText(this.stopButton, '■ Stop ' + machine.path);
-    setText(this.standing, standingWords(machine));
+    setText(this.standing, standingWords(machine, this.robot, this.app.store));
     if (this.replyIsOver(machine)) setText(this.reply, '');
     this.root.classList.toggle('held', machine.paused || waiting(machine).length > 0);
     this.showGoOn(machine);
