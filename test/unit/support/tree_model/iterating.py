@@ -57,15 +57,16 @@ class IteratorPart(Part):
         try:
             outcome = yield from self._iterate(self._first_item(goes_on))
         except Raised:
+            self._runs = self.run.is_upstream  # whose Iterator does not end by an error
             self.settled = self._child.settled
             raise
         except Jumping:
+            self._runs = False
             self.flag = False
             self.left_with = self.plan.final_map.get(self._child.left_with, self._child.left_with)
             view.copy_from(self.keys, self.userdata)
             raise
-        finally:
-            self._runs = False
+        self._runs = False
         self.flag = False
         view.copy_from(self.keys, self.userdata)
         self.ended_with = self.plan.final_map.get(outcome, outcome)

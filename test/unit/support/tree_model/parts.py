@@ -65,6 +65,12 @@ class Part:
         """Ask it to stop."""
         self.flag = True
 
+    def recall_preempts(self) -> None:
+        """Take requests back from it and from all below: what they were for is over."""
+        self.flag = False
+        for part in self.children():
+            part.recall_preempts()
+
     def children(self) -> List['Part']:
         """The parts below."""
         return []
@@ -146,12 +152,13 @@ class ConcurrencePart(Part):
             self._preempt_active()
         yield Fork(self, [(child.label, self._branch(child)) for child in self._children])
         is_deaf = any(child.flag for child in self._children)
-        for child in self._children:
-            child.flag = False
+        if self._error is None or not self.run.is_upstream:
+            for child in self._children:
+                child.flag = False
         self.settled = any(child.settled for child in self._children)
         goal = self.goal
         if self._error is not None:
-            self.flag = False
+            self.flag = self.flag and self.run.is_upstream  # whose requests outlive an error
             if goal is None or goal.machine.flag:
                 raise self._error
             self.left_with = ''

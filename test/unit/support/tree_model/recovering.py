@@ -312,6 +312,7 @@ class Recovering:
     def follow_from_below(self: Any, label: str, goal: Goal) -> Course:
         """A jump has left the state of that label and has come here."""
         yield from ()
+        self.child(label).recall_preempts()
         if goal.gives_up is not None:
             self.memory.ended(label, 'preempted')
             self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
