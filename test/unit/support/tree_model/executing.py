@@ -1,5 +1,6 @@
 """Trees of SMACH executed under an oracle; what happens is noted as the model notes it."""
 import threading
+import time
 from typing import Any, Dict, List, Optional, Tuple
 
 import smach
@@ -10,7 +11,7 @@ from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 from .answers import Options, draw_reply
-from .building import LIMIT_S, World, build
+from .building import LIMIT_S, World, build, owed_branches
 from .ends import Reply
 from .plan import CUT, KEYS, TOP, TreePlan
 
@@ -101,7 +102,15 @@ class _InTurn(OracleState):
         recovery: Any = self._recovery
         if recovery._failure.is_held_back:
             self._world.turns.wait('{}/{}'.format(self._node.path, recovery._failure.state))
+            self._await_preempt(recovery)
         return super().execute(ud)
+
+    def _await_preempt(self, recovery: Any) -> None:
+        """Where a Concurrence around is about to stop its branches, wait for that."""
+        if owed_branches(self._node.machine._states[recovery._failure.state]):
+            end = time.monotonic() + self._world.patience_s
+            while not recovery.stopped() and time.monotonic() < end:
+                time.sleep(0.001)
 
 
 def _userdata() -> smach.UserData:
