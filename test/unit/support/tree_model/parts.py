@@ -10,6 +10,19 @@ OVERRUN = object()
 class Unsaid(str):
     """An outcome that may be another: upstream's engine may preempt a branch that has ended."""
 
+    also = ''  # the other one
+
+    @classmethod
+    def of(cls, outcome: str, also: str) -> 'Unsaid':
+        """One or the other."""
+        unsaid = cls(outcome)
+        unsaid.also = also
+        return unsaid
+
+    def mapped(self, outcomes: Dict[str, str]) -> 'Unsaid':
+        """What a map makes of it."""
+        return self.of(outcomes.get(self, self), outcomes.get(self.also, self.also))
+
 
 class View:
     """What a child sees of the userdata of its container."""
@@ -168,7 +181,9 @@ class ConcurrencePart(Part):
         view.copy_from(self.keys, self.userdata)
         if goal is not None:
             self.flag = False
-            self.left_with = Unsaid(outcome) if self.run.is_upstream else outcome
+            self.left_with = outcome
+            if self.run.is_upstream:
+                self.left_with = Unsaid.of(outcome, self._outcome(not serviced))
             raise Jumping(goal)
         return outcome
 
