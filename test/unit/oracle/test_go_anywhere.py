@@ -161,6 +161,23 @@ def test_a_branch_whose_own_jump_comes_too_late_is_left_as_a_whole():
     assert ends['TOP/BOTH/RIGHT/IN'] == 'aborted' and ends['TOP/BOTH/RIGHT'] == 'preempted'
 
 
+def test_a_branch_whose_own_jump_comes_too_late_leaves_nothing_above_the_first():
+    gate = Gate()
+
+    def fails(state, ud):
+        assert gate.entered.wait(20)
+        return 'aborted'
+
+    middle = chain(BOTH=both(LEFT=chain(L=Scripted(fails)),
+                             RIGHT=chain(OBEYS=Scripted(lambda state, ud: gate(state, ud) and 'ok'),
+                                         R=Scripted('aborted'))), C=Scripted())
+    watched, expert, outcome = run(chain(A=Scripted(), MIDDLE=middle), to('TOP/MIDDLE', 'C'),
+                                   to('TOP', 'A'))
+    assert outcome == 'done' and watched.visits()[-1] == 'C'
+    assert [question.failed_state for question in expert.questions] == ['L', 'R']
+    assert jumps(watched) == [('TOP/MIDDLE', 'BOTH', 'C', 'TOP/MIDDLE/BOTH/LEFT/L', None)]
+
+
 def test_what_runs_beside_a_jump_that_comes_too_late_is_preempted():
     beside = Gate()
 

@@ -73,7 +73,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     others = _claim(nodes, departure)
     if others:
         _preempt(_container_apart(nodes, others))
-        _leave_way(left)
+        _leave_way(nodes[:-len(others)])
         return False
     where = (verdict.way.down[-1].path if verdict.way is not None
              else 'its end with {}'.format(verdict.ending.outcome))
