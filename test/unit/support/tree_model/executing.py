@@ -110,7 +110,7 @@ class _InTurn(OracleState):
         if owed_branches(self._node.machine._states[recovery._failure.state]):
             end = time.monotonic() + self._world.patience_s
             while not recovery.stopped() and time.monotonic() < end:
-                time.sleep(0.001)
+                time.sleep(0.001)  # it comes in the thread of a branch beside
 
 
 def _userdata() -> smach.UserData:
