@@ -212,6 +212,8 @@ class ConcurrencePart(Part):
             outcome = self.child(label).left_with
         elif error is not None:
             self._error = error
+            if self.run.is_upstream and not self._is_reached:
+                self.child(label).request_preempt()  # there it has not ended
             self._preempt_active()
             return
         self._outcomes[label] = outcome
