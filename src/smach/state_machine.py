@@ -306,10 +306,11 @@ class StateMachine(Container):
     def _preempt_current_state(self) -> None:
         self._is_preempt_passed_on = True
         state: Any = self._current_state
-        if self._preempted_state is state and state.preempt_requested():
+        asked = self._preempted_state
+        if asked is not None and not (asked is state and state.preempt_requested()):
+            asked.recall_preempt()
+        elif asked is not None and not isinstance(state, Container):  # in which some have gone on
             return
-        if self._preempted_state is not None:
-            self._preempted_state.recall_preempt()
         self._preempted_label = self._current_label
         self._preempted_state = state
         try:
@@ -319,9 +320,7 @@ class StateMachine(Container):
                          (self._current_label, traceback.format_exc()))
 
     def _pass_preempt_on(self) -> None:
-        """Called with a preempt pending, before a state runs: preempt it, unless the last one
-        serviced the request.
-        """
+        """Preempt the state that is to run, unless the last one serviced the pending request."""
         smach.loginfo('The state machine is to be preempted before its next state runs.')
         preempted = self._preempted_state
         if preempted is None:

@@ -55,12 +55,16 @@ def supersede(outcome: str, *, outputs: Optional[Mapping[str, Any]] = None, abou
                                  why=why), about)
 
 
-def give_up(outcome: str = '', *, about: str = '', why: str = '') -> ScriptedAnswer:
+def give_up(outcome: str = '', *, container: str = '', about: str = '',
+            why: str = '') -> ScriptedAnswer:
     """End the container with this outcome; '': as the failure would have ended it.
 
+    :param container: a level above that ends so, LABEL or PATH/LABEL, or the name of the top
+        machine; '': the failed state's own. A level above needs an outcome.
     :param about: the failed state, LABEL or PATH/LABEL, that is expected in the question.
     """
-    return ScriptedAnswer(Answer(AnswerKind.GIVE_UP, outcome=outcome, by=BY, why=why), about)
+    return ScriptedAnswer(Answer(AnswerKind.GIVE_UP, outcome=outcome, container=container, by=BY,
+                                 why=why), about)
 
 
 def use_interface(interface: str, outcome: str, *, outputs: Optional[Mapping[str, Any]] = None,
@@ -186,7 +190,10 @@ def _as_scripted(reply: object) -> ScriptedAnswer:
 
 
 def _placed(answer: Answer, choices: AnswerChoices) -> Answer:
-    """Return an answer that names a state by its path with the container of that state."""
+    """Return an answer with the whole path of the container that it names."""
+    if answer.kind is AnswerKind.GIVE_UP and answer.container:
+        level = _level(answer.container, choices)
+        return answer._replace(container='' if level == choices.container else level)
     if answer.kind is not AnswerKind.GOTO or answer.container or '/' not in str(answer.state):
         return answer
     top = choices.container.split('/')[0]
@@ -195,6 +202,14 @@ def _placed(answer: Answer, choices: AnswerChoices) -> Answer:
         if '{}/{}'.format(container or choices.container, label) in paths:
             return answer._replace(container=container, state=label)
     return answer
+
+
+def _level(name: str, choices: AnswerChoices) -> str:
+    """Return the path of the level of that LABEL or PATH/LABEL, the innermost of several."""
+    levels = [choices.container, *(path for path, _ in choices.give_up_above)]
+    found = [path for path in levels if name in (path, path.partition('/')[2])]
+    found = found or [path for path in levels if path.endswith('/' + name)]
+    return found[0] if found else name
 
 
 def _path(question: Question) -> str:

@@ -22,11 +22,11 @@ from smach_oracle.oracle.records.events import EventKind
 ASKED = {'max_recoveries': 0}
 
 
-def each(state, items=(1, 2, 3)):
+def each(state, items=(1, 2, 3), loop=('done',)):
     iterator = smach.Iterator(outcomes=list(OUTCOMES), input_keys=[], output_keys=[],
                               it=list(items), it_label='item', exhausted_outcome='done')
     with iterator:
-        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['done'])
+        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=list(loop))
     return iterator
 
 
@@ -161,6 +161,23 @@ def test_a_branch_whose_own_jump_comes_too_late_is_left_as_a_whole():
     assert ends['TOP/BOTH/RIGHT/IN'] == 'aborted' and ends['TOP/BOTH/RIGHT'] == 'preempted'
 
 
+def test_a_branch_whose_own_jump_comes_too_late_leaves_nothing_above_the_first():
+    gate = Gate()
+
+    def fails(state, ud):
+        assert gate.entered.wait(20)
+        return 'aborted'
+
+    middle = chain(BOTH=both(LEFT=chain(L=Scripted(fails)),
+                             RIGHT=chain(OBEYS=Scripted(lambda state, ud: gate(state, ud) and 'ok'),
+                                         R=Scripted('aborted'))), C=Scripted())
+    watched, expert, outcome = run(chain(A=Scripted(), MIDDLE=middle), to('TOP/MIDDLE', 'C'),
+                                   to('TOP', 'A'))
+    assert outcome == 'done' and watched.visits()[-1] == 'C'
+    assert [question.failed_state for question in expert.questions] == ['L', 'R']
+    assert jumps(watched) == [('TOP/MIDDLE', 'BOTH', 'C', 'TOP/MIDDLE/BOTH/LEFT/L', None)]
+
+
 def test_what_runs_beside_a_jump_that_comes_too_late_is_preempted():
     beside = Gate()
 
@@ -171,6 +188,41 @@ def test_what_runs_beside_a_jump_that_comes_too_late_is_preempted():
                                              WAITS=chain(S=Scripted(beside))))
     ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
     assert ends['TOP/BOTH/RIGHT/IN/WAITS'] == 'preempted' and ends['TOP/BOTH/RIGHT'] == 'preempted'
+
+
+def test_an_iterator_in_a_branch_that_is_left_takes_up_no_further_item():
+    """Upstream's Concurrence hands a preempt on at some time later."""
+    polish = Scripted('aborted', outcomes=('ok', 'aborted'))
+    items = each(chain_of(polish, outcomes=('done', 'aborted')), loop=('done', 'aborted'))
+    for _ in range(5):
+        polish.script[:] = ['aborted']
+        machine = chain(BOTH=both(LEFT=chain(ALL=items), RIGHT=chain(R=Scripted(Gate()))),
+                        C=Scripted())
+        watched, expert, outcome = run(machine, to('TOP', 'C'), author_recoveries='override')
+        assert outcome == 'done' and len(expert.questions) == 1
+        assert watched.visits().count('A') == 1
+        ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
+        assert ends['TOP/BOTH/RIGHT'] == 'preempted'
+
+
+def test_a_jump_that_a_preempt_has_ended_has_no_container_on_the_way_recover():
+    """Upstream's Concurrence hands on the first preempt of an execution alone."""
+    obeys = Gate()
+    inner = chain_of(Scripted('aborted', outcomes=('ok', 'aborted')), outcomes=('done', 'aborted'))
+    left = smach.StateMachine(outcomes=OUTCOMES)
+    with left:
+        smach.StateMachine.add('OBEYS', Scripted(obeys), {'ok': 'done', 'preempted': 'IN'})
+        smach.StateMachine.add('IN', inner, {'done': 'done'})
+    expert = FakeExpert(to('TOP', 'C'))
+    watched = Watched(chain(BOTH=both(LEFT=left), C=Scripted()), name='TOP', expert=expert,
+                      settings=ASKED)
+    ended = in_thread(watched.run)
+    assert obeys.entered.wait(20)
+    watched.machine.request_preempt()
+    assert ended.result() in ('preempted', 'aborted') and not jumps(watched)
+    assert [event.path for event in watched.of(EventKind.FAILURE)] == ['TOP/BOTH/LEFT/IN']
+    assert [question.failed_state for question in expert.questions] == ['A']
+    assert watched.run() == 'done', 'nothing is left over'
 
 
 def test_keys_missing_at_a_place_are_none_of_the_container_above():

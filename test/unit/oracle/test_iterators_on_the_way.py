@@ -10,13 +10,14 @@ from smach_oracle.oracle.records.events import EventKind
 ASKS = {'max_recoveries': 0}
 
 
-def each_of(state, label, items=(1, 2), loop=('done',)):
+def each_of(state, label, items=(1, 2), loop=('done',), **contained):
     """An Iterator over a machine or a state; its item is under the key `label`."""
     iterator = smach.Iterator(outcomes=['done', 'aborted', 'preempted'], input_keys=[],
                               output_keys=[], it=list(items), it_label=label,
                               exhausted_outcome='done')
     with iterator:
-        smach.Iterator.set_contained_state(label.upper(), state, loop_outcomes=list(loop))
+        smach.Iterator.set_contained_state(label.upper(), state, loop_outcomes=list(loop),
+                                           **contained)
     return iterator
 
 
@@ -49,6 +50,15 @@ def test_an_iterator_further_down_goes_on_where_an_expert_goes_there(place):
     machine['LATER'].script.append('aborted')
     assert Watched(machine, name='TOP', expert=expert, settings=ASKS).run() == 'done'
     assert each.tried == [1, 2, 3, 3, 4]
+
+
+@pytest.mark.parametrize('final', [{}, {'preempted': 'done'}])
+def test_an_iterator_that_was_left_goes_on_whatever_its_author_makes_of_its_end(final):
+    items = each_of(chain(A=Scripted('ok', 'aborted')), 'item', (1, 2, 3), final_outcome_map=final)
+    machine = Watched(chain(ALL=items), name='TOP', expert=FakeExpert(goto('ALL', container='TOP')),
+                      settings=ASKS)
+    assert machine.run() == 'done'
+    assert machine.visits() == ['ALL', 'A', 'A', 'ALL', 'A', 'A'], 'items 1, 2 and 2, 3'
 
 
 def test_what_is_left_of_one_item_is_not_gone_on_with_in_the_next():

@@ -126,6 +126,21 @@ def test_names_are_those_of_a_real_run(check, text, options, names):
     assert 'for 2 machines' in report
 
 
+def test_like_machines_of_a_concurrence_have_names_of_their_own(check):
+    code, report, errors = check('''
+        both = smach.Concurrence(['succeeded'], 'succeeded')
+        with both:
+            smach.Concurrence.add('LEFT', machine('A'))
+            smach.Concurrence.add('RIGHT', machine('A'))
+        both.execute()
+        machine('A').execute()
+    ''')
+    assert code == 0, errors
+    assert 'TASK begins at A' in report
+    assert 'TASK_2: another machine of the same structure' in report, report
+    assert 'TASK: another machine of the same structure' in report, 'it runs after them'
+
+
 WRAPPED = '''
     from smach_oracle import OracleContainer
     rospy.init_node('task')

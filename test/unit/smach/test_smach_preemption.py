@@ -272,3 +272,17 @@ def test_a_preempt_between_two_runs_stops_one_state_after_an_error_too():
     machine.request_preempt()
     assert machine.execute() == 'ok'
     assert seen[2:] == [('A', True), ('B', False)]
+
+
+@pytest.mark.improvement
+def test_a_second_request_reaches_what_runs_in_a_branch_that_has_gone_on():
+    obeys, goes_on = UntilPreempted(), UntilPreempted(5.0)
+    branch = machine(('OBEYS', obeys, {'preempted': 'GOES_ON'}),
+                     ('GOES_ON', goes_on, {'done': 'failed'}))
+    outer = machine(('BOTH', concurrence({'BRANCH': branch}, outcome_map={
+        'failed': {'BRANCH': 'failed'}}), None))
+    askers = [Once(state.started.is_set, outer.request_preempt) for state in (obeys, goes_on)]
+    assert outer.execute() == 'preempted'
+    for asker in askers:
+        asker.join()
+    assert not outer.preempt_requested()

@@ -145,3 +145,39 @@ def test_goto_leads_to_a_state_of_another_container_by_its_path(state):
 def test_a_label_that_several_other_containers_have_needs_its_path():
     with pytest.raises(ScriptError, match='it is in SM_ROOT/HALL, SM_ROOT/KITCHEN: name'):
         trial_with(expert(goto('PICK')), fail('TABLE', visit=1), machine=two_rooms())
+
+
+def three_levels():
+    inner = smach.StateMachine(OUTCOMES)
+    with inner:
+        smach.StateMachine.add('GRASP', Works(), {'succeeded': 'succeeded'})
+    middle = smach.StateMachine(OUTCOMES)
+    with middle:
+        smach.StateMachine.add('ARM', inner, {'succeeded': 'succeeded'})
+    machine = smach.StateMachine(OUTCOMES)
+    with machine:
+        smach.StateMachine.add('PICK', middle, {'succeeded': 'TABLE'})
+        smach.StateMachine.add('TABLE', Works())
+    return machine
+
+
+@pytest.mark.parametrize('container, ended', [
+    ('PICK', 'SM_ROOT/PICK'), ('SM_ROOT/PICK', 'SM_ROOT/PICK'), ('SM_ROOT', 'SM_ROOT'),
+    ('ARM', 'SM_ROOT/PICK/ARM'), ('PICK/ARM', 'SM_ROOT/PICK/ARM'), ('', 'SM_ROOT/PICK/ARM')])
+def test_a_level_above_may_be_given_up(container, ended):
+    trial = trial_with(expert(give_up('succeeded', container=container)),
+                       fail('GRASP', visit=1), machine=three_levels())
+    trial.assert_ended_with('succeeded')
+    given_up, = [event for event in trial.events if event.kind.name == 'GIVE_UP']
+    assert (given_up.path, given_up.outcome) == (ended, 'succeeded')
+    assert ('TABLE' in trial.visits()) == (container != 'SM_ROOT')
+
+
+@pytest.mark.parametrize('answer, said', [
+    (give_up('lost', container='PICK'), "SM_ROOT/PICK has no outcome 'lost' to give up with"),
+    (give_up(container='PICK'), "SM_ROOT/PICK has no outcome '' to give up with"),
+    (give_up('succeeded', container='TABLE'), "TABLE has no outcome 'succeeded' to give up with")])
+def test_a_level_that_cannot_be_given_up_so_fails_the_test(answer, said):
+    with pytest.raises(ScriptError) as raised:
+        trial_with(expert(answer), fail('GRASP', visit=1), machine=three_levels())
+    assert said in str(raised.value)

@@ -188,6 +188,7 @@ class IteratorBorder(Border):
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
         self._begun: Dict[str, Any] = {}  # what its io keys were when it began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
+        self._is_left = False
         self._is_asked_to_go_on = False
         self.goes_on = False
 
@@ -210,6 +211,10 @@ class IteratorBorder(Border):
         """Return how the execution before has ended; None: by an error, or it was left."""
         return self._ended_with
 
+    def note_left(self) -> None:
+        """Note that it is left for a state elsewhere: the outcome it gets is no word of its own."""
+        self._is_left = True
+
     def _remapping_of(self, label: str) -> Mapping[str, str]:
         return {}
 
@@ -229,6 +234,7 @@ class IteratorBorder(Border):
         else:
             self._rounds += 1
         self._items, self._trial_id, self._ended_with = items, trial_id, None
+        self._is_left = False
         self._inside = inside
         iterator._items = items
         state = iterator._state
@@ -279,7 +285,7 @@ class IteratorBorder(Border):
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
-        self._ended_with = outcome if isinstance(outcome, str) else None
+        self._ended_with = outcome if isinstance(outcome, str) and not self._is_left else None
         if self._items is not None and self._items.is_exhausted:
             _forget_given_up(self.container)  # the author has gone on behind it
         super().ended(outcome, error)

@@ -8,6 +8,7 @@ from typing import List, Optional, cast
 
 import smach
 
+from ..branches.border import IteratorBorder, border_of
 from ..machine.nesting import machines_below
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode, WrappedMachine
@@ -72,12 +73,14 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     others = _claim(nodes, departure)
     if others:
         _preempt(_container_apart(nodes, others))
+        _leave_way(nodes[:-len(others)])
         return False
     where = (verdict.way.down[-1].path if verdict.way is not None
              else 'its end with {}'.format(verdict.ending.outcome))
     smach.loginfo('{}/{} is left for {}'.format(arrives_at.path, arrives_at.machine._current_label,
                                                 where))
     _preempt(arrives_at.machine._current_state)
+    _leave_way(left)
     return True
 
 
@@ -87,6 +90,24 @@ def _preempt(state: Optional[smach.State]) -> None:
             state.request_preempt()
     except Exception as err:  # it is the user's
         smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
+
+
+def _leave_way(left: List[TreeNode]) -> None:
+    """Preempt the containers around a failure that are left, as far as they are not yet.
+
+    Iterators among them are told that they are left. Upstream's Concurrence hands a preempt on at
+    some time later, and once in an execution. Until then an Iterator on the way would go on with
+    its next item.
+
+    :param left: innermost first; that of the failure ends by itself.
+    """
+    around = [link.below for node in reversed(left) for link in links_to(node)]
+    for container in around[:-1]:
+        border = border_of(container)
+        if isinstance(border, IteratorBorder):
+            border.note_left()
+        if not container.preempt_requested():
+            _preempt(container)
 
 
 def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:

@@ -1,6 +1,7 @@
 """Every machine that a checked script executes: it is checked, and not executed."""
 import functools
 import threading
+from contextlib import ExitStack
 from typing import Any, Callable, Iterator, List, Sequence, Tuple, Type, cast
 
 import smach
@@ -46,19 +47,20 @@ class MachineCheck:
             if any(container is each for each in self._seen):
                 raise StopIteration('it executes a machine for the second time')
             self._seen.append(container)
-            for machine in list(_top_machines(container)):
-                self._check(machine)
+            with ExitStack() as running:  # machines of a Concurrence run at the same time
+                for machine in list(_top_machines(container)):
+                    self._check(machine, running)
             outcome = good_outcome(container, self._settings())
             self._tell(wrapped('It is not executed; the script goes on with {}.'.format(
                 'no outcome: all of them are failures' if outcome is None
                 else 'the outcome {}'.format(outcome)), 0) + [''])
             return outcome
 
-    def _check(self, machine: smach.StateMachine) -> None:
+    def _check(self, machine: smach.StateMachine, running: ExitStack) -> None:
         with _heard_warnings() as warnings:
             if not isinstance(machine, OracleContainer):
                 self._wrap(machine)
-            name = _prepare(cast(OracleContainer, machine))
+            name = _prepare(cast(OracleContainer, machine), running)
         prospects = prospects_of(machine)
         told = _without_name(prospects, name)
         self._told.append(told)
@@ -75,13 +77,14 @@ class MachineCheck:
             self._tell(wrapped('Warning: ' + warning, 0, 4))
 
 
-def _prepare(machine: OracleContainer) -> str:
+def _prepare(machine: OracleContainer, running: ExitStack) -> str:
     """Do what a real run does before the first state; return the machine's name.
 
+    :param running: as long as it is open, no other machine takes the name.
     :raises SettingsError: where the parameters of the node are wrong.
     """
-    with machine_names().running(machine):
-        take_parameters(machine)
+    running.enter_context(machine_names().running(machine))
+    take_parameters(machine)
     return oracle_of(machine).path
 
 

@@ -114,7 +114,7 @@ class Scripted(smach.State):
 
     def _await_preempt(self) -> None:
         """Where a Concurrence around passes a preempt on in a thread of its own, wait for it."""
-        branches = _owed_branches(self)
+        branches = owed_branches(self)
         if branches and not self.preempt_requested():
             self._asked.wait(self._world.patience_s)
         end = time.monotonic() + self._world.patience_s
@@ -124,7 +124,7 @@ class Scripted(smach.State):
             time.sleep(0.001)  # upstream passes it on in a thread of its own
 
 
-def _owed_branches(state: Any) -> List[Any]:
+def owed_branches(state: Any) -> List[Any]:
     """The branches around, to which a preempt is on its way; it comes once to each that runs."""
     owed, is_cut_off = [], False
     while state is not None:

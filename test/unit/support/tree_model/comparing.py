@@ -121,7 +121,8 @@ def _is_same(one: Any, other: Any) -> bool:
     if one is None or other is None or len(one) != len(other):
         return one == other
     return all(abs(mine - theirs) < 1e-9 if isinstance(mine, float) and isinstance(theirs, float)
-               else isinstance(mine, Unsaid) or mine == theirs for mine, theirs in zip(one, other))
+               else mine == theirs or isinstance(mine, Unsaid) and mine.also == theirs
+               for mine, theirs in zip(one, other))
 
 
 def _by_path(plan: TreePlan, course: List[Any], is_concurrent: bool) -> Dict[str, List[Any]]:

@@ -32,11 +32,12 @@ class Shape(NamedTuple):
     time_limits: bool = True
     beside_beside: bool = True  # Concurrences in Concurrences
     guarded: bool = True  # states that are not repeated
+    guarded_beside: bool = True  # also in Concurrences
 
 
 ANY = Shape()
 # there a preempt reaches branches in branches at no certain moment
-UPSTREAM = Shape(beside_beside=False)
+UPSTREAM = Shape(beside_beside=False, guarded_beside=False)
 
 
 def draw(seed: object, shape: Shape = ANY) -> TreePlan:
@@ -236,9 +237,9 @@ class _Drawing:
                 on_retry=self._on_retry(path, node))
 
     def _on_retry(self, path: str, node: Node) -> str:
-        """None in Concurrences: who is held back there asks while others still begin."""
         is_beside = isinstance(node, Beside) or '/C' in path
-        if is_beside or not self._guards or self._chance.random() >= 0.25:
+        may_be = self._guards and (self._shape.guarded_beside or not is_beside)
+        if not may_be or self._chance.random() >= 0.25:
             return 'allow'
         return self._chance.choice(('confirm', 'confirm', 'never'))
 

@@ -1,14 +1,17 @@
 """Trees of SMACH executed under an oracle; what happens is noted as the model notes it."""
 import threading
+import time
 from typing import Any, Dict, List, Optional, Tuple
 
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.execution.oracle_state import OracleState
+from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 from .answers import Options, draw_reply
-from .building import LIMIT_S, World, build
+from .building import LIMIT_S, World, build, owed_branches
 from .ends import Reply
 from .plan import CUT, KEYS, TOP, TreePlan
 
@@ -31,6 +34,8 @@ class Executed:
         OracleContainer.wrap(
             self.machine, name=TOP, settings=settings_of(plan), preconditions=self._checks(),
             expert=DrawnExpert(self.world) if plan.has_expert else None)
+        for node in nodes_of(self.machine):
+            _InTurn.take_over(self.world, node)
         self.machine.events.observers.append(self._observe)
 
     def execute(self) -> str:
@@ -73,6 +78,39 @@ class Executed:
                                      else _Check(self.plan, path, label, check)
                                      for check in own.preconditions]
             for (path, label), own in self.plan.states.items() if own.preconditions}
+
+
+class _InTurn(OracleState):
+    """Takes a turn before it decides about a state that was held back, and that took none."""
+
+    def __init__(self, world: World, node: Any) -> None:
+        super().__init__()
+        self._world = world
+        self._node = node
+
+    @classmethod
+    def take_over(cls, world: World, node: Any) -> None:
+        """Be the meta state of a container, or of a branch."""
+        machine, label = node.machine, node.settings.oracle_label
+        machine._states[label] = cls(world, node)
+        machine._remappings[label] = {}
+        machine._transitions.pop(label, None)
+        machine._sync_oracle()
+
+    def execute(self, ud: Any) -> str:
+        """Recover, as its class does."""
+        recovery: Any = self._recovery
+        if recovery._failure.is_held_back:
+            self._world.turns.wait('{}/{}'.format(self._node.path, recovery._failure.state))
+            self._await_preempt(recovery)
+        return super().execute(ud)
+
+    def _await_preempt(self, recovery: Any) -> None:
+        """Where a Concurrence around is about to stop its branches, wait for that."""
+        if owed_branches(self._node.machine._states[recovery._failure.state]):
+            end = time.monotonic() + self._world.patience_s
+            while not recovery.stopped() and time.monotonic() < end:
+                time.sleep(0.001)  # it comes in the thread of a branch beside
 
 
 def _userdata() -> smach.UserData:

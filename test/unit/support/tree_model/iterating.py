@@ -1,7 +1,7 @@
 """The model's Iterators: from item to item, and how they go on when they are entered again."""
 from typing import Any, Dict, List, Optional
 
-from .parts import Jumping, Part, Raised, View
+from .parts import Jumping, Part, Raised, Unsaid, View
 from .plan import Leaf, Repeated
 from .scheduling import Course
 
@@ -57,19 +57,25 @@ class IteratorPart(Part):
         try:
             outcome = yield from self._iterate(self._first_item(goes_on))
         except Raised:
+            self._runs = self.run.is_upstream  # whose Iterator does not end by an error
             self.settled = self._child.settled
             raise
         except Jumping:
+            self._runs = False
             self.flag = False
-            self.left_with = self.plan.final_map.get(self._child.left_with, self._child.left_with)
+            self.left_with = self._mapped(self._child.left_with)
             view.copy_from(self.keys, self.userdata)
             raise
-        finally:
-            self._runs = False
+        self._runs = False
         self.flag = False
         view.copy_from(self.keys, self.userdata)
         self.ended_with = self.plan.final_map.get(outcome, outcome)
         return self.ended_with
+
+    def _mapped(self, outcome: str) -> str:
+        if isinstance(outcome, Unsaid):
+            return outcome.mapped(self.plan.final_map)
+        return self.plan.final_map.get(outcome, outcome)
 
     def _take_inputs(self, view: View, goes_on: bool) -> None:
         """Take the input keys; what finished items have made of them stays where it goes on."""

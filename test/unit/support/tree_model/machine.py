@@ -139,6 +139,8 @@ class MachinePart(Part, Recovering):
 
     def _fails(self, failed: Failed) -> Course:
         label, memory = failed.label, self.memory
+        if failed.kind != 'TIME_LIMIT':
+            self.child(label).recall_preempts()
         continuous = memory.is_continuous(self.run.plan.policy, label)
         self.count_failure(failed, continuous)
         if self.author_recovers(failed):
@@ -207,8 +209,9 @@ class MachinePart(Part, Recovering):
 
     def request_preempt(self) -> None:
         self.flag = True
-        if self.current is not None:
-            self._pass_preempt_on()
+        was_asked = self._preempted is not None and self._preempted is self.current
+        if self.current is not None and not (was_asked and self.run.is_upstream):
+            self._pass_preempt_on()  # upstream's engine asks a state once in a visit
 
     def _heed_preempt(self) -> None:
         """Before a state runs: it is preempted, unless the one before has serviced the request."""

@@ -10,6 +10,19 @@ OVERRUN = object()
 class Unsaid(str):
     """An outcome that may be another: upstream's engine may preempt a branch that has ended."""
 
+    also = ''  # the other one
+
+    @classmethod
+    def of(cls, outcome: str, also: str) -> 'Unsaid':
+        """One or the other."""
+        unsaid = cls(outcome)
+        unsaid.also = also
+        return unsaid
+
+    def mapped(self, outcomes: Dict[str, str]) -> 'Unsaid':
+        """What a map makes of it."""
+        return self.of(outcomes.get(self, self), outcomes.get(self.also, self.also))
+
 
 class View:
     """What a child sees of the userdata of its container."""
@@ -64,6 +77,12 @@ class Part:
     def request_preempt(self) -> None:
         """Ask it to stop."""
         self.flag = True
+
+    def recall_preempts(self) -> None:
+        """Take requests back from it and from all below: what they were for is over."""
+        self.flag = False
+        for part in self.children():
+            part.recall_preempts()
 
     def children(self) -> List['Part']:
         """The parts below."""
@@ -146,12 +165,13 @@ class ConcurrencePart(Part):
             self._preempt_active()
         yield Fork(self, [(child.label, self._branch(child)) for child in self._children])
         is_deaf = any(child.flag for child in self._children)
-        for child in self._children:
-            child.flag = False
+        if self._error is None or not self.run.is_upstream:
+            for child in self._children:
+                child.flag = False
         self.settled = any(child.settled for child in self._children)
         goal = self.goal
         if self._error is not None:
-            self.flag = False
+            self.flag = self.flag and self.run.is_upstream  # whose requests outlive an error
             if goal is None or goal.machine.flag:
                 raise self._error
             self.left_with = ''
@@ -161,7 +181,9 @@ class ConcurrencePart(Part):
         view.copy_from(self.keys, self.userdata)
         if goal is not None:
             self.flag = False
-            self.left_with = Unsaid(outcome) if self.run.is_upstream else outcome
+            self.left_with = outcome
+            if self.run.is_upstream:
+                self.left_with = Unsaid.of(outcome, self._outcome(not serviced))
             raise Jumping(goal)
         return outcome
 
@@ -190,6 +212,8 @@ class ConcurrencePart(Part):
             outcome = self.child(label).left_with
         elif error is not None:
             self._error = error
+            if self.run.is_upstream and not self._is_reached:
+                self.child(label).request_preempt()  # there it has not ended
             self._preempt_active()
             return
         self._outcomes[label] = outcome

@@ -3,7 +3,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Reply, Way
 from .parts import Part, Raised, View
-from .scheduling import Course
+from .scheduling import Course, Turn
 from .words import decided, failing_outcome_of
 
 ORACLE = 'ORACLE'
@@ -30,6 +30,8 @@ class Recovering:
     def recover(self: Any, failed: Failed, continuous: bool) -> Course:
         """Recover from a failure that was counted; returns where the machine goes."""
         self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
+        if failed.kind == 'HELD_BACK':
+            yield Turn('{}/{}'.format(self.path, failed.label))
         decision = yield from self.decide(failed.label, continuous, failed.kind == 'HELD_BACK')
         if self.flag:
             return self._preempted_ending(failed)
@@ -312,6 +314,7 @@ class Recovering:
     def follow_from_below(self: Any, label: str, goal: Goal) -> Course:
         """A jump has left the state of that label and has come here."""
         yield from ()
+        self.child(label).recall_preempts()
         if goal.gives_up is not None:
             self.memory.ended(label, 'preempted')
             self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
