@@ -22,11 +22,10 @@ from .userdata_facts import KeptOut, UserdataFacts, keys_of
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
 _COMMITTED = frozenset((
-    EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.FAILURE,
-    EventKind.PRECONDITION_START,
+    EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.PRECONDITION_START,
     EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
     EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
-    EventKind.HOLD_START, EventKind.SENT))
+    EventKind.HOLD_START, EventKind.SENT, EventKind.TRIAL_END))
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
                      EventKind.QUERY_CANCELLED))
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
@@ -52,9 +51,13 @@ class Checkpointer:
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
         self._userdata: Dict[str, UserdataFacts] = {}
-        self._pending: List[Fact] = list(first)
-        self._items: Dict[str, int] = {}  # numbers, by path of the Iterator
+        # by where a line of steps begins: what one of them commits, the others may not yet have
+        self._pending: Dict[str, List[Fact]] = {_begins_line(top): list(first)}
+        # numbers, by path of the Iterator
+        self._items = {} if before is None else {
+            path: told.item for path, told in before.containers.items() if told.item}
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
+        self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
         self._borders: Dict[str, Tuple[TreeNode, List[Tuple[str, Border]]]] = {}
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
@@ -70,20 +73,37 @@ class Checkpointer:
         node = self._node_of(event)
         if node is None:
             return
-        self._pending += self._items_around(node)
-        self._pending += self._where(event, node)
+        pending = self._pending_of(node)
+        items = list(self._items_around(event, node))
+        pending += items
+        pending += self._where(event, node)
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
             if event.kind in _HAS_RUN:
                 self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
         if event.kind is EventKind.CONTAINER_START and node.resuming is None:
-            self._pending += self._facts_of(node).begin_execution()
+            pending += self._facts_of(node).begin_execution()
+        if event.kind is (EventKind.CONTAINER_START if node.branch is None
+                          else EventKind.STATE_START):
+            self._entered.setdefault(_begins_line(node), []).append(node)
         if event.kind is EventKind.CONTAINER_END:
-            self._pending += self._collected(node, all_keys=True)
-            self._pending += self._around(node)
-        if (event.kind in _COMMITTED or self._ends_branch(event, node)
-                or event.seq >= self._seq_stored + SEQ_RESERVE - 1):
+            pending += self._collected(node, all_keys=True)
+            pending += self._around(node)
+        if self._is_due(event, node) or items:
             self._commit(event, node)
+
+    def _is_due(self, event: Event, node: TreeNode) -> bool:
+        """Whether a moment is stored at an event.
+
+        That of a failure is stored once it is counted, as the state gives way to the oracle.
+        """
+        return (event.kind in _COMMITTED or self._ends_branch(event, node)
+                or event.seq >= self._seq_stored + SEQ_RESERVE - 1
+                or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target)))
+
+    def _pending_of(self, node: TreeNode) -> List[Fact]:
+        """Return what a container and those around it have to commit, which run in one thread."""
+        return self._pending.setdefault(_begins_line(node), [])
 
     def goal_begins(self, goal_id: str, server: str) -> None:
         """Store a goal that is about to be sent."""
@@ -92,10 +112,11 @@ class Checkpointer:
 
     def last_words(self) -> None:
         """Store what has not been stored of the trial, which has ended."""
-        facts = tuple(self._pending) + tuple(
-            fact for node in self._nodes.values() for fact in self._facts_of(node).all_states())
-        self._pending = []
-        self._commit_by_hand('TRIAL_END', facts + tuple(self._ended_goals()))
+        facts = [fact for line in self._pending.values() for fact in line]
+        facts += (fact for node in self._nodes.values()
+                  for fact in self._facts_of(node).all_states())
+        self._pending = {}
+        self._commit_by_hand('TRIAL_END', (*facts, *self._ended_goals()))
 
     def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
         """Commit a moment that belongs to no event."""
@@ -112,12 +133,14 @@ class Checkpointer:
 
     def _begin_trial(self) -> None:
         self._nodes = {node.key: node for node in nodes_of(self._top.machine)}
+        pending = self._pending_of(self._top)
         for node in self._nodes.values():
-            self._pending += self._facts_of(node).all_states()
-        self._pending += self._collected(self._top, all_keys=True)
+            pending += self._facts_of(node).all_states()
+        if self._top.resuming is None:
+            pending += self._collected(self._top, all_keys=True)
         for goal_id, server in GOALS.running().items():
             self._goals.add(goal_id)
-            self._pending.append(fact_of('', GOAL + goal_id, server))
+            pending.append(fact_of('', GOAL + goal_id, server))
 
     def _node_of(self, event: Event) -> Optional[TreeNode]:
         """Return the container that an event is of: that of a branch goes by its label as well."""
@@ -145,10 +168,12 @@ class Checkpointer:
         kind, label = event.kind, event.state
         if kind is EventKind.STATE_START:
             yield fact_of(node.key, AT, [label, IN])
-            if isinstance(node.machine._states.get(label), smach.Container):
-                yield from self._not_begun_below('{}/{}'.format(node.key, label))
-        elif kind is EventKind.CONTAINER_START and node.resuming is None:
-            yield fact_of(node.key, AT, [label, BEFORE])
+            path = '{}/{}'.format(node.key, label)
+            if isinstance(node.machine._states.get(label), smach.Container) and not any(
+                    _goes_on(each) for each in self._below(path)):
+                yield from self._not_begun_below(path)
+        elif kind is EventKind.CONTAINER_START and node is self._top and node.resuming is None:
+            yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
                 event.target in node.machine._states and not node.is_oracle(event.target)):
             yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
@@ -159,7 +184,7 @@ class Checkpointer:
             yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind in _CLOSES:
             yield Fact(node.key, ASKED, None)
-        elif kind is EventKind.CONTAINER_END and node.branch is None:
+        elif kind is EventKind.CONTAINER_END and node.branch is None and event.outcome:
             yield fact_of(node.key, AT, [event.outcome, ENDED])
         elif node.branch is not None and kind in _LEAVES:
             outcome = event.outcome if kind is EventKind.GIVE_UP else event.target
@@ -168,8 +193,13 @@ class Checkpointer:
 
     def _not_begun_below(self, path: str) -> Iterator[Fact]:
         """Yield that what is in a container or state has not begun in this visit of it."""
-        yield from (Fact(key, AT, None) for key in list(self._nodes)
-                    if (key + '/').startswith(path + '/'))
+        yield from (Fact(node.key, AT, None) for node in self._below(path))
+        for each in [each for each in self._items if each.startswith(path + '/')]:
+            del self._items[each]
+            yield Fact(each, ITEMS, None)
+
+    def _below(self, path: str) -> List[TreeNode]:
+        return [node for key, node in self._nodes.items() if (key + '/').startswith(path + '/')]
 
     def _ends_branch(self, event: Event, node: TreeNode) -> bool:
         """Whether a branch has ended, or a machine in a Concurrence: no state follows it."""
@@ -184,9 +214,11 @@ class Checkpointer:
             kept = self._borders[node.key] = node, borders_around(node)
         return kept[1]
 
-    def _items_around(self, node: TreeNode) -> Iterator[Fact]:
+    def _items_around(self, event: Event, node: TreeNode) -> Iterator[Fact]:
         """Yield which items the Iterators around a container have come to."""
         for path, border in self._borders_around(node):
+            if event.kind is EventKind.CONTAINER_START and event.path == path:
+                continue  # it has not begun with any
             number = getattr(border, 'item_number', 0)
             if number and self._items.get(path) != number:
                 self._items[path] = number
@@ -194,9 +226,11 @@ class Checkpointer:
                 yield from self._not_begun_below(path)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
-        facts = self._pending + list(self._collected(node)) + list(self._ended_goals())
+        facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
         facts += self._spent()
-        self._pending = []
+        self._pending_of(node).clear()
+        for each in self._entered.pop(_begins_line(node), ()):
+            facts += self._keys_around(each)
         self._seq_stored = event.seq
         behind, self._behind = self._behind, None
         self._writer.commit(
@@ -217,6 +251,8 @@ class Checkpointer:
         """Yield what is new of a container."""
         labels = self._ran.pop(node.key, set())
         yield from self._facts_of(node).changed(list(labels))
+        if node.resuming is not None:
+            return  # it does not have the stored userdata yet
         reached = None if all_keys else frozenset().union(
             *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
         yield from self._keys(_userdata_path(node), node.machine.userdata._data, reached)
@@ -231,12 +267,17 @@ class Checkpointer:
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata into which the outputs of a container have gone."""
-        for path, border in self._borders_around(node):
+        for path, _ in self._borders_around(node):
             self._wrote[path] = node.key
-            yield from self._keys(path, border.container.userdata._data, None)
+        yield from self._keys_around(node)
         if node.parent is not None and len(node.below) == 1:
             self._wrote[node.parent.key] = node.key
             yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
+
+    def _keys_around(self, node: TreeNode) -> Iterator[Fact]:
+        """Yield what is new of the userdata of the Concurrences and Iterators around a node."""
+        for path, border in self._borders_around(node):
+            yield from self._keys(path, border.container.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         if (path, out.key) in self._told:
@@ -250,6 +291,19 @@ class Checkpointer:
 def _userdata_path(node: TreeNode) -> str:
     """Return the path of the container whose userdata a node's states work on."""
     return node.path if node.branch is not None else node.key
+
+
+def _begins_line(node: TreeNode) -> str:
+    """Return the key of the outermost container around one that surely runs in its thread."""
+    while node.parent is not None and node.branch is None and len(node.below) == 1:
+        node = node.parent
+    return node.key
+
+
+def _goes_on(node: TreeNode) -> bool:
+    """Whether a container is to go on where it stood before the program was stopped."""
+    return node.resuming is not None or node.ended_before is not None or any(
+        record.unfinished is not None for record in node.records.by_label.values())
 
 
 def must_stop(node: TreeNode) -> bool:

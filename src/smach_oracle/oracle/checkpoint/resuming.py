@@ -210,10 +210,17 @@ class _Setting:
             record.resume(self._unfinished(node, stored))
             return
         for path, border in borders_in(node, stored.label):
-            told = self._resumption.tree.container(path)
-            border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
+            if self._has_begun(path):
+                told = self._resumption.tree.container(path)
+                border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
         for each in inside:
             self._set(each)
+
+    def _has_begun(self, path: str) -> bool:
+        """Whether anything has run in a Concurrence or Iterator, in its present execution."""
+        tree = self._resumption.tree
+        return bool(tree.container(path).item) or any(
+            told.phase for key, told in tree.containers.items() if key.startswith(path + '/'))
 
     def _set(self, node: TreeNode) -> None:
         """Set a container in a state that was under way."""

@@ -66,7 +66,7 @@ class _Reading:
         self._keys: Dict[str, _Values] = {}  # by path
         self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
         self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
-        self._decoded: Dict[StoredValue, Any] = {}
+        self._decoded: Dict[Tuple[str, StoredValue], Any] = {}  # by userdata key
 
     def read(self, facts: Iterable[StoredFact]) -> StoredTree:
         before: Optional[StoredFact] = None
@@ -138,7 +138,7 @@ class _Reading:
                 container.gone.append(key)
                 continue
             try:
-                container.keys[key] = self._value(value)
+                container.keys[key] = self._value(key, value)
             except NotReadable as err:
                 container.missing[key] = str(err)
         for label, values in self._at_entry.get(path, {}).items():
@@ -149,16 +149,17 @@ class _Reading:
         for key, value in values.items():
             try:
                 if value.is_there:
-                    found[key] = self._value(value)
+                    found[key] = self._value(key, value)
             except NotReadable:
                 pass  # said of the present value, or not needed any more
         return found
 
-    def _value(self, value: StoredValue) -> Any:
-        """Return a value; the same object where the same one is meant."""
-        if value not in self._decoded:
-            self._decoded[value] = self._codecs.decode(value.text, value.whole, self._store.part)
-        return self._decoded[value]
+    def _value(self, key: str, value: StoredValue) -> Any:
+        """Return a value; the same object where a container hands it to those below."""
+        known = self._decoded
+        if (key, value) not in known:
+            known[key, value] = self._codecs.decode(value.text, value.whole, self._store.part)
+        return known[key, value]
 
 
 def _plain(value: StoredValue) -> Any:

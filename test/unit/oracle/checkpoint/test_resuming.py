@@ -6,6 +6,8 @@ from killed_machines import Diary, KilledMachine, Noted
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.checkpoint.storable import CODECS
+from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.store.store_file import StoreFile
 
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
@@ -73,7 +75,7 @@ def make(folder):
 
 
 def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_again(tmp_path):
-    for point in range(1, points_of(tmp_path, tree) + 1):
+    for point in range(1, points_of(tmp_path, tree)):  # at the last one it has ended
         killed = KilledMachine(make(tmp_path / 'killed'), tree)
         assert killed.run(kill_at=point) is None
         told = killed.run()
@@ -98,6 +100,69 @@ def test_killed_again_and_again_it_comes_to_its_end(tmp_path):
     assert times > 5
     assert told['outcome'] == 'succeeded'
     assert set(ALL) == set(killed.diary.count('ends'))
+
+
+def test_killed_while_it_resumes_it_still_stands_where_it_stood(tmp_path):
+    """A second kill comes before anything has been done: no state runs again that had ended."""
+    for point in range(10, points_of(tmp_path, tree), 14):
+        for second in (1, 3, 4, 6):
+            killed = KilledMachine(make(tmp_path / 'killed'), tree)
+            killed.run(kill_at=point)
+            first = killed.diary.count('begins')
+            killed.run(kill_at=second)
+            told = killed.run()
+            assert told.get('outcome') == 'succeeded', (point, second, told)
+            begun = killed.diary.count('begins')
+            again = {name for name in begun if begun[name] > 1}
+            assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, second, again)
+            assert len(told['done']) >= len(ALL) - 2, (point, second, first)
+
+
+@pytest.mark.parametrize('point, is_stored', [(10, False), (11, True)])
+def test_a_failure_is_stored_once_it_is_counted(tmp_path, point, is_stored):
+    """At its event it is in doubt as before, at the transition to the oracle it is in the rates."""
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    assert killed.run(kill_at=point) is None
+    told = killed.run()
+    of_b = [name for name, _, state in told['events'] if state == 'B']
+    rates = {state: row for _, state, *row in told['rates']}
+    # in each process the state fails once
+    assert (of_b[:2], rates['B']) == ((['CONTAINER_START', 'TRANSITION'], [1, 2]) if is_stored
+                                      else (['CONTAINER_START', 'FAILURE'], [1, 1]))
+
+
+def test_a_trial_that_has_told_its_end_is_not_resumed(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    whole = KilledMachine(make(tmp_path / 'whole'), flat).run()
+    assert whole['events'][-1][0] == 'TRIAL_END'
+    assert killed.run(kill_at=whole['points']) is None
+    assert killed.run()['events'][0][0] == 'TRIAL_START'
+
+
+def test_equal_values_of_two_keys_do_not_become_one_object(tmp_path):
+    class Adds(smach.State):
+        def __init__(self):
+            smach.State.__init__(self, ['succeeded', 'aborted'], ['done'], ['done'])
+
+        def execute(self, userdata):
+            userdata.done.append('ADDS')
+            return 'succeeded'
+
+    def two_lists(diary, points):
+        machine = flat(diary, points)
+        machine.userdata.done, machine.userdata.other = ['C'], ['C']
+        with machine:
+            smach.StateMachine.add('ADDS', Adds(), {'succeeded': 'TELL'})
+            smach.StateMachine.add('TELL', Noted('TELL', diary, points, keys=('done',)), ENDS)
+        machine.set_initial_state(['ADDS'])
+        return machine
+
+    killed = KilledMachine(make(tmp_path / 'killed'), two_lists)
+    assert killed.run(kill_at=3) is None  # as ADDS begins
+    killed.run(kill_at=0)
+    seen = read_tree(StoreFile(killed.store, read_only=True), 1, CODECS)
+    assert seen.container('TOP').keys['done'][:2] == ['C', 'ADDS']
+    assert seen.container('TOP').keys['other'] == ['C']
 
 
 def test_rates_of_a_resumed_trial_are_those_of_one_that_was_not_killed(tmp_path):
