@@ -9,7 +9,7 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.store.errors import StoreError
+from smach_oracle.oracle.errors import CheckpointError
 
 FILLER = 'filler'
 
@@ -78,7 +78,7 @@ def read_only():
     ran = []
     try:
         machine_of([lambda: ran.append(1)]).execute()
-    except StoreError as err:
+    except CheckpointError as err:
         assert 'robot.db' in str(err) and 'ead-only' in str(err), err
         assert not ran
     else:

@@ -131,7 +131,7 @@ def test_renamed_states_go_on_wherever_it_was_killed(folder):
 
 def test_what_has_moved_into_another_container_goes_on_there(folder):
     names = {'B': 'IN/B', 'C': 'IN/C'}
-    for point in range(1, points_of(folder, flat_before) + 1):
+    for point in range(1, points_of(folder, flat_before)):  # at the last one it has ended
         before, after = both_scripts(folder, flat_before, nested_after, resume_map=names)
         before.run(kill_at=point)
         told = after.run()
@@ -144,7 +144,7 @@ def test_what_has_moved_into_another_container_goes_on_there(folder):
 
 def test_what_has_moved_out_of_a_container_goes_on_there(folder):
     names = {'IN': 'B', 'IN/B': 'B', 'IN/C': 'C'}
-    for point in range(1, points_of(folder, nested_after) + 1):
+    for point in range(1, points_of(folder, nested_after)):  # at the last one it has ended
         before, after = both_scripts(folder, nested_after, flat_before, resume_map=names)
         before.run(kill_at=point)
         told = after.run()

@@ -13,7 +13,7 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.store.errors import StoreError
+from smach_oracle.oracle.errors import CheckpointError
 from smach_oracle.store.store_file import StoreFile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -144,7 +144,7 @@ def test_a_slow_disk_is_waited_for_and_holds_all(tmp_path, monkeypatch, log):
 def test_one_that_cannot_be_made_is_refused_before_anything_runs(tmp_path):
     (tmp_path / 'folder').mkdir()
     ran = []
-    with pytest.raises(StoreError, match='folder'):
+    with pytest.raises(CheckpointError, match='folder'):
         wrapped(machine_of([lambda: ran.append(1)]), str(tmp_path / 'folder')).execute()
     assert ran == []
 
