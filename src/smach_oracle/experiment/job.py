@@ -97,7 +97,7 @@ class ExperimentJob:
         """
         self._ended_at = self._sign_at = time.monotonic()
         if self._plan.hours is not None:
-            write_lab(self._records.folder, self._seed, self._plan,
+            write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
                       self._results.left_before(self._next))
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 

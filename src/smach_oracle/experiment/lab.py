@@ -2,18 +2,17 @@
 from pathlib import Path
 from typing import Any, Mapping, Optional
 
-from .plan import ExperimentPlan, write_json
+from .plan import write_json
 
 LAB_FILE = 'lab.json'
 
 
-def write_lab(folder: Path, first_seed: int, plan: ExperimentPlan,
+def write_lab(folder: Path, first_seed: int, slot_h: float,
               left: Optional[Mapping[str, Any]]) -> None:
-    """Write the file for a job whose world goes on over the hours of its plan.
+    """Write the file for a job whose world goes on.
 
+    :param slot_h: h from the begin of one trial to that of the next, where none takes longer.
     :param left: how the last trial left it, as its row tells; None: it begins.
     :raises OSError: where it cannot be written.
     """
-    assert plan.hours is not None
-    write_json(folder / LAB_FILE, {'seed': first_seed, 'slot_h': plan.hours / plan.trials,
-                                   'left': left})
+    write_json(folder / LAB_FILE, {'seed': first_seed, 'slot_h': slot_h, 'left': left})
