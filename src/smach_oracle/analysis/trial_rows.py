@@ -244,8 +244,7 @@ def details_of(data: Mapping[str, Any]) -> TruthDetails:
 
 
 def _number(value: object) -> Optional[float]:
-    known = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if known else None  # type: ignore[arg-type]
+    return float(value) if isinstance(value, (int, float)) and value is not True else None
 
 
 def _damage(by_kind: object) -> Optional[int]:

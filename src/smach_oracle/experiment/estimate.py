@@ -7,7 +7,7 @@ SECONDS = {'pick_and_place': 4.0, 'drink_retrieval': 15.0}
 START_S = 15.0  # of the nodes of a job
 
 
-class Work(NamedTuple):
+class JobWork(NamedTuple):
     """What a job has done, and what it has to do."""
 
     task: str
@@ -15,7 +15,7 @@ class Work(NamedTuple):
     took_s: Sequence[float]  # wall s of each of its trials, as far as they are known
 
 
-def paces(works: Sequence[Work]) -> Dict[str, float]:
+def paces(works: Sequence[JobWork]) -> Dict[str, float]:
     """Return wall s of a trial by task."""
     found = {}
     for task, usual in SECONDS.items():
@@ -24,13 +24,13 @@ def paces(works: Sequence[Work]) -> Dict[str, float]:
     return found
 
 
-def seconds_missing(works: Sequence[Work]) -> List[float]:
+def seconds_missing(works: Sequence[JobWork]) -> List[float]:
     """Return wall s that each job still takes by itself."""
     pace = paces(works)
     return [START_S + pace[work.task] * work.missing if work.missing else 0.0 for work in works]
 
 
-def seconds_left(works: Sequence[Work], at_a_time: int) -> float:
+def seconds_left(works: Sequence[JobWork], at_a_time: int) -> float:
     """Return wall s until all jobs are over, so many at a time."""
     missing = seconds_missing(works)
     return max([sum(missing) / at_a_time, *missing])

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
 
-from .estimate import Work
+from .estimate import JobWork
 from .lab import LAB_FILE, write_lab
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
@@ -73,10 +73,10 @@ class ExperimentJob:
         """How many trials are over, lost ones among them."""
         return min(self.trials, self._kept + len(self.summaries) + len(self._lost))
 
-    def work(self) -> Work:
+    def work(self) -> JobWork:
         """Return what it has done and has to do."""
         took = [row.wall_s for row in self._results.rows() if row.wall_s is not None]
-        return Work(self._plan.task, self.trials - self.finished, took)
+        return JobWork(self._plan.task, self.trials - self.finished, took)
 
     def _look_through(self) -> None:
         progress = self._records.tidy_up(self._results.kept())

@@ -7,11 +7,11 @@ from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.comparison import format_comparison
 from smach_oracle.analysis.trial_rows import read_rows
 
-from .estimate import Work, duration, paces, seconds_left, seconds_missing
+from .estimate import JobWork, duration, paces, seconds_left, seconds_missing
 from .freeze import BLOCKS, checkout, frozen_seeds, last_freeze
 from .plan import TASKS, ExperimentError
 from .pool import run_parts
-from .protocols import Choice, Part, parts_of
+from .protocols import Part, ProtocolChoice, parts_of
 from .results import RESULTS_FILE
 
 DONE, FAILED, LOST = 0, 1, 3  # exit codes
@@ -23,7 +23,7 @@ def chosen_parts(args: argparse.Namespace) -> List[Part]:
     :raises ExperimentError: where the frozen seeds cannot be used.
     """
     seeds = frozen_blocks(checkout()) if args.frozen else dict.fromkeys(BLOCKS, args.seed)
-    return parts_of(args.protocol, Choice(
+    return parts_of(args.protocol, ProtocolChoice(
         seeds, args.answer_delay, tuple(args.names), (args.task,) if args.task else tuple(
             sorted(TASKS)), args.trials, args.replicates))
 
@@ -69,7 +69,7 @@ def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
     """
     lines = ['{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
         'part', 'seeds from', 'replicates', 'trials', 'done', 'one by one', 'variants')]
-    everything: List[Work] = []
+    everything: List[JobWork] = []
     by_part = [(part, _works(part, output)) for part in parts]
     pace = paces([work for _, works in by_part for work in works])
     for part, works in by_part:
@@ -87,7 +87,7 @@ def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
     return '\n'.join(lines)
 
 
-def _works(part: Part, output: Optional[Path]) -> List[Work]:
+def _works(part: Part, output: Optional[Path]) -> List[JobWork]:
     rows = output / part.name / RESULTS_FILE if output else None
     try:
         kept = read_rows(rows) if rows is not None and rows.exists() else []
@@ -98,6 +98,6 @@ def _works(part: Part, output: Optional[Path]) -> List[Work]:
         for variant in part.plan.variants:
             took = [row.wall_s for row in kept
                     if (row.variant, row.replicate) == (variant.name, replicate)]
-            works.append(Work(part.plan.task, max(0, part.plan.trials - len(took)),
+            works.append(JobWork(part.plan.task, max(0, part.plan.trials - len(took)),
                               [each for each in took if each is not None]))
     return works

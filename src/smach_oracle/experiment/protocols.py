@@ -24,7 +24,7 @@ class Part(NamedTuple):
     plan: ExperimentPlan
 
 
-class Choice(NamedTuple):
+class ProtocolChoice(NamedTuple):
     """What of a protocol is run, and on which seeds."""
 
     seeds: Mapping[str, int]  # the first of each of BLOCKS
@@ -53,7 +53,7 @@ class Choice(NamedTuple):
             self.answer_delay, lasting=lasting, hours=hours))
 
 
-def main_parts(choice: Choice) -> Iterator[Part]:
+def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the main table's parts: the compared variants, and the others in one replicate."""
     others = [name for name in sorted(POLICIES) if name not in COMPARED + ('prose',)]
     for task in choice.tasks:
@@ -64,7 +64,7 @@ def main_parts(choice: Choice) -> Iterator[Part]:
             yield choice.part('others', task, trials, 1, named_variants(others, {}))
 
 
-def persistence_parts(choice: Choice) -> Iterator[Part]:
+def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part for each share of causes that last."""
     for task in choice.tasks:
         for share in SHARES:
@@ -72,27 +72,27 @@ def persistence_parts(choice: Choice) -> Iterator[Part]:
                               named_variants(choice.variants or COMPARED, {}), lasting=share)
 
 
-def memory_parts(choice: Choice) -> Iterator[Part]:
+def memory_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part with a variant for each memory."""
     for task in choice.tasks:
         yield choice.part('memory', task, SWEPT[task], 1,
                           named_variants(choice.variants or (DEFAULT,), {}, MEMORIES))
 
 
-def continuous_parts(choice: Choice) -> Iterator[Part]:
+def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the parts of continuous operation."""
     for task in choice.tasks:
         yield choice.part('continuous', task, TASKS[task][1], 1,
                           named_variants(choice.variants or (DEFAULT,), {}), hours=HOURS[task])
 
 
-PROTOCOLS: Dict[str, Callable[[Choice], Iterator[Part]]] = {
+PROTOCOLS: Dict[str, Callable[[ProtocolChoice], Iterator[Part]]] = {
     'main': main_parts, 'persistence': persistence_parts, 'memory': memory_parts,
     'continuous': continuous_parts
 }
 
 
-def parts_of(protocol: str, choice: Choice) -> List[Part]:
+def parts_of(protocol: str, choice: ProtocolChoice) -> List[Part]:
     """Return the parts of a protocol, or of ALL of them.
 
     :raises KeyError: for one that is not there.

@@ -98,8 +98,8 @@ def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
                     '{"seed": 2, "causes": [{"kind": "glare", "lasting": true}, '
                     '{"kind": "dim", "lasting": false}], "wrong_object": "cup", '
                     '"damage": {"dropped": ["a", "b"], "pushed_off": []}, '
-                    '"passed_s": {"expert": 12.5}, "wall_s": 9, "hour": 0.5, "left": {"ended": 1}}\n'
-                    '{"se')
+                    '"passed_s": {"expert": 12.5}, "wall_s": 9, "hour": 0.5, '
+                    '"left": {"ended": 1}}\n{"se')
     details = read_details(str(path))
     assert details == {1: NO_DETAILS,
                        2: ('cup', 2, {'expert': 12.5}, 1, 9.0, 0.5, {'ended': 1})}

@@ -8,11 +8,11 @@ import pytest
 
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows, read_rows
 from smach_oracle.experiment import command, pool, protocol_run
-from smach_oracle.experiment.estimate import Work, duration, seconds_left
+from smach_oracle.experiment.estimate import JobWork, duration, seconds_left
 from smach_oracle.experiment.freeze import BLOCK, BLOCKS, Freeze
 from smach_oracle.experiment.plan import ExperimentError
 from smach_oracle.experiment.progress import PoolProgress
-from smach_oracle.experiment.protocols import ALL, COMPARED, MEMORIES, Choice, parts_of
+from smach_oracle.experiment.protocols import ALL, COMPARED, MEMORIES, ProtocolChoice, parts_of
 from smach_oracle.experiment.stop_signals import StopRequested
 from smach_oracle.oracle.decision.policy import POLICIES
 
@@ -22,7 +22,7 @@ TASKS = ('pick_and_place', 'drink_retrieval')
 def by_name(protocol=ALL, **choice):
     seeds = choice.pop('seeds', dict.fromkeys(BLOCKS, 700))
     return {part.name: part.plan
-            for part in parts_of(protocol, Choice(seeds, 15.0, **choice))}
+            for part in parts_of(protocol, ProtocolChoice(seeds, 15.0, **choice))}
 
 
 def names_of(plan):
@@ -130,7 +130,7 @@ class FakeRunner:
         return self.finished >= self.trials
 
     def work(self):
-        return Work(self._plan.task, self.trials - self.finished, [2.0] * self.finished)
+        return JobWork(self._plan.task, self.trials - self.finished, [2.0] * self.finished)
 
     def start(self):
         self.running = True
@@ -188,7 +188,7 @@ def run(monkeypatch, tmp_path):
 
 def test_all_parts_are_run_in_one_pool_with_a_folder_each(run, tmp_path):
     code, told = run('--jobs', '3')
-    names = [part.name for part in parts_of(ALL, Choice(dict.fromkeys(BLOCKS, 7), 15.0, trials=2))]
+    names = list(by_name(trials=2))
     assert code == 0 and len(names) == 14
     for name in names:
         settings = json.loads((tmp_path / name / 'experiment.json').read_text())['settings']
@@ -251,8 +251,8 @@ def test_the_plan_of_one_experiment_needs_no_protocol(capsys):
 
 
 def test_the_time_left_goes_by_what_trials_took_and_by_the_longest_job():
-    works = [Work('pick_and_place', 10, [5.0, 7.0]), Work('pick_and_place', 10, []),
-             Work('pick_and_place', 0, [6.0])]
+    works = [JobWork('pick_and_place', 10, [5.0, 7.0]), JobWork('pick_and_place', 10, []),
+             JobWork('pick_and_place', 0, [6.0])]
     assert seconds_left(works, 1) == pytest.approx(2 * seconds_left(works, 2))
     assert seconds_left(works, 2) == seconds_left(works, 20), 'no job is split'
     assert seconds_left(works, 2) == pytest.approx(10 * 6.0, abs=20.0)
@@ -264,6 +264,6 @@ def test_the_time_left_goes_by_what_trials_took_and_by_the_longest_job():
 def test_the_line_of_a_pool_counts_trials_and_replicates():
     stream = io.StringIO()
     job = SimpleNamespace(finished=3, trials=9, over=False, lost={5: 'hung'}, messages=[],
-                          work=lambda: Work('pick_and_place', 6, [10.0]))
+                          work=lambda: JobWork('pick_and_place', 6, [10.0]))
     PoolProgress(stream, 2).show([job])
     assert stream.getvalue().startswith('3/9 trials, 0/1 replicates over, 1 lost   about ')

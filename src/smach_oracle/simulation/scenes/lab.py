@@ -120,7 +120,7 @@ def _table(trial: _Trial, robot: RobotStart) -> Scene:
                                              generator.uniform(*tabletop_scene.NEAREST_Y),
                                              TABLE_TOP + 0.06]), generator))
         draft = with_table_causes(draft, trial.seed, trial.lasting, FROM_THE_HOUR)
-    robot = robot._replace(joints=_standing((('torso_lift_joint', TORSO),), trial.state))
+    robot = robot._replace(joints=_start_joints((('torso_lift_joint', TORSO),), trial.state))
     table = true_table(trial.run.seed, TABLE_TOP, tabletop_scene.TABLE_X, tabletop_scene.TABLE_SIZE)
     return tabletop_scene.composed(trial.seed, draft, table, robot)
 
@@ -158,7 +158,7 @@ def _kitchen(trial: _Trial, robot: RobotStart) -> Scene:
                 kitchen, (float(generator.uniform(*kitchen_scene.DEPTHS)),
                           float(generator.uniform(*kitchen_scene.SIDES))), 0.06)), generator))
         draft = with_kitchen_causes(draft, trial.seed, trial.lasting, FROM_THE_HOUR)
-    robot = robot._replace(joints=_standing(kitchen_scene.posture(), state),
+    robot = robot._replace(joints=_start_joints(kitchen_scene.posture(), state),
                            base=stays.base if stays else robot.base)
     return kitchen_scene.composed(trial.seed, draft, kitchen, robot)
 
@@ -207,7 +207,7 @@ def _told(spell: Spell) -> str:
     return '{} from hour {:.2f} to {:.2f}'.format(what, spell.begins, spell.ends)
 
 
-def _standing(start: Joints, state: Optional[LabState]) -> Joints:
+def _start_joints(start: Joints, state: Optional[LabState]) -> Joints:
     """Return where the joints are: arms and grippers as at the begin, torso and head as left."""
     return tuple({**dict(start), **dict(state.joints if state else ())}.items())
 
