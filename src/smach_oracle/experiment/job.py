@@ -98,7 +98,7 @@ class ExperimentJob:
         self._ended_at = self._sign_at = time.monotonic()
         if self._plan.hours is not None:
             write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
-                      self._results.left_before(self._next))
+                      self._results.last_left())
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
@@ -178,7 +178,7 @@ class ExperimentJob:
 
     def _give_up_trial(self, number: int, why: str, text: str) -> None:
         before = set(range(number - LOST_IN_A_ROW + 1, number))
-        if not self.summaries or before <= set(self._lost) and len(before) < number:
+        if not (self.summaries or self._kept) or before <= set(self._lost) and len(before) < number:
             raise ExperimentError(text + last_words(self._records.folder / LOG_FILE))
         self._records.mark_lost(number, why)
         self.messages.append(text + '; LOST')

@@ -84,13 +84,12 @@ class JobResults:
         """Return all rows of the job, in the order of the trials."""
         return [self._rows[seed] for seed in sorted(self._rows)]
 
-    def left_before(self, number: int) -> Optional[Mapping[str, Any]]:
-        """Return how the last trial before this one left a world that goes on; None: none did.
+    def last_left(self) -> Optional[Mapping[str, Any]]:
+        """Return how the last trial left a world that goes on; None: none has ended.
 
         :raises ExperimentError: where a row does not tell.
         """
-        told = [row for row in self.rows()
-                if row.left and row.seed < self._first_seed + number]
+        told = [row for row in self.rows() if row.left]
         return _data_in(told[-1], told[-1].left, 'how the world was left') if told else None
 
     def forget_from(self, number: int) -> None:
