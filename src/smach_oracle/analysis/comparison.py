@@ -20,6 +20,7 @@ from .reading import report_error
 from .trial_rows import LOST, TrialRow, read_rows
 
 SECONDS_PER_HOUR = 3600.0
+Group = Tuple[str, Optional[float]]  # a task, and the share of causes that last
 SHARES: Tuple[Tuple[str, Happened], ...] = (
     ('true success', lambda row: row.succeeded),
     ('interventions', lambda row: row.intervened),
@@ -84,7 +85,7 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
     """
     ended = [row for row in rows if row.ending != LOST]
     asked, interventions = sum(row.questions for row in rows), sum(row.intervened for row in rows)
-    hours = _total(ended, lambda row: row.sim_s, SECONDS_PER_HOUR)
+    hours = robot_hours(ended)
     expert_s = _total(ended, lambda row: row.expert_s)
     done = [row for row in ended if row.succeeded]
     harm = _total(done, lambda row: row.damage)
@@ -96,6 +97,21 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
         None if None in wrong else sum(map(bool, wrong)), _ratio(harm, len(done)),
         statistics.median(times) if times else None, _ratio(len(rows), interventions),
         _ratio(hours, interventions))
+
+
+def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:
+    """Return how long robots were at work in trials that have ended; None: not known of some.
+
+    Where a world goes on, the time from one trial to the next counts, too.
+    """
+    by_replicate: Dict[int, List[float]] = {}
+    for row in rows:
+        if row.hour is not None and row.sim_s is not None:
+            by_replicate.setdefault(row.replicate, []).extend(
+                (row.hour, row.hour + row.sim_s / SECONDS_PER_HOUR))
+    if rows and sum(map(len, by_replicate.values())) == 2 * len(rows):
+        return sum(max(each) - min(each) for each in by_replicate.values())
+    return _total(rows, lambda row: row.sim_s, SECONDS_PER_HOUR)
 
 
 def _total(rows: Sequence[TrialRow], value: Callable[[TrialRow], Optional[float]],
@@ -112,16 +128,24 @@ def _ratio(above: Optional[float], below: Optional[float]) -> Optional[float]:
 def format_comparison(rows: Sequence[TrialRow]) -> str:
     """Return the tables, one task after the other."""
     texts = []
-    for task in sorted({row.task for row in rows}):
-        mine = [row for row in rows if row.task == task]
+    for (task, share), mine in groups_of(rows).items():
         names = list(dict.fromkeys(row.variant for row in mine))
         variants = {name: [row for row in mine if row.variant == name] for name in names}
         best = hindsight(mine) if len(names) > 1 else []
         if best:
             variants[HINDSIGHT] = best
-        texts += ['{}\n'.format(task)] + [_variant(*each) for each in variants.items()]
+        told = '' if share is None else ', {:.0%} of the causes last'.format(share)
+        texts += ['{}{}\n'.format(task, told)] + [_variant(*each) for each in variants.items()]
         texts += _tests({name: variants[name] for name in names})
     return '\n'.join(texts)
+
+
+def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
+    """Return the rows that may be compared: of one task, and one share of causes that last."""
+    found: Dict[Group, List[TrialRow]] = {}
+    for row in sorted(rows, key=lambda row: (row.task, row.lasting_share or 0.0)):
+        found.setdefault((row.task, row.lasting_share), []).append(row)
+    return found
 
 
 def _variant(name: str, rows: Sequence[TrialRow]) -> str:

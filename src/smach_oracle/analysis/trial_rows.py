@@ -39,6 +39,10 @@ class TrialRow(NamedTuple):
     why: str = ''  # by the judge, or why it was lost
     version: str = ''  # of the code that ran it
     learned: str = ''  # rates at its end, as JSON
+    lasting_share: Optional[float] = None  # of the causes, that the world was given; None: its own
+    wall_s: Optional[float] = None  # of the machine, that the trial took
+    hour: Optional[float] = None  # of a world that goes on, at which it began
+    left: str = ''  # how it left a world that goes on, as JSON
 
     @property
     def succeeded(self) -> bool:
@@ -82,6 +86,9 @@ class TruthDetails(NamedTuple):
     damage: Optional[int] = None  # things knocked over, dropped, pushed off
     passed_s: Optional[Mapping[str, float]] = None  # s of the world's time, by what took them
     lasting: Optional[int] = None  # causes that last
+    wall_s: Optional[float] = None
+    hour: Optional[float] = None  # of a world that goes on, at which it began
+    left: Optional[Mapping[str, Any]] = None  # how it left a world that goes on
 
 
 NO_DETAILS = TruthDetails()
@@ -89,7 +96,8 @@ NO_DETAILS = TruthDetails()
 
 def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed: int,
            details: TruthDetails = NO_DETAILS, version: str = '',
-           learned: Optional[Mapping[str, Any]] = None) -> TrialRow:
+           learned: Optional[Mapping[str, Any]] = None,
+           lasting_share: Optional[float] = None) -> TrialRow:
     """Return the row of a trial that has come to its end."""
     truth, cause = summary.truth, summary.cause
     asked_s = None
@@ -102,7 +110,11 @@ def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed:
         asked_s, None if truth is None else truth.sim_s,
         ' '.join(cause.kinds) if cause is not None else '', details.lasting,
         '' if truth is None else truth.why, version,
-        json.dumps(learned, sort_keys=True) if learned is not None else '')
+        _as_json(learned), lasting_share, details.wall_s, details.hour, _as_json(details.left))
+
+
+def _as_json(data: Optional[Mapping[str, Any]]) -> str:
+    return json.dumps(data, sort_keys=True) if data is not None else ''
 
 
 def append_rows(path: Path, rows: Sequence[TrialRow]) -> None:
@@ -169,9 +181,10 @@ def _flag(text: str) -> bool:
 _PARSERS: Mapping[str, Callable[[str], Any]] = {
     'replicate': int, 'seed': int, 'true_success': _flag, 'damage': int, 'failures': int,
     'attempts': int, 'questions': int, 'answered': int, 'expert_s': float, 'sim_s': float,
-    'lasting': int,
+    'lasting': int, 'lasting_share': float, 'wall_s': float, 'hour': float,
 }
-_MAY_BE_EMPTY = ('true_success', 'damage', 'expert_s', 'sim_s', 'lasting')
+_MAY_BE_EMPTY = ('true_success', 'damage', 'expert_s', 'sim_s', 'lasting', 'lasting_share',
+                 'wall_s', 'hour')
 _ENDINGS = {ending.value for ending in TrialEnding} | {LOST}
 
 
@@ -223,10 +236,15 @@ def _data_of(line: str) -> Mapping[str, Any]:
 
 def details_of(data: Mapping[str, Any]) -> TruthDetails:
     """Return the details of a line."""
-    wrong, passed = data.get('wrong_object'), data.get('passed_s')
+    wrong, passed, left = (data.get(key) for key in ('wrong_object', 'passed_s', 'left'))
     return TruthDetails(wrong if isinstance(wrong, str) else None, _damage(data.get('damage')),
                         passed if isinstance(passed, dict) else None,
-                        _lasting(data.get('causes')))
+                        _lasting(data.get('causes')), _number(data.get('wall_s')),
+                        _number(data.get('hour')), left if isinstance(left, dict) else None)
+
+
+def _number(value: object) -> Optional[float]:
+    return float(value) if isinstance(value, (int, float)) and value is not True else None
 
 
 def _damage(by_kind: object) -> Optional[int]:

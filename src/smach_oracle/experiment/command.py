@@ -5,16 +5,14 @@ its own learned rates. What is started is stopped, also on Ctrl-C, pressed once 
 again with the same --output, an experiment goes on where it was.
 """
 import argparse
-import fcntl
 import os
 import shutil
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from smach_oracle.analysis import bag_statistics, comparison
+from smach_oracle.analysis import bag_statistics
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policy import POLICIES
 from smach_oracle.oracle.errors import SettingsError
@@ -37,15 +35,16 @@ from .plan import (
     make_variants,
     named_variants,
 )
-from .progress import ProgressLine
-from .protocols import PROTOCOLS
-from .results import RESULTS_FILE
-from .stop_signals import StopRequested, StopSignals
+from .pool import alone_in, run
+from .protocol_run import chosen_parts, plan_text, run_protocol
+from .protocols import ALL, PROTOCOLS, Part
+from .stop_signals import StopRequested
 
-POLL_S = 0.5
 FAILED, LACKING, LOST = 1, 2, 3  # exit codes
+DEFAULT_TASK = 'pick_and_place'
 LONGEST_DELAY = 3600.0  # s, of the operator
 COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
+SHARE, HOURS = number(0.0, 1.0, 'from 0 to 1'), number(0.01, 1000.0, 'from 0.01 to 1000')
 DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
 BOTH = ('both', 'with', 'without')  # the oracle
 NAMED = (BARE, DEFAULT, *sorted(POLICIES))
@@ -54,76 +53,6 @@ OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERA
              ('high_from', float, 'failure rate from which a state is HIGH'),
              ('prior', float, 'failure rate that a state starts with'),
              ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'))
-
-
-def run(plan: ExperimentPlan, output: Path, at_a_time: int,
-        hung_after_s: float) -> List[ExperimentJob]:
-    """Run the jobs that are not over, some at a time; returns them all.
-
-    :raises ExperimentError: naming the job and its folder.
-    :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
-    """
-    jobs: List[ExperimentJob] = []
-    progress = ProgressLine(sys.stdout)
-    with StopSignals() as signals:
-        try:
-            for replicate in range(plan.replicates):
-                jobs += [
-                    ExperimentJob(plan, variant, replicate, output, hung_after_s)
-                    for variant in plan.variants
-                ]
-            run_jobs(jobs, at_a_time, signals, progress)
-        finally:
-            progress.end()
-            stop_all(jobs)
-    return jobs
-
-
-def stop_all(jobs: Sequence[ExperimentJob]) -> None:
-    """End the processes of every job; of several errors the first is raised, after all."""
-    for job in jobs:
-        job.request_stop()
-    errors: List[Exception] = []
-    for job in jobs:
-        try:
-            job.stop()
-        except (ExperimentError, OSError) as err:  # e.g. the disk is full
-            errors.append(err)
-    if errors:
-        raise errors[0]
-
-
-def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals,
-             progress: ProgressLine) -> None:
-    """Start the jobs one after the other and wait for their ends."""
-    waiting = [job for job in jobs if not job.over]
-    active: List[ExperimentJob] = []
-    progress.show(jobs)
-    while waiting or active:
-        while waiting and len(active) < at_a_time:
-            active.append(waiting.pop(0))
-            active[-1].start()
-        time.sleep(POLL_S)
-        signals.check()
-        for job in active:
-            job.watch()
-        active = [job for job in active if not job.over]
-        progress.show(jobs)
-
-
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Keep a second experiment out of the folder.
-
-    :raises ExperimentError: where one is at work there.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / '.lock').open('w') as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as err:
-            raise ExperimentError('{}: another run_trials is at work there'.format(folder)) from err
-        yield
 
 
 class _RenamedOption(argparse.Action):
@@ -142,11 +71,15 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        '--protocol', choices=sorted(PROTOCOLS),
-        help='all experiments of a protocol, each in a folder of its own below --output; only '
-        '--seed, --jobs, --answer-delay and --hung-after count beside')
-    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
-                        help='(default: %(default)s)')
+        '--protocol', choices=[*PROTOCOLS, ALL],
+        help='the experiments of doc/protocol.md in one pool, each in a folder of its own below '
+        '--output; --task, --trials, --replicates and --variants then choose some of them')
+    parser.add_argument('--frozen', action='store_true',
+                        help='with --protocol: the evaluation seeds of the freeze that holds')
+    parser.add_argument('--plan', dest='only_plan', action='store_true',
+                        help='run nothing: print what would be run, and how long it takes')
+    parser.add_argument('--task', choices=sorted(TASKS),
+                        help='(default: pick_and_place; of a protocol: all)')
     parser.add_argument(
         '--trials', type=int,
         help='per variant and replicate (default: as in the paper, {})'.format(', '.join(
@@ -154,7 +87,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--seed', type=int, default=1,
                         help='of the first trial; the next has the next (default: 1)')
     parser.add_argument(
-        '--replicates', type=int, default=1,
+        '--replicates', type=int,
         help='complete repetitions on further seeds, each learning anew (default: 1)')
     parser.add_argument('--jobs', type=int, default=2,
                         help='replicates of variants at a time (default: %(default)s)')
@@ -176,6 +109,11 @@ def make_parser() -> argparse.ArgumentParser:
         '--answer-delay', type=float, default=15.0,
         help='s of simulated time that the scripted operator takes, in the median (default: 15)')
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
+    parser.add_argument('--lasting', type=float, metavar='SHARE',
+                        help='of the causes, that last, 0 to 1 (default: that of the world)')
+    parser.add_argument(
+        '--hours', type=float, metavar='H',
+        help='of a world that goes on from trial to trial (default: each trial has a fresh one)')
     parser.add_argument(
         '--hung-after', type=float, default=300.0, metavar='S',
         help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
@@ -196,13 +134,17 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     """Parse the command line; `args.plan` is the experiment. A wrong one ends the process."""
     parser = make_parser()
     args = parser.parse_args(argv)
-    trials = TASKS[args.task][1] if args.trials is None else args.trials
+    task = args.task or DEFAULT_TASK
+    trials = TASKS[task][1] if args.trials is None else args.trials
+    replicates = 1 if args.replicates is None else args.replicates
     for check, option, value in ((COUNT, '--trials', trials), (COUNT, '--jobs', args.jobs),
-                                 (COUNT, '--replicates', args.replicates),
-                                 (SEED, '--seed', args.seed),
+                                 (COUNT, '--replicates', replicates),
+                                 (SEED, '--seed', args.seed), (SHARE, '--lasting', args.lasting),
+                                 (HOURS, '--hours', args.hours),
                                  (DELAY, '--answer-delay', args.answer_delay)):
         try:
-            check(option, value)
+            if value is not None:
+                check(option, value)
         except SettingsError as err:
             parser.error('{} must be {}'.format(err.key, err.allowed))
     if not args.hung_after > 0:
@@ -218,9 +160,25 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
             Settings.from_dict(dict(variant.settings))
         except SettingsError as err:
             parser.error(str(err))
-    args.plan = ExperimentPlan(args.task, trials, args.seed, args.replicates, variants,
-                               args.answer_delay, args.benign)
+    args.plan = ExperimentPlan(task, trials, args.seed, replicates, variants, args.answer_delay,
+                               args.benign, args.lasting, args.hours)
+    args.names = [name for name in args.variants if name not in BOTH]  # of a protocol's variants
+    _check_protocol(parser, args)
     return args
+
+
+def _check_protocol(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
+    """Refuse what a protocol says itself, and what makes sense of a protocol alone."""
+    if args.protocol:
+        said = ('policy', 'memory', 'estimator', 'benign', 'lasting', 'hours',
+                *(name for name, _, _ in OVERRIDES))
+        for name in said:
+            if getattr(args, name) != parser.get_default(name):
+                parser.error('--{}: the protocol says it'.format(name.replace('_', '-')))
+        if args.variants != ['both'] and not args.names:
+            parser.error('--variants: name those of the protocol')
+    elif args.frozen:
+        parser.error('--frozen: name a --protocol')
 
 
 def _chosen_variants(parser: argparse.ArgumentParser, args: argparse.Namespace,
@@ -256,10 +214,17 @@ def main(argv: Optional[List[str]] = None) -> int:
         return freeze_seeds(args)
     output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
     try:
+        if args.only_plan:
+            parts = chosen_parts(args) if args.protocol else [Part('', args.plan)]
+            print(plan_text(parts, args.output, args.jobs))
+            return 0
         if shutil.which('roslaunch') is None:
             raise ExperimentError('roslaunch not found; source the workspace first')
         if args.protocol:
-            return _run_protocol(args, output)
+            with alone_in(output):
+                code, told = run_protocol(args, output)
+            print(told)
+            return code
         jobs = _run_in(output, args.plan, args)
     except ImportError as err:  # bags are read with a package that not every robot has
         print('run_trials: {}'.format(lacking(err) or err), file=sys.stderr)
@@ -281,20 +246,6 @@ def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> Lis
         if enter_folder(output, plan):
             print('Going on in {}'.format(output))
         return run(plan, output, args.jobs, args.hung_after)
-
-
-def _run_protocol(args: argparse.Namespace, output: Path) -> int:
-    """Run the parts of a protocol one after the other, and compare the variants of each.
-
-    :returns: 0, or LOST where trials of a part were lost.
-    """
-    code = 0
-    for part in PROTOCOLS[args.protocol](args.seed, args.answer_delay):
-        print('Part {}'.format(part.name), flush=True)
-        jobs = _run_in(output / part.name, part.plan, args)
-        comparison.main([str(output / part.name / RESULTS_FILE)])
-        code = LOST if any(job.lost for job in jobs) else code
-    return code
 
 
 def freeze_seeds(args: argparse.Namespace) -> int:

@@ -9,6 +9,8 @@ from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
 
+from .estimate import JobWork
+from .lab import LAB_FILE, write_lab
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
 from .records import RecordedTrial, ReplicateRecords
@@ -41,7 +43,8 @@ class ExperimentJob:
         self._hung_after_s = hung_after_s
         self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
                                          self._seed, plan.trials)
-        self._results = JobResults(output, plan.task, variant.name, replicate, self._seed)
+        self._results = JobResults(output, plan.task, variant.name, replicate, self._seed,
+                                   plan.lasting)
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
@@ -70,6 +73,11 @@ class ExperimentJob:
         """How many trials are over, lost ones among them."""
         return min(self.trials, self._kept + len(self.summaries) + len(self._lost))
 
+    def work(self) -> JobWork:
+        """Return what it has done and has to do."""
+        took = [row.wall_s for row in self._results.rows() if row.wall_s is not None]
+        return JobWork(self._plan.task, self.trials - self.finished, took)
+
     def _look_through(self) -> None:
         progress = self._records.tidy_up(self._results.kept())
         self._untold, self._kept = [], progress.kept
@@ -88,14 +96,22 @@ class ExperimentJob:
         :raises OSError: where that cannot be done.
         """
         self._ended_at = self._sign_at = time.monotonic()
+        if self._plan.hours is not None:
+            write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
+                      self._results.last_left())
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))
         if settings.get('policy') == 'random':  # trial by trial, also after an interruption
             settings['policy'] = {'name': 'random', 'seed': self._seed + self._next}
+        given: Dict[str, Any] = {}
+        if self._plan.lasting is not None:
+            given['lasting'] = self._plan.lasting
+        if self._plan.hours is not None:
+            given['lab'] = self._records.folder / LAB_FILE
         return {
-            'trials': self.trials - self._next, 'seed': self._seed + self._next,
+            **given, 'trials': self.trials - self._next, 'seed': self._seed + self._next,
             'record': self._records.folder, 'truth': self._records.truth,
             'with_oracle': str(self.variant.recovers).lower(),
             'answer_delay': self._plan.answer_delay, 'benign': str(self._plan.benign).lower(),
@@ -162,7 +178,7 @@ class ExperimentJob:
 
     def _give_up_trial(self, number: int, why: str, text: str) -> None:
         before = set(range(number - LOST_IN_A_ROW + 1, number))
-        if not self.summaries or before <= set(self._lost) and len(before) < number:
+        if not (self.summaries or self._kept) or before <= set(self._lost) and len(before) < number:
             raise ExperimentError(text + last_words(self._records.folder / LOG_FILE))
         self._records.mark_lost(number, why)
         self.messages.append(text + '; LOST')

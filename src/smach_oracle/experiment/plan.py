@@ -5,7 +5,7 @@ import os
 import platform
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 EXPERIMENT_FILE = 'experiment.json'
 FORMAT = 'smach_oracle experiment'
@@ -42,6 +42,8 @@ class ExperimentPlan(NamedTuple):
     variants: Tuple[Variant, ...]
     answer_delay: float  # s
     benign: bool = False  # worlds without causes to fail
+    lasting: Optional[float] = None  # share of the causes that last; None: the world's own
+    hours: Optional[float] = None  # of a world that goes on; None: each trial has a fresh one
 
     def first_seed(self, replicate: int) -> int:
         """Seed of the first trial of a replicate (from 0); each next trial has the next seed."""
@@ -51,6 +53,9 @@ class ExperimentPlan(NamedTuple):
         """The plan as plain data, as its file has it."""
         data = self._asdict()
         del data['variants']
+        for name in ('lasting', 'hours'):  # folders of older versions have neither
+            if data[name] is None:
+                del data[name]
         data[ARMS] = [dict(variant._asdict(), settings=dict(variant.settings))
                       for variant in self.variants]
         return data

@@ -5,6 +5,7 @@ from typing import IO, List, Sequence
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import TrialSummary
 
+from .estimate import duration, seconds_left
 from .job import ExperimentJob
 
 LOG_EVERY_S = 10.0
@@ -29,14 +30,19 @@ class ProgressLine:
             job.messages.clear()
         finished = [job.finished for job in jobs]
         self._finished_before = self._finished_before or finished
-        text = '   '.join(describe_variants(jobs))
+        text = self._describe(jobs)
         now = time.monotonic()
         if text == self._last or (not self._terminal and now - self._printed < LOG_EVERY_S):
             return
         self._last, self._printed = text, now
-        left = time_left(now - self._began, sum(finished) - sum(self._finished_before),
-                         sum(job.trials for job in jobs) - sum(finished))
+        left = self._left(jobs, now - self._began, sum(finished) - sum(self._finished_before))
         self._write(text + left + ('' if self._terminal else '\n'))
+
+    def _describe(self, jobs: Sequence[ExperimentJob]) -> str:
+        return '   '.join(describe_variants(jobs))
+
+    def _left(self, jobs: Sequence[ExperimentJob], elapsed_s: float, done: int) -> str:
+        return time_left(elapsed_s, done, sum(job.trials - job.finished for job in jobs))
 
     def _write(self, text: str) -> None:
         self._stream.write('\r\033[K' + text if self._terminal else text)
@@ -46,6 +52,24 @@ class ProgressLine:
         """Leave the line."""
         if self._terminal:
             self._stream.write('\n')
+
+
+class PoolProgress(ProgressLine):
+    """The line for the jobs of many experiments, of different length."""
+
+    def __init__(self, stream: IO[str], at_a_time: int) -> None:
+        super().__init__(stream)
+        self._at_a_time = at_a_time
+
+    def _describe(self, jobs: Sequence[ExperimentJob]) -> str:
+        lost = sum(len(job.lost) for job in jobs)
+        return '{}/{} trials, {}/{} replicates over{}'.format(
+            sum(job.finished for job in jobs), sum(job.trials for job in jobs),
+            sum(job.over for job in jobs), len(jobs), ', {} lost'.format(lost) if lost else '')
+
+    def _left(self, jobs: Sequence[ExperimentJob], elapsed_s: float, done: int) -> str:
+        left_s = seconds_left([job.work() for job in jobs], self._at_a_time)
+        return '   about {} left'.format(duration(left_s)) if left_s else ''
 
 
 def time_left(elapsed_s: float, done: int, missing: int) -> str:

@@ -1,14 +1,20 @@
-"""Experiments of several parts, each of which is an experiment with a folder of its own."""
-from typing import Callable, Dict, List, NamedTuple
+"""The protocol's experiments: several parts, each an experiment with a folder of its own."""
+from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.decision.policy import POLICIES
 
-from .plan import BARE, DEFAULT, TASKS, ExperimentPlan, named_variants
+from .freeze import BLOCKS
+from .plan import BARE, DEFAULT, TASKS, ExperimentPlan, Variant, named_variants
 
-COMPARED = (BARE, DEFAULT, 'restart')  # variants with all replicates
+COMPARED = (BARE, DEFAULT, 'restart')  # variants with all replicates, and at all shares
 REPLICATES = {'pick_and_place': 3, 'drink_retrieval': 4}
 SWEPT = {'pick_and_place': 100, 'drink_retrieval': 60}  # trials of a point of a sweep
 MEMORIES = (2, 5, 10, 20, 50)
+SHARES = (0.0, 0.5, 1.0)  # of the causes, that last
+HOURS = {'pick_and_place': 20.0, 'drink_retrieval': 16.0}  # of continuous operation
+ALL = 'all'
+BLOCK_OF = dict(zip(('pick_and_place', 'drink_retrieval', 'persistence', 'memory', 'continuous'),
+                    BLOCKS))
 
 
 class Part(NamedTuple):
@@ -18,20 +24,78 @@ class Part(NamedTuple):
     plan: ExperimentPlan
 
 
-def main_parts(seed: int, answer_delay: float) -> List[Part]:
-    """Return the parts of the main protocol: the compared variants, the others, the memory."""
+class ProtocolChoice(NamedTuple):
+    """What of a protocol is run, and on which seeds."""
+
+    seeds: Mapping[str, int]  # the first of each of BLOCKS
+    answer_delay: float  # s
+    variants: Tuple[str, ...] = ()  # in place of those of the protocol
+    tasks: Tuple[str, ...] = tuple(sorted(TASKS))
+    trials: Optional[int] = None  # of a replicate, at most
+    replicates: Optional[int] = None  # at most
+
+    def part(self, name: str, task: str, trials: int, replicates: int,
+             variants: Sequence[Variant], lasting: Optional[float] = None,
+             hours: Optional[float] = None) -> Part:
+        """Return a part of so many trials and replicates at most.
+
+        Where fewer trials are run, a world that goes on does so for fewer hours.
+
+        :param name: of the figure.
+        """
+        fewer = min(trials, self.trials or trials)
+        if hours is not None:
+            hours *= fewer / trials
+        seed = self.seeds[BLOCK_OF.get(name, BLOCK_OF[task])]
+        told = '' if lasting is None else '_{:.0f}'.format(100 * lasting)
+        return Part('{}_{}{}'.format(task, name, told), ExperimentPlan(
+            task, fewer, seed, min(replicates, self.replicates or replicates), tuple(variants),
+            self.answer_delay, lasting=lasting, hours=hours))
+
+
+def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield the main table's parts: the compared variants, and the others in one replicate."""
     others = [name for name in sorted(POLICIES) if name not in COMPARED + ('prose',)]
-    parts: List[Part] = []
-    for task in sorted(TASKS):
+    for task in choice.tasks:
         trials = TASKS[task][1]
-        for name, replicates, variants in (
-                ('compared', REPLICATES[task], named_variants(COMPARED, {})),
-                ('others', 1, named_variants(others, {}))):
-            parts.append(Part('{}_{}'.format(task, name), ExperimentPlan(
-                task, trials, seed, replicates, variants, answer_delay)))
-        parts.append(Part('{}_memory'.format(task), ExperimentPlan(
-            task, SWEPT[task], seed, 1, named_variants((DEFAULT,), {}, MEMORIES), answer_delay)))
-    return parts
+        yield choice.part('compared', task, trials, REPLICATES[task],
+                          named_variants(choice.variants or COMPARED, {}))
+        if not choice.variants:
+            yield choice.part('others', task, trials, 1, named_variants(others, {}))
 
 
-PROTOCOLS: Dict[str, Callable[[int, float], List[Part]]] = {'main': main_parts}
+def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield a part for each share of causes that last."""
+    for task in choice.tasks:
+        for share in SHARES:
+            yield choice.part('persistence', task, SWEPT[task], 1,
+                              named_variants(choice.variants or COMPARED, {}), lasting=share)
+
+
+def memory_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield a part with a variant for each memory."""
+    for task in choice.tasks:
+        yield choice.part('memory', task, SWEPT[task], 1,
+                          named_variants(choice.variants or (DEFAULT,), {}, MEMORIES))
+
+
+def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield the parts of continuous operation."""
+    for task in choice.tasks:
+        yield choice.part('continuous', task, TASKS[task][1], 1,
+                          named_variants(choice.variants or (DEFAULT,), {}), hours=HOURS[task])
+
+
+PROTOCOLS: Dict[str, Callable[[ProtocolChoice], Iterator[Part]]] = {
+    'main': main_parts, 'persistence': persistence_parts, 'memory': memory_parts,
+    'continuous': continuous_parts
+}
+
+
+def parts_of(protocol: str, choice: ProtocolChoice) -> List[Part]:
+    """Return the parts of a protocol, or of ALL of them.
+
+    :raises KeyError: for one that is not there.
+    """
+    names = list(PROTOCOLS) if protocol == ALL else [protocol]
+    return [part for name in names for part in PROTOCOLS[name](choice)]

@@ -40,7 +40,7 @@ class JobResults:
     """The rows of one job."""
 
     def __init__(self, output: Path, task: str, variant: str, replicate: int,
-                 first_seed: int) -> None:
+                 first_seed: int, lasting_share: Optional[float] = None) -> None:
         """Read them.
 
         :raises ExperimentError: where the file cannot be used.
@@ -51,6 +51,7 @@ class JobResults:
         self._variant = variant
         self._replicate = replicate
         self._first_seed = first_seed
+        self._lasting_share = lasting_share
         self._version = code_version()
         self._rows: Dict[int, TrialRow] = {}  # by seed
         if self._path.exists():
@@ -74,10 +75,22 @@ class JobResults:
             if row.ending == LOST:
                 kept.lost[number] = row.why
             else:
-                kept.learned.append(_learned_in(row))
+                kept.learned.append(_data_in(row, row.learned, 'what was learned'))
                 kept.numbers.append(number)
             seed += 1
         return kept
+
+    def rows(self) -> List[TrialRow]:
+        """Return all rows of the job, in the order of the trials."""
+        return [self._rows[seed] for seed in sorted(self._rows)]
+
+    def last_left(self) -> Optional[Mapping[str, Any]]:
+        """Return how the last trial left a world that goes on; None: none has ended.
+
+        :raises ExperimentError: where a row does not tell.
+        """
+        told = [row for row in self.rows() if row.left]
+        return _data_in(told[-1], told[-1].left, 'how the world was left') if told else None
 
     def forget_from(self, number: int) -> None:
         """Write anew what is told of this trial and of those behind it: they are run anew."""
@@ -101,21 +114,22 @@ class JobResults:
                 details = read_details(str(truth)) if truth.exists() else {}
             new.append(row_of(trial.summary, self._task, self._variant, self._replicate,
                               cause.seed, details.get(cause.seed, NO_DETAILS), self._version,
-                              trial.learned))
+                              trial.learned, self._lasting_share))
         for number, why in lost.items():
             if self._first_seed + number not in self._rows:
                 new.append(TrialRow(self._task, self._variant, self._replicate,
                                     self._first_seed + number, LOST, why=why,
-                                    version=self._version))
+                                    version=self._version,
+                                    lasting_share=self._lasting_share))
         if new:
             append_rows(self._path, new)
             self._rows.update((row.seed, row) for row in new)
 
 
-def _learned_in(row: TrialRow) -> Optional[Mapping[str, Any]]:
+def _data_in(row: TrialRow, text: str, what: str) -> Optional[Mapping[str, Any]]:
     try:
-        learned = json.loads(row.learned)
+        data = json.loads(text)
     except ValueError as err:
-        raise ExperimentError('results of {}, seed {}: it does not tell what was learned'.format(
-            row.variant, row.seed)) from err
-    return learned if isinstance(learned, dict) else None
+        raise ExperimentError('results of {}, seed {}: it does not tell {}'.format(
+            row.variant, row.seed, what)) from err
+    return data if isinstance(data, dict) else None

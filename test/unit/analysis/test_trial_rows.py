@@ -51,7 +51,8 @@ def test_rows_come_back_as_they_were_written(tmp_path):
     rows = [row(1, causes='glare dim_light', why='it stands, 0.2 cm off', learned='{"A": [1]}'),
             row(2, ending='lost', true_success=None, wrong_object=None, damage=None,
                 expert_s=None, sim_s=None),
-            row(3, wrong_object='cup', true_success=False, lasting=2)]
+            row(3, wrong_object='cup', true_success=False, lasting=2, lasting_share=0.5, wall_s=2.5,
+                hour=1.25, left='{"ended": 1.3}')]
     append_rows(path, rows[:1])
     append_rows(path, rows[1:])
     assert read_rows(path) == rows
@@ -97,9 +98,11 @@ def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
                     '{"seed": 2, "causes": [{"kind": "glare", "lasting": true}, '
                     '{"kind": "dim", "lasting": false}], "wrong_object": "cup", '
                     '"damage": {"dropped": ["a", "b"], "pushed_off": []}, '
-                    '"passed_s": {"expert": 12.5}}\n{"se')
+                    '"passed_s": {"expert": 12.5}, "wall_s": 9, "hour": 0.5, '
+                    '"left": {"ended": 1}}\n{"se')
     details = read_details(str(path))
-    assert details == {1: NO_DETAILS, 2: ('cup', 2, {'expert': 12.5}, 1)}
+    assert details == {1: NO_DETAILS,
+                       2: ('cup', 2, {'expert': 12.5}, 1, 9.0, 0.5, {'ended': 1})}
     assert details_of({'damage': {'dropped': 3}}).damage == 3
 
 

@@ -15,9 +15,10 @@ import pytest
 
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.experiment import launching
-from smach_oracle.experiment.command import alone_in, parse, stop_all
+from smach_oracle.experiment.command import parse
 from smach_oracle.experiment.launching import MARK, end_marked, environment_of, free_port, marked
 from smach_oracle.experiment.plan import ExperimentError, enter_folder
+from smach_oracle.experiment.pool import alone_in, stop_all
 from smach_oracle.experiment.progress import ProgressLine, describe_trials, time_left
 from smach_oracle.experiment.stop_signals import StopRequested, StopSignals
 from smach_oracle.oracle.records.events import Event, EventKind

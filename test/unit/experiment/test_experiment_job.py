@@ -159,3 +159,14 @@ def test_a_job_that_cannot_even_begin_is_an_error(run):
 def test_too_many_lost_trials_in_a_row_are_an_error(run):
     with pytest.raises(ExperimentError, match='seed 103'):
         run((1, True), *[(0, True)] * 6)
+
+
+def test_where_trials_have_rows_alone_the_next_one_that_hangs_is_lost(run, monkeypatch):
+    def tidy_up(records, kept):
+        left = [number for number in range(2, 6)
+                if number not in records.done and number not in records.lost]
+        return JobProgress([recorded(path) for path in records.closed_bags()], dict(records.lost),
+                           (), left[0] if left else 6, kept=2)
+    monkeypatch.setattr(FakeRecords, 'tidy_up', tidy_up)
+    job, started = run((0, True), (0, True), (3, False))
+    assert started == [(2, 4), (2, 4), (3, 3)] and list(job.lost) == [FIRST_SEED + 2]

@@ -1,5 +1,6 @@
 """The rows of an experiment: written as trials end, and gone on from without the bags."""
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -8,6 +9,7 @@ from smach_oracle.analysis.bag_events import RecordedCause
 from smach_oracle.analysis.trial_rows import LOST, append_rows, read_rows
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.analysis.truth import Truth
+from smach_oracle.experiment import job as job_module
 from smach_oracle.experiment.command import parse
 from smach_oracle.experiment.job import ExperimentJob
 from smach_oracle.experiment.plan import ExperimentError
@@ -143,6 +145,35 @@ def test_a_whole_job_goes_on_without_its_bags(tmp_path):
     told = job._arguments()
     assert (told['seed'], told['trials'], told['with_oracle']) == (102, 4, 'true')
     assert json.loads(told['oracle'])['policy'] == 'restart'
+
+
+def test_the_share_of_lasting_causes_is_given_to_the_world_and_told_by_the_rows(tmp_path):
+    given = plan('--variants', 'bare', '--lasting', '0.5')
+    job = ExperimentJob(given, given.variants[0], 0, tmp_path, 300.0)
+    assert job._arguments()['lasting'] == 0.5 and 'lab' not in job._arguments()
+    job._results.add([trial(0)], {1: 'hung'}, tmp_path / 'none')
+    assert [row.lasting_share for row in read_rows(tmp_path / RESULTS_FILE)] == [0.5] * 2
+    usual = plan('--variants', 'bare')
+    assert 'lasting' not in ExperimentJob(usual, usual.variants[0], 0, tmp_path / 'other',
+                                          300.0)._arguments()
+
+
+def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatch):
+    given = plan('--variants', 'bare', '--hours', '3')
+    truth = tmp_path / 'truth.jsonl'
+    truth.write_text(''.join(json.dumps({
+        'seed': FIRST_SEED + number, 'hour': 0.5 * number, 'left': {'ended': 0.5 * number + 0.1}
+    }) + '\n' for number in range(3)))
+    JobResults(tmp_path, 'pick_and_place', 'bare', 0, FIRST_SEED).add(
+        [trial(0), trial(1)], {2: 'hung'}, truth)
+    started = []
+    monkeypatch.setattr(job_module, 'Launch', lambda *launched: started.append(launched))
+    job = ExperimentJob(given, given.variants[0], 0, tmp_path, 300.0)
+    job.start()
+    (_, _, arguments), = started
+    assert arguments['seed'] == FIRST_SEED + 3
+    assert json.loads(Path(arguments['lab']).read_text()) == {
+        'seed': FIRST_SEED, 'slot_h': 0.5, 'left': {'ended': 0.6}}, 'a lost trial leaves nothing'
 
 
 def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path):

@@ -43,11 +43,12 @@ from ..scenes.scene import Scene
 from ..scenes.tasks import draw
 from .camera_publisher import CameraPublisher
 from .controllers import Controllers
+from .lab import read_lab
 from .loop import PERIOD_S, WorldLoop, WorldStopped
 from .motion_table import MotionTable
 from .recognition import Recognition
 from .reveal import reveal
-from .settings import WorldSettings, read_settings
+from .settings import NONE, WorldSettings, read_settings
 from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
 from .truth import TrialTruth, append_line
@@ -75,6 +76,7 @@ class WorldNode:
         """
         self._settings = settings
         self.exit_code = 0  # of the process; 1 where the world failed
+        self._lab = read_lab(settings) if settings.lab != NONE else None
         self._world = World(self._drawn(settings.seed), settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
@@ -168,7 +170,7 @@ class WorldNode:
         self._finish_trial()
         self._loop.watch.restart()
         began_s = time.monotonic()
-        self._world.reset(self._drawn(seed))
+        self._world.reset(self._lab.scene(seed) if self._lab else self._drawn(seed))
         self._recognition.forget()
         self._loop.watch.add_time('reset')
         self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
@@ -184,7 +186,7 @@ class WorldNode:
     def _finish_trial(self) -> None:
         """Write down how the trial ended, once."""
         truth, self._truth = self._truth, None
-        if truth is None or self._settings.truth_file == 'none':
+        if truth is None or not (self._lab or self._settings.truth_file != NONE):
             return
         sim_s = self._world.time
         truth.happened(self._world.cause_spans())
@@ -192,6 +194,10 @@ class WorldNode:
         verdict = self._judge()
         record = truth.record(verdict, self._world.harm.found(self._world), sim_s,
                               self._loop.watch.spent, self._loop.watch.used)
+        if self._lab:
+            record.update(self._lab.leave(self._world, verdict, record['sim_s']))
+        if self._settings.truth_file == NONE:
+            return
         try:
             append_line(self._settings.truth_file, record)
         except OSError as err:
@@ -254,10 +260,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
-        '~lasting, '
-        '~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, ~camera_rate, '
-        '~camera_binning, ~reveal; see '
-        'doc/simulation.md.')
+        '~lasting, ~lab, ~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, '
+        '~camera_rate, ~camera_binning, ~reveal; see doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:
         # before the node is made: rospy looks at it only then

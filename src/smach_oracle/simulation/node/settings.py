@@ -26,6 +26,8 @@ class WorldSettings(NamedTuple):
     idle_speed: float = 10.0
     # at factor 0: wall s that nothing was commanded before the clock goes on alone
     idle_grace: float = 0.1
+    # file of a lab that goes on from trial to trial; none: each trial has a fresh world
+    lab: str = NONE
     truth_file: str = NONE  # gets a line of JSON on each trial that has ended
     # joint states and transforms per simulated s; at factor 0 the default is 4
     state_rate: float = 10.0
@@ -66,6 +68,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
+        lab=taken('lab', NONE, _file),
         state_rate=number('state_rate', 10.0 if factor else 4.0, 0.1, 60.0),
         camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
         camera_binning=taken('camera_binning', 1, _one_or_two))
@@ -77,11 +80,14 @@ def _one_or_two(key: str, value: object) -> int:
     return value
 
 
-def _writable_file(key: str, value: object) -> str:
+def _file(key: str, value: object) -> str:
     if not isinstance(value, str) or not value:
         raise SettingsError(key, value, "a file's name, or {}".format(NONE))
-    if value == NONE:
-        return value
-    path = path_of(value)
-    check_writable(key, path)
+    return value if value == NONE else path_of(value)
+
+
+def _writable_file(key: str, value: object) -> str:
+    path = _file(key, value)
+    if path != NONE:
+        check_writable(key, path)
     return path

@@ -81,7 +81,8 @@ class Pr2Body:
         for arm in ARMS:
             for finger in FINGERS[arm]:
                 pybullet.changeDynamics(self.index, self.links[finger],
-                                        lateralFriction=TIP_FRICTION, spinningFriction=0.005,
+                                        lateralFriction=TIP_FRICTION * (1.0 - start.tip_wear),
+                                        spinningFriction=0.005,
                                         rollingFriction=0.0005, physicsClientId=client)
 
     def _stand(self, start: RobotStart) -> None:

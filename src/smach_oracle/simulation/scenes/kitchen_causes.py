@@ -2,7 +2,7 @@
 
 Neither the executive nor the subsystems learn of them.
 """
-from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -52,13 +52,16 @@ class KitchenDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE) -> KitchenDraft:
+def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE,
+                without: Collection[str] = ()) -> KitchenDraft:
     """A kitchen with the causes that its seed has for it: mostly one, seldom two.
 
     :param lasting: the share of the causes that last, 0 to 1.
+    :param without: kinds that are left out where they are drawn.
     """
     for kind, generator in drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting):
-        draft = MAKERS[kind](draft, generator)
+        if kind not in without:
+            draft = MAKERS[kind](draft, generator)
     return declared(draft, KINDS_OF[LASTING])
 
 

@@ -34,24 +34,37 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     """
     if seed < 0:
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
-    generator = np.random.default_rng([seed, 2])
     kitchen = true_kitchen(seed)
-    draft = KitchenDraft(tuple(_drinks(seed, generator, kitchen)), kitchen.place[:2],
-                         kitchen.width / 2 - kitchen.wall,
-                         localisation_error=localisation_error(seed))
+    draft = drafted(kitchen, fresh_drinks(seed, kitchen))._replace(
+        localisation_error=localisation_error(seed))
     if not benign:
         draft = with_causes(draft, seed, lasting)
+    robot = RobotStart(posture(), encoder_errors=encoder_errors(seed),
+                       camera_error=camera_error(seed))
+    return composed(seed, draft, kitchen, robot)
+
+
+def drafted(kitchen: Kitchen, drinks: Tuple[Body, ...]) -> KitchenDraft:
+    """Return a kitchen with drinks and without a cause."""
+    return KitchenDraft(drinks, kitchen.place[:2], kitchen.width / 2 - kitchen.wall)
+
+
+def composed(seed: int, draft: KitchenDraft, kitchen: Kitchen, robot: RobotStart) -> Scene:
+    """Return the scene of a draft.
+
+    :param robot: it gets the errors of the draft.
+    """
     palm = true_palm(seed)
     goal = Goal('in_hand', ORDERED, palm, PALM_SIZE[0] / 2)
+    robot = robot._replace(drive_error=draft.drive_error,
+                           localisation_error=draft.localisation_error)
     return Scene(TASK, seed, (fridge(kitchen, draft.closing),) + draft.drinks + person(palm), goal,
-                 RobotStart(_posture(), drive_error=draft.drive_error,
-                            localisation_error=draft.localisation_error,
-                            encoder_errors=encoder_errors(seed), camera_error=camera_error(seed)),
-                 disturbances=draft.disturbances, causes=draft.causes)
+                 robot, disturbances=draft.disturbances, causes=draft.causes)
 
 
-def _drinks(seed: int, generator: np.random.Generator, kitchen: Kitchen) -> List[Body]:
+def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
     """Upright on the shelf, apart from each other, near the front; the foremost comes first."""
+    generator = np.random.default_rng([seed, 2])
     places: List[Tuple[float, float]] = []
     for _ in range(100):
         x, y = generator.uniform(*DEPTHS), generator.uniform(*SIDES)
@@ -59,10 +72,10 @@ def _drinks(seed: int, generator: np.random.Generator, kitchen: Kitchen) -> List
                 np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
-    return [_drink(seed, index, place, kitchen) for index, place in enumerate(places)]
+    return tuple(drink_at(seed, index, place, kitchen) for index, place in enumerate(places))
 
 
-def _drink(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen) -> Body:
+def drink_at(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen) -> Body:
     """A can at a place (m) in the fridge's frame."""
     radius, height = drink_size(seed, index)
     spot = odom_from_pose(kitchen, place[0], place[1], 0.0)[:2, 3]
@@ -72,7 +85,8 @@ def _drink(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen) 
                 colour=COLOURS[index % len(COLOURS)])
 
 
-def _posture() -> Tuple[Tuple[str, float], ...]:
+def posture() -> Tuple[Tuple[str, float], ...]:
+    """Return where the joints are at the beginning: arms stowed, grippers closed."""
     arms = [pair for arm in ARMS for pair in zip(ARM_JOINTS[arm], TRAVEL[arm])]
     fingers = [(name, 0.0) for arm in ARMS for name in FINGER_JOINTS[arm]]
     return tuple(arms + fingers + [('torso_lift_joint', START_TORSO)])

@@ -80,6 +80,7 @@ class RobotStart(NamedTuple):
     encoder_errors: Tuple[Tuple[str, float], ...] = ()  # rad that joints read too much
     # m and rad (roll, pitch, yaw) of the head camera, from where the URDF has it, in its own frame
     camera_error: Tuple[float, float, float, float, float, float] = (0.0,) * 6
+    tip_wear: float = 0.0  # share of their friction that the finger tips have lost
 
 
 class Goal(NamedTuple):

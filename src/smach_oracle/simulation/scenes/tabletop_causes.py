@@ -3,7 +3,7 @@
 Neither the executive nor the subsystems learn of them.
 """
 import functools
-from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -51,13 +51,16 @@ class TabletopDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE) -> TabletopDraft:
+def with_causes(draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE,
+                without: Collection[str] = ()) -> TabletopDraft:
     """A scene with the causes that its seed has for it: mostly none, seldom two.
 
     :param lasting: the share of the causes that last, 0 to 1.
+    :param without: kinds that are left out where they are drawn.
     """
     for kind, generator in drawn_kinds(seed, 62, AMOUNT, KINDS_OF, lasting):
-        draft = MAKERS[kind](draft, generator) or draft
+        if kind not in without:
+            draft = MAKERS[kind](draft, generator) or draft
     return declared(draft, KINDS_OF[LASTING])
 
 

@@ -32,18 +32,27 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     :param benign: without any reason to fail.
     :param lasting: the share of the causes that last, 0 to 1.
     """
-    target, *others = _things(np.random.default_rng([seed, 61]))
-    draft = TabletopDraft((target, *(another(generator_for(seed, 'clutter:' + each.name), each,
-                                             TABLE_TOP) for each in others)))
+    draft = TabletopDraft(fresh_things(seed))
     if not benign:
         draft = with_causes(draft, seed, lasting)
-    table = true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE)
+    robot = RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
+                       camera_error=camera_error(seed))
+    return composed(seed, draft, true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE), robot)
+
+
+def fresh_things(seed: int) -> Tuple[Body, ...]:
+    """Return what stands on a table of TABLE_TOP that is set anew; the nearest thing first."""
+    target, *others = _things(np.random.default_rng([seed, 61]))
+    return (target, *(another(generator_for(seed, 'clutter:' + each.name), each, TABLE_TOP)
+                      for each in others))
+
+
+def composed(seed: int, draft: TabletopDraft, table: TrueTable, robot: RobotStart) -> Scene:
+    """Return the scene of a draft; its things stand on the table as it is."""
     target = min(draft.things, key=lambda thing: float(np.hypot(*thing.position[:2])))
     goal = Goal('stands_at', target.name, (*GOAL, table.height + target.size[2] / 2), TOLERANCE)
-    return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal,
-                 RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
-                            camera_error=camera_error(seed)), CameraQuality(), draft.disturbances,
-                 draft.causes)
+    return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal, robot,
+                 CameraQuality(), draft.disturbances, draft.causes)
 
 
 def _standing_on(table: TrueTable, things: Sequence[Body]) -> List[Body]:

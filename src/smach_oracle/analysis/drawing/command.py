@@ -1,0 +1,72 @@
+"""Draw the figures of an experiment, and write its tables, from the rows that it has kept.
+
+FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it; no bag is
+needed. OUT gets main.svg, persistence.svg, memory.svg, continuous.svg, each with a PNG, and
+tables.md, as far as there are rows of them.
+"""
+import argparse
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
+
+from smach_oracle.oracle.settings.paths import path_of
+
+from ..bag_events import BagError
+from ..reading import report_error
+from ..trial_rows import TrialRow, read_rows
+from .tables import format_tables
+
+ROWS = 'results.csv'
+KINDS = ('main', 'persistence', 'memory', 'continuous')
+
+
+def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
+    """Return the rows below a folder, by the figure that they belong to, one of KINDS.
+
+    :raises BagError: where there are none, or a file cannot be used.
+    :raises OSError: where one cannot be read.
+    """
+    found: Dict[str, List[TrialRow]] = {}
+    for path in sorted(folder.rglob(ROWS)):
+        kind = next((each for each in KINDS[1:] if each in path.parent.name), KINDS[0])
+        found.setdefault(kind, []).extend(read_rows(path))
+    found = {kind: found[kind] for kind in KINDS if found.get(kind)}
+    if not found:
+        raise BagError('{}: no {} with trials in it'.format(folder, ROWS))
+    return found
+
+
+def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path]:
+    """Draw what there is, and write the tables; returns the paths.
+
+    :raises OSError: where a file cannot be written.
+    """
+    from .hours_figure import draw_hours  # matplotlib takes a second: only where it is wanted
+    from .looks import save
+    from .main_figure import draw_main
+    from .sweep_figures import draw_memory, draw_persistence
+    draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(zip(KINDS, (
+        draw_main, draw_persistence, draw_memory, draw_hours)))
+    output.mkdir(parents=True, exist_ok=True)
+    paths = [output / 'tables.md']
+    paths[0].write_text('\n'.join('## {}\n\n{}'.format(kind.capitalize(), format_tables(rows))
+                                  for kind, rows in found.items()), encoding='utf-8')
+    for kind, rows in found.items():
+        paths += save(partial(draws[kind], rows), output / kind)
+    return paths
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog='draw_results', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folder', metavar='FOLDER', type=path_of)
+    parser.add_argument('output', metavar='OUT', type=path_of)
+    args = parser.parse_args(argv)
+    try:
+        for path in draw_all(find_rows(Path(args.folder)), Path(args.output)):
+            sys.stdout.write('{}\n'.format(path))
+    except (BagError, OSError, ImportError) as err:
+        return report_error('draw_results', err)
+    return 0

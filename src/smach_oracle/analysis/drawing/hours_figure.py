@@ -1,0 +1,111 @@
+"""Continuous operation over its hours: attempts and questions, what was needed, learned rates."""
+import json
+from typing import Any, Dict, List, Sequence, Tuple
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ..figure import BLACK, BLUE, VERMILLION
+from ..sweep_figure import GREEN
+from ..trial_rows import TrialRow
+from .looks import Happened, legend_above, panels, tasks_of, title_of
+
+HEIGHT_IN = 5.6
+CURVES: Tuple[Tuple[str, str, str, Happened], ...] = (
+    ('oracle recovered', BLUE, '-', lambda row: row.recovered),
+    ('intervention', VERMILLION, '--', lambda row: row.intervened),
+    ('not a true success', BLACK, ':', lambda row: not row.succeeded))
+LIGHT = {'glare': '#F0E442', 'dim_light': '#BBBBBB'}  # behind the events of trials with such light
+MOST_STATES = 6  # whose rates are drawn, those that failed most
+# colours of Okabe and Ito's palette that are left, and dashes, so that lines are told apart
+RATE_LOOKS = ((BLUE, '-'), (VERMILLION, '--'), (GREEN, '-.'), (BLACK, ':'),
+              ('#CC79A7', (0, (5, 1, 1, 1, 1, 1))), ('#E69F00', (0, (2, 1))))
+
+
+def draw_hours(rows: Sequence[TrialRow]) -> Figure:
+    """Draw a column of panels for each task, over the hours of its run."""
+    known = [row for row in rows if row.hour is not None]
+    tasks = tasks_of(known)
+    figure, made = panels([title_of(task) for task in tasks], HEIGHT_IN, rows=3, margins=dict(
+        bottom=0.08, top=0.91, hspace=0.42))
+    for column, task in enumerate(tasks):
+        mine = sorted((row for row in known if row.task == task), key=lambda row: row.seed)
+        events, needed, rates = (line[column] for line in made)
+        _draw_events(events, mine)
+        _draw_needed(needed, mine)
+        _draw_rates(rates, mine)
+        for axes in (events, needed, rates):
+            axes.set_xlim(0, max(_hours(mine)[-1], 1e-3))
+        rates.set_xlabel('Hour of the run')
+        if column == 0:
+            for axes, label in ((events, 'Attempts (up)\nand questions (down)'),
+                                (needed, 'Trials so far'), (rates, 'Learned failure rate')):
+                axes.set_ylabel(label)
+    legend_above(figure, made[1][0])
+    return figure
+
+
+def _hours(rows: Sequence[TrialRow]) -> List[float]:
+    return [row.hour or 0.0 for row in rows]
+
+
+def _draw_events(axes: Any, rows: Sequence[TrialRow]) -> None:
+    """Draw a stem for each trial, and behind it what light it had."""
+    hours = _hours(rows)
+    widths = [later - hour for hour, later in zip(hours, hours[1:])] + [0.0]
+    for row, hour, width in zip(rows, hours, widths):
+        for kind, colour in LIGHT.items():
+            if kind in row.causes.split():
+                axes.axvspan(hour, hour + width, color=colour, linewidth=0, alpha=0.6)
+    axes.vlines(hours, 0, [row.attempts for row in rows], color=BLUE, linewidth=0.9)
+    axes.vlines(hours, [-row.questions for row in rows], 0, color=VERMILLION, linewidth=0.9)
+    axes.axhline(0, color=BLACK, linewidth=0.5)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
+
+
+def _draw_needed(axes: Any, rows: Sequence[TrialRow]) -> None:
+    """Draw in how many trials so far something happened."""
+    for label, colour, dashes, happened in CURVES:
+        counts = [sum(map(happened, rows[:number + 1])) for number in range(len(rows))]
+        axes.step([0.0, *_hours(rows)], [0, *counts], where='post', color=colour, linestyle=dashes,
+                  linewidth=1.1, label=label)
+    axes.set_ylim(bottom=0)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
+
+
+def _draw_rates(axes: Any, rows: Sequence[TrialRow]) -> None:
+    """Draw the rates of the states that failed most; a small shift keeps equal ones apart."""
+    series = learned_rates(rows)
+    ranked = sorted(series, key=lambda state: (-sum(rate for _, rate in series[state]), state))
+    for number, state in enumerate(ranked[:MOST_STATES]):
+        colour, dashes = RATE_LOOKS[number % len(RATE_LOOKS)]
+        hours, rates = zip(*series[state])
+        axes.step(hours, [rate + 0.006 * number for rate in rates], where='post', color=colour,
+                  linestyle=dashes, linewidth=1.0, label=state)
+    axes.set_ylim(0, 1)
+    axes.legend(loc='lower left', bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, fontsize=6,
+                borderaxespad=0.0, handlelength=2.2, columnspacing=0.8, handletextpad=0.4)
+
+
+def learned_rates(rows: Sequence[TrialRow]) -> Dict[str, List[Tuple[float, float]]]:
+    """Return the failure rate of each state after each trial, as (hour, rate).
+
+    It is that of the window of the latest results; where the estimator has none, of all.
+    """
+    series: Dict[str, List[Tuple[float, float]]] = {}
+    for row in rows:
+        for path, states in (json.loads(row.learned) if row.learned else {}).items():
+            for state, learned in states.items():
+                rate = _rate(learned)
+                if rate is not None:
+                    name = '{}/{}'.format(path, state) if path else state
+                    series.setdefault(name, []).append((row.hour or 0.0, rate))
+    return series
+
+
+def _rate(learned: Dict[str, Any]) -> Any:
+    window = learned.get('window')
+    if isinstance(window, list) and window:
+        return sum(window) / len(window)
+    total = learned.get('failures', 0) + learned.get('successes', 0)
+    return learned.get('failures', 0) / total if total else None

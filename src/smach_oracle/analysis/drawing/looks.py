@@ -1,0 +1,95 @@
+"""How the figures of an experiment look: sizes, colours, and how a file is written."""
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..figure import BLACK, BLUE, COLUMN_IN, DPI, STYLE, VERMILLION
+from ..intervals import Interval, wilson_interval
+from ..sweep_figure import GREEN
+from ..trial_rows import TrialRow
+
+# a variant looks the same in all figures: colour, marker, dashes
+LOOKS: Dict[str, Tuple[str, str, str]] = {
+    'bare': (BLACK, 'd', '-.'), 'default': (BLUE, 'o', '-'), 'restart': (VERMILLION, 's', '--')
+}
+OTHERS = (GREEN, '^', ':')
+TITLES = {'pick_and_place': 'Pick and place', 'drink_retrieval': 'Drink retrieval'}
+Happened = Callable[[TrialRow], bool]
+
+
+def look_of(variant: str) -> Tuple[str, str, str]:
+    """Return the colour, marker and dashes of a variant."""
+    return LOOKS.get(variant, OTHERS)
+
+
+def title_of(task: str) -> str:
+    """Return what a task is called in a figure."""
+    return TITLES.get(task, task.replace('_', ' ').capitalize())
+
+
+class Percent:
+    """A share of trials with its 95% Wilson interval, in percent."""
+
+    def __init__(self, rows: Sequence[TrialRow], happened: Happened) -> None:
+        """Count."""
+        number = sum(map(happened, rows))
+        self.share = 100.0 * number / len(rows)
+        low, high = wilson_interval(number, len(rows))
+        self.interval: Interval = (100 * low, 100 * high)
+
+    @property
+    def reach(self) -> Tuple[float, float]:
+        """How far the interval goes below and above."""
+        return max(0.0, self.share - self.interval[0]), max(0.0, self.interval[1] - self.share)
+
+
+def panels(titles: Sequence[str], height_in: float, rows: int = 1,
+           margins: Optional[Dict[str, float]] = None) -> Tuple[Figure, List[List[Any]]]:
+    """Return a figure as wide as two columns of a paper, with axes row by row.
+
+    :param titles: one for each column.
+    :param margins: of matplotlib's subplots_adjust.
+    """
+    figure = Figure(figsize=(COLUMN_IN[2], height_in))
+    FigureCanvasAgg(figure)
+    made = [[figure.add_subplot(rows, len(titles), 1 + row * len(titles) + column)
+             for column in range(len(titles))] for row in range(rows)]
+    for axes, title in zip(made[0], titles):
+        axes.set_title(title, loc='left')
+    figure.subplots_adjust(**{**dict(left=0.08, right=0.98, bottom=0.17, top=0.80, wspace=0.22),
+                              **(margins or {})})
+    return figure, made
+
+
+def legend_above(figure: Figure, axes: Any) -> None:
+    """Put the legend of some axes above all, where it covers no data."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc='upper center', ncol=6, frameon=False, borderpad=0.2)
+
+
+def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:
+    """Draw a figure to STEM.svg and STEM.png; the same rows give the same files.
+
+    :raises OSError: where a file cannot be written.
+    """
+    paths = [stem.with_suffix('.svg'), stem.with_suffix('.png')]
+    with rc_context(STYLE):
+        figure = draw()
+        figure.savefig(str(paths[0]), metadata={'Date': None, 'Creator': None})
+        figure.savefig(str(paths[1]), dpi=DPI, metadata={'Software': None})
+    return paths
+
+
+def tasks_of(rows: Sequence[TrialRow]) -> List[str]:
+    """Return the tasks in the order in which the paper has them."""
+    return sorted({row.task for row in rows},
+                  key=lambda task: (task not in TITLES, list(TITLES).index(task)
+                                    if task in TITLES else 0, task))
+
+
+def variants_of(rows: Sequence[TrialRow]) -> List[str]:
+    """Return the variants in the order in which they were begun."""
+    return list(dict.fromkeys(row.variant for row in rows))

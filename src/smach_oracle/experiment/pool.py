@@ -1,0 +1,160 @@
+"""Jobs, some at a time: of one experiment, or of all parts of a protocol."""
+import fcntl
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence
+
+from .estimate import seconds_missing
+from .job import ExperimentJob
+from .plan import ExperimentError, ExperimentPlan, enter_folder
+from .progress import PoolProgress, ProgressLine
+from .protocols import Part
+from .stop_signals import StopSignals
+
+POLL_S = 0.5
+BROKEN_AT_ONCE = 3  # jobs, before a trial has ended: then something is wrong with more than a job
+# a protocol's folder may lie in a repository: its rows shall be committed, its bags not
+IGNORED = '*\n!*/\n!.gitignore\n!results.csv\n!experiment.json\n'
+
+
+class PartJobs(NamedTuple):
+    """A part of a protocol, and its jobs."""
+
+    part: Part
+    jobs: List[ExperimentJob]
+
+
+class PoolResult(NamedTuple):
+    """What became of the parts of a protocol."""
+
+    parts: List[PartJobs]
+    broken: Dict[str, str]  # jobs that could not be brought to their ends, and why
+
+
+def run(plan: ExperimentPlan, output: Path, at_a_time: int,
+        hung_after_s: float) -> List[ExperimentJob]:
+    """Run the jobs of an experiment that are not over, some at a time; returns them all.
+
+    :raises ExperimentError: naming the job and its folder.
+    :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
+    """
+    jobs: List[ExperimentJob] = []
+    progress = ProgressLine(sys.stdout)
+    with StopSignals() as signals:
+        try:
+            jobs += _make_jobs(plan, output, hung_after_s)
+            run_jobs(jobs, at_a_time, signals, progress)
+        finally:
+            progress.end()
+            stop_all(jobs)
+    return jobs
+
+
+def run_parts(parts: Sequence[Part], output: Path, at_a_time: int,
+              hung_after_s: float) -> PoolResult:
+    """Run the jobs of all parts that are not over, the longest first.
+
+    A job that cannot go on costs its replicate; the others go on.
+
+    :param output: each part gets a folder in it.
+    :raises ExperimentError: where a folder cannot be gone on with, or job after job breaks.
+    :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
+    """
+    (output / '.gitignore').write_text(IGNORED, encoding='utf-8')
+    made: List[PartJobs] = []
+    broken: Dict[str, str] = {}
+    progress = PoolProgress(sys.stdout, at_a_time)
+    with StopSignals() as signals:
+        try:
+            for part in parts:
+                folder = output / part.name
+                goes_on = enter_folder(folder, part.plan)
+                made.append(PartJobs(part, []))
+                for job in _make_jobs(part.plan, folder, hung_after_s):
+                    job.name = '{}/{}'.format(part.name, job.name)
+                    made[-1].jobs.append(job)
+                if goes_on:
+                    made[-1].jobs[0].messages.insert(0, 'Going on in {}'.format(folder))
+                signals.check()
+            run_jobs(_longest_first(_all(made)), at_a_time, signals, progress, broken)
+        finally:
+            progress.end()
+            stop_all(_all(made))
+    return PoolResult(made, broken)
+
+
+def _all(made: Sequence[PartJobs]) -> List[ExperimentJob]:
+    return [job for each in made for job in each.jobs]
+
+
+def _make_jobs(plan: ExperimentPlan, output: Path, hung_after_s: float) -> Iterator[ExperimentJob]:
+    for replicate in range(plan.replicates):
+        for variant in plan.variants:
+            yield ExperimentJob(plan, variant, replicate, output, hung_after_s)
+
+
+def _longest_first(jobs: Sequence[ExperimentJob]) -> List[ExperimentJob]:
+    """Return the jobs so that none of the longest is alone at the end."""
+    missing = dict(zip(map(id, jobs), seconds_missing([job.work() for job in jobs])))
+    return sorted(jobs, key=lambda job: -missing[id(job)])
+
+
+def stop_all(jobs: Sequence[ExperimentJob]) -> None:
+    """End the processes of every job; of several errors the first is raised, after all."""
+    for job in jobs:
+        job.request_stop()
+    errors: List[Exception] = []
+    for job in jobs:
+        try:
+            job.stop()
+        except (ExperimentError, OSError) as err:  # e.g. the disk is full
+            errors.append(err)
+    if errors:
+        raise errors[0]
+
+
+def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals,
+             progress: ProgressLine, broken: Optional[Dict[str, str]] = None) -> None:
+    """Start the jobs one after the other and wait for their ends.
+
+    :param broken: gets the jobs that cannot go on, and why; None: the first such is raised.
+    :raises ExperimentError: likewise, and where jobs break before any trial has ended.
+    """
+    waiting = [job for job in jobs if not job.over]
+    active: List[ExperimentJob] = []
+    before = sum(job.finished for job in jobs)
+    progress.show(jobs)
+    while waiting or active:
+        while waiting and len(active) < at_a_time:
+            active.append(waiting.pop(0))
+            active[-1].start()
+        time.sleep(POLL_S)
+        signals.check()
+        for job in active:
+            try:
+                job.watch()
+            except ExperimentError as err:
+                if broken is None or (len(broken) + 1 >= BROKEN_AT_ONCE
+                                      and sum(each.finished for each in jobs) == before):
+                    raise
+                broken[job.name] = str(err)
+                job.messages.append('{}; the replicate is left'.format(err))
+        active = [job for job in active if not job.over and job.name not in (broken or ())]
+        progress.show(jobs)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep a second experiment out of the folder.
+
+    :raises ExperimentError: where one is at work there.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / '.lock').open('w') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as err:
+            raise ExperimentError('{}: another run_trials is at work there'.format(folder)) from err
+        yield

@@ -1,0 +1,126 @@
+"""The figures and tables of an experiment, drawn from its rows alone."""
+
+import pytest
+from matplotlib import rc_context
+
+from smach_oracle.analysis.comparison import costs_of, format_comparison, robot_hours
+from smach_oracle.analysis.drawing import command
+from smach_oracle.analysis.drawing.hours_figure import draw_hours, learned_rates
+from smach_oracle.analysis.drawing.main_figure import draw_main
+from smach_oracle.analysis.drawing.sweep_figures import draw_memory, draw_persistence
+from smach_oracle.analysis.drawing.tables import format_tables
+from smach_oracle.analysis.figure import STYLE
+from smach_oracle.analysis.intervals import wilson_interval
+from smach_oracle.analysis.trial_rows import TrialRow, append_rows
+
+LEARNED = '{"": {"PICK": {"window": [0, 1, 0, 1]}, "PLACE": {"failures": 1, "successes": 3}}}'
+
+
+def rows_of(variant, asked, count=10, **more):
+    """So many trials, of which the first ones had a question."""
+    return [TrialRow(**{**dict(task='pick_and_place', variant=variant, replicate=0, seed=7 + number,
+                               ending='success', true_success=True, wrong_object='', damage=0,
+                               questions=int(number < asked), expert_s=0.0, sim_s=60.0), **more})
+            for number in range(count)]
+
+
+def errorbars(axes):
+    """What errorbar has drawn: by label, x and y of the points and their intervals."""
+    return {bars.get_label(): (bars.lines[0].get_xdata(), bars.lines[0].get_ydata(),
+                               [line.get_segments() for line in bars.lines[2]])
+            for bars in axes.containers}
+
+
+def test_the_main_figure_has_each_share_with_its_interval_and_hides_none():
+    rows = rows_of('bare', 4) + rows_of('default', 4)  # alike: the worst case for hiding
+    with rc_context(STYLE):
+        axes = draw_main(rows).axes[0]
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ['bare', 'default', 'hindsight']
+    points = [(float(bars.lines[0].get_xdata()[0]), float(bars.lines[0].get_ydata()[0]))
+              for bars in axes.containers]
+    heights = sorted(y for _, y in points)
+    assert len(points) == 12 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
+    x, _, (segments,) = errorbars(axes)['intervention']
+    assert x[0] == pytest.approx(40.0)
+    assert segments[0][:, 0] == pytest.approx([100 * end for end in wilson_interval(4, 10)])
+
+
+def test_persistence_is_drawn_over_the_share_with_variants_beside_each_other():
+    rows = [row for share in (0.0, 0.5, 1.0) for variant in ('bare', 'default')
+            for row in rows_of(variant, 3, lasting_share=share)]
+    with rc_context(STYLE):
+        needed, success = draw_persistence(rows).axes
+    drawn = errorbars(needed)
+    assert [list(drawn[name][1]) for name in ('bare', 'default')] == [[30.0] * 3] * 2
+    assert all(abs(one - other) > 2 for one, other in zip(drawn['bare'][0], drawn['default'][0]))
+    assert [tick.get_text() for tick in success.get_xticklabels()] == ['0', '50', '100']
+    assert list(errorbars(success)['bare'][1]) == [100.0] * 3
+
+
+def test_the_memory_figure_tells_how_often_the_expert_is_asked():
+    rows = rows_of('default_memory_2', 5) + rows_of('default_memory_20', 1)
+    with rc_context(STYLE):
+        asked = draw_memory(rows).axes[0]
+    x, y, _ = errorbars(asked)['default']
+    assert list(x) == [2.0, 20.0] and list(y) == [50.0, 10.0]
+
+
+def test_the_hours_have_events_counts_and_learned_rates():
+    rows = [row._replace(hour=0.5 * number, learned=LEARNED, causes='glare' if number == 3 else '')
+            for number, row in enumerate(rows_of('default', 2))]
+    with rc_context(STYLE):
+        events, needed, rates = draw_hours(rows).axes
+    assert len(events.patches) == 1  # the light of one trial
+    curve = next(line for line in needed.lines if line.get_label() == 'intervention')
+    assert curve.get_ydata()[-1] == 2 and curve.get_xdata()[-1] == 4.5
+    assert [line.get_label() for line in rates.lines] == ['PICK', 'PLACE']
+    assert learned_rates(rows[:1]) == {'PICK': [(0.0, 0.5)], 'PLACE': [(0.0, 0.25)]}
+
+
+def test_tables_tell_all_figures_of_a_variant_and_the_bound():
+    rows = rows_of('bare', 0) + rows_of('default', 2, attempts=1, expert_s=6.0)
+    text = format_tables(rows)
+    cells = [[cell.strip() for cell in line.strip('|').split('|')]
+             for line in text.splitlines() if line.startswith('|')]
+    told = dict(zip(cells[0], next(line for line in cells if line[0] == 'default')))
+    assert told['interventions'] == '20.0% (6% to 51%)'
+    assert (told['attempts a trial'], told['expert s a trial'], told['expert s an hour'],
+            told['trials between interventions'], told['completion, s']) == (
+                '1', '6', '360', '5', '60')
+    assert [line[0] for line in cells[2:]] == ['bare', 'default', 'hindsight']
+
+
+def test_shares_of_lasting_causes_are_never_compared_with_each_other():
+    rows = rows_of('bare', 5, lasting_share=0.0) + rows_of('default', 0, lasting_share=1.0)
+    text = format_comparison(rows)
+    assert '0% of the causes last' in text and '100% of the causes last' in text
+    assert 'McNemar' not in text and 'hindsight' not in text
+
+
+def test_a_world_that_goes_on_has_hours_between_its_trials():
+    rows = [row._replace(hour=0.5 * number) for number, row in enumerate(rows_of('default', 1, 3))]
+    assert robot_hours(rows) == pytest.approx(1.0 + 60 / 3600)
+    assert costs_of(rows).hours_between == pytest.approx(1.0 + 60 / 3600)
+    assert robot_hours(rows_of('default', 1, 3)) == pytest.approx(180 / 3600)
+
+
+def test_the_command_draws_what_there_is_and_the_same_rows_give_the_same_files(tmp_path):
+    for name, rows in (('pick_and_place_compared', rows_of('bare', 1)),
+                       ('pick_and_place_memory', rows_of('default_memory_5', 1)),
+                       ('pick_and_place_persistence_50', rows_of('bare', 1, lasting_share=0.5)),
+                       ('pick_and_place_continuous', rows_of('default', 1, hour=0.0))):
+        (tmp_path / name).mkdir()
+        append_rows(tmp_path / name / 'results.csv', rows)
+    for out in ('one', 'two'):
+        assert command.main([str(tmp_path), str(tmp_path / out)]) == 0
+    names = sorted(path.name for path in (tmp_path / 'one').iterdir())
+    assert names == sorted(['tables.md'] + [kind + end for kind in command.KINDS
+                                            for end in ('.svg', '.png')])
+    for name in names:
+        assert (tmp_path / 'one' / name).read_bytes() == (tmp_path / 'two' / name).read_bytes()
+
+
+def test_a_folder_without_rows_is_refused(tmp_path, capsys):
+    assert command.main([str(tmp_path), str(tmp_path / 'out')]) == 2
+    assert 'no results.csv' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
