@@ -18,6 +18,7 @@ from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
 from .checkpointer import Checkpointer
+from .damaged import understood
 from .resuming import Resumption, go_on
 from .storable import CODECS
 from .stored_tree import StoredTree, read_tree
@@ -51,7 +52,8 @@ class TrialStore:
     def to_resume(self) -> Optional[Resumption]:
         """Return the trial that goes on, None where a new one begins."""
         try:
-            return self._to_resume()
+            with understood(self._store.path):
+                return self._to_resume()
         except BaseException:
             self._let_go()
             raise
@@ -119,7 +121,7 @@ class TrialStore:
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            go_on(top, resumed)
+            self._go_on(resumed)
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
@@ -128,6 +130,14 @@ class TrialStore:
                                       resumed.moment if resumed and resumed.is_earlier else None)
         GOALS.observers.append(self._observer.goal_begins)
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
+
+    def _go_on(self, resumed: Resumption) -> None:
+        try:
+            with understood(self._store.path):
+                go_on(self._top, resumed)
+        except BaseException:
+            self._let_go()
+            raise
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
