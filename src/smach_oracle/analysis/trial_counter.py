@@ -7,7 +7,7 @@ from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import TrialEnd, ended_by
+from smach_oracle.oracle.records.facts import TrialEnd, ended_by, last_stored
 from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
 
 DEFAULT_FAILING = FailingNames()
@@ -144,8 +144,7 @@ class TrialCounter:
             self.trial_id, self.experiment = event.trial_id, _experiment(event)
             self.start_time = self._earliest_s = self._latest_s = event.wall_time
         if event.kind == EventKind.RESUMED:
-            stored = event.data.get('last_seq', -1) if isinstance(event.data, Mapping) else -1
-            self._left_out += max(0, event.seq - 1 - max(stored, self._last_seq))
+            self._left_out += max(0, event.seq - 1 - max(last_stored(event), self._last_seq))
         self._before_s = self._latest_s  # that of the events before this one
         self._count += 1
         self._last_seq = max(self._last_seq, event.seq)

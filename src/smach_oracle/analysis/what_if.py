@@ -27,6 +27,7 @@ from smach_oracle.oracle.decision.policy import (
     policy_named,
 )
 from smach_oracle.oracle.errors import OracleError
+from smach_oracle.oracle.records import facts
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by, is_counted
 from smach_oracle.oracle.records.history import History
@@ -286,8 +287,8 @@ def _that_count(trial: Sequence[Event]) -> List[Event]:
     """
     found: List[Event] = []
     for event in trial:
-        if event.kind == EventKind.RESUMED and isinstance(event.data, Mapping):
-            stored = event.data.get('last_seq', event.seq)
+        stored = facts.last_stored(event) if event.kind == EventKind.RESUMED else -1
+        if stored >= 0:
             found = [each for each in found if each.seq <= stored]
         found.append(event)
     return found

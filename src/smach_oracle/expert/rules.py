@@ -172,7 +172,7 @@ def _parse_rule(key: str, value: object) -> Rule:
         raise SettingsError('{}.{}'.format(key, unknown[0]), value,
                           'the keys {}'.format(', '.join(_FIELDS)))
     kind = value.get('kind')
-    if kind != IGNORE and kind not in KINDS:
+    if not isinstance(kind, str) or (kind != IGNORE and kind not in KINDS):
         raise SettingsError(key + '.kind', kind, ', '.join(sorted(KINDS)) + ' or ' + IGNORE)
     named_by = _NAMED_BY.get(kind)
     if named_by is not None and not value.get(named_by):

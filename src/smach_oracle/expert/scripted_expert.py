@@ -133,8 +133,9 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     try:
         with open(path_of(path), encoding='utf-8') as file:
             content = yaml.safe_load(file)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as err:
-        raise SettingsError('~rules_file', path, 'a YAML file of rules; {}'.format(err)) from err
+    except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
+        raise SettingsError('~rules_file', path, 'a YAML file of rules; {}: {}'.format(
+            type(err).__name__, err)) from err
     return Rules.parse(content)
 
 

@@ -54,7 +54,7 @@ def _jumps_to(event: Union[OracleEvent, Event]) -> str:
     try:
         data = json.loads(event.data) if isinstance(event.data, str) else event.data
         return clean(str(data['to']))
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return clean(event.target)
 
 

@@ -30,6 +30,7 @@ from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, Ora
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.settings.paths import path_of
 
+from .disk.limits import NO_LIMITS, Limits
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
 from .goal_tracking import track_goals_from_the_start
@@ -41,7 +42,7 @@ from .introspection.container_watch import CALLBACK_LISTS, is_watched
 from .introspection.introspection_server import IntrospectionServer
 from .main_thread import keep_log_from_master
 from .master_watch import start_master_watch
-from .parameters import private_flag, private_names, private_text
+from .parameters import private_flag, private_names, private_number, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
@@ -64,6 +65,7 @@ class _RecordingPlan(NamedTuple):
     folder: str
     topics: List[str]
     types: Dict[str, MessageClass]
+    keep: Limits = NO_LIMITS
 
 
 class Attachments:
@@ -227,12 +229,14 @@ class Attachments:
             types = {audit: ConsoleCommand, rospy.resolve_name(OUTPUT_TOPIC): InterfaceOutput}
             if private_names('failure_cameras'):
                 types[rospy.resolve_name(FRAMES_TOPIC)] = FailureFrames
-            return _RecordingPlan(folder, topics + list(types), types)
+            keep = Limits(private_number('keep_days'), private_number('keep_gb'))
+            return _RecordingPlan(folder, topics + list(types), types, keep)
         return _RecordingPlan(folder, topics, {})
 
     def _record(self, machine: OracleContainer, plan: Optional[_RecordingPlan]) -> None:
         if plan is not None:
-            self._recorder = TrialRecorder(plan.folder, plan.topics, types=plan.types)
+            self._recorder = TrialRecorder(plan.folder, plan.topics, types=plan.types,
+                                           keep=plan.keep)
         if self._recorder is not None:
             self._recorder.attach(oracle_of(machine).events,
                                   {'~oracle/rates': _snapshot_of_rates(machine)})

@@ -108,8 +108,8 @@ def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
     except RecursionError as err:
         raise SettingsError(str(path), 'something that contains itself',
                           'a tree of settings') from err
-    except ValueError as err:  # what a tag such as !!int promises and the value does not keep
-        raise SettingsError(str(path), str(err), 'YAML') from err
+    except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
+        raise SettingsError(str(path), '{}: {}'.format(type(err).__name__, err), 'YAML') from err
     if values is None:
         return {}, lines
     if not isinstance(values, dict):

@@ -1,4 +1,5 @@
 """A node's private parameters, checked: an error names the parameter and what is allowed."""
+import math
 from typing import Any, List, Mapping
 
 import rospy
@@ -92,6 +93,17 @@ def private_text(name: str) -> str:
     :raises SettingsError: where it is not.
     """
     return checks.text(_key_of(name), read_or_default('~' + name, ''))
+
+
+def private_number(name: str) -> float:
+    """A private parameter as `read_or_default` gives it, if it is a number from 0.
+
+    It is 0 where it is not set.
+
+    :raises SettingsError: where it is not.
+    """
+    return float(checks.number(0, math.inf, 'a number from 0')(
+        _key_of(name), read_or_default('~' + name, 0.0)))
 
 
 def private_names(name: str) -> List[str]:

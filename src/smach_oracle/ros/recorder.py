@@ -17,6 +17,8 @@ from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 from smach_oracle.oracle.settings.paths import path_of
 
 from .connections import quiet_at_shutdown
+from .disk.limits import NO_LIMITS, Limits
+from .disk.pruner import Pruner
 from .recording.recorder_queue import (
     EndItem,
     EventItem,
@@ -56,7 +58,7 @@ class TrialRecorder:
                  types: Optional[Mapping[str, MessageClass]] = None, warn: Optional[Log] = None,
                  say: Optional[Log] = None, on_status: Optional[StatusCallback] = None,
                  max_events: int = MAX_EVENTS, max_message_bytes: int = MAX_MESSAGE_BYTES,
-                 hung_after_s: float = HUNG_AFTER_S) -> None:
+                 hung_after_s: float = HUNG_AFTER_S, keep: Limits = NO_LIMITS) -> None:
         """Create the folder, mend the bags of recorders that died in it, and start.
 
         :param topics: names of other topics to record, each from when it is first published.
@@ -65,6 +67,8 @@ class TrialRecorder:
             `smach_oracle.recorder`.
         :param say: logs good news; default as for `warn`.
         :param on_status: called with each change of status, in the recorder's threads.
+        :param keep: bags of earlier trials over these limits are removed when a trial's bag is
+            closed, each after a line in the log; by default all stay.
         :raises OSError: where the folder cannot be made or written: better known before the robot
             moves.
         """
@@ -74,6 +78,7 @@ class TrialRecorder:
         self._on_status = on_status
         self._publisher = StatusPublisher() if has_node() else None
         self._reporter = Reporter(say or default_info, warn or default_warn, self._report)
+        self._pruner = Pruner(self.folder, keep, self._reporter.info, self._reporter.warn)
         self.losses = LossCounter()
         self._watch = DiskWatch(hung_after_s)
         self._queue = RecorderQueue(max_events, max_message_bytes)
@@ -173,6 +178,8 @@ class TrialRecorder:
             self._reporter.warn('Not recorded: {!r}: {!r}'.format(item, err))
 
     def _report(self, status: RecordingStatus) -> None:
+        if status.state is RecorderState.IDLE and not self._closed:
+            self._pruner.bag_closed()
         for publish in (self._on_status, self._publisher):
             if publish is not None:
                 try:

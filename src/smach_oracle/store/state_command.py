@@ -23,6 +23,10 @@ def main(arguments: Optional[List[str]] = None) -> int:
     except StoreError as err:
         sys.stderr.write('oracle_state: {}\n'.format(err))
         return WRONG
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as err:
+        # what is stored is not what this program has written
+        sys.stderr.write('oracle_state: {}: is damaged: {!r}\n'.format(given.path, err))
+        return WRONG
     return 0
 
 

@@ -4,6 +4,7 @@ Every moment of a trial stays, so that each can be resumed from. Where the trial
 earlier one, those between stay, too, and count for nothing that follows. A moment has the facts
 that changed with it. What is large is kept once, by its content.
 """
+import contextlib
 import os
 import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
@@ -311,6 +312,21 @@ class StoreFile:
         return [LogLine(*row) for row in self._read('SELECT at, who, what FROM log ORDER BY number',
                                                     ())]
 
+    def compact(self) -> None:
+        """Give what is free in the file back to the disk.
+
+        :raises StoreError: where that cannot be done, as another program reads.
+        """
+        try:
+            self._db.execute('VACUUM')
+            self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')
+        except sqlite3.Error as err:
+            raise _told(self.path, err) from err
+
+    def integrity(self) -> Iterator[Tuple[Any, ...]]:
+        """Yield what SQLite finds wrong, ('ok',) where that is nothing."""
+        return self._read('PRAGMA quick_check', ())
+
     def _read(self, query: str, given: Tuple[object, ...]) -> Iterator[Tuple[Any, ...]]:
         try:
             yield from self._db.execute(query, given)
@@ -325,6 +341,30 @@ def _try_to_write(database: sqlite3.Connection) -> None:
         database.execute('PRAGMA user_version = {}'.format(FORMAT))
     finally:
         database.execute('ROLLBACK')
+
+
+@contextlib.contextmanager
+def transaction(store: StoreFile, keep: bool = True) -> Iterator[sqlite3.Connection]:
+    """Have all that the body does to the database of a store, or nothing where it raises.
+
+    `keep`: False takes it back in any case.
+
+    :raises StoreError: where it cannot be done.
+    """
+    database = store._db
+    try:
+        with _Transaction(database):
+            yield database
+            if not keep:
+                raise _TakenBack
+    except _TakenBack:
+        pass
+    except sqlite3.Error as err:
+        raise _told(store.path, err) from err
+
+
+class _TakenBack(Exception):
+    """Never leaves this module."""
 
 
 class _Transaction:

@@ -138,7 +138,7 @@ class StoreWriter:
             if self._end is not None and not self._waiting:
                 self._store.end_trial(self._trial, *self._end)
             return ''
-        except (sqlite3.Error, StoreError, OSError) as err:
+        except (sqlite3.Error, StoreError, OSError, ValueError) as err:  # or a name is no UTF-8
             return str(err) or type(err).__name__
 
 

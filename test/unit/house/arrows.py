@@ -52,7 +52,7 @@ LAYERS: Dict[str, List[Layer]] = {
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
                                                  'hand', 'waiting'},
-        {'recording', 'interfaces', 'goal_link', 'loaded_settings', 'stored'},
+        {'recording', 'interfaces', 'goal_link', 'disk', 'loaded_settings', 'stored'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
@@ -69,7 +69,7 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
-        'state_command', 'stopped_trial', {'store_writer', 'holding'}, 'store_file',
+        'state_command', {'stopped_trial', 'retention'}, {'store_writer', 'holding'}, 'store_file',
         'renaming', 'rows', {'codecs', 'errors', 'names'}
     ],
     'pr2': [

@@ -87,7 +87,7 @@ class JsonValidator(Validator):
             return
         try:
             load_json(text)
-        except ValueError as err:
+        except (ValueError, RecursionError) as err:
             position = getattr(err, 'pos', len(text))
             raise ValidationError(position,
                                   'not JSON: {}; strings need "quotes"'.format(err)) from err

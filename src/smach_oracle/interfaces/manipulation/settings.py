@@ -191,7 +191,7 @@ def _state(state: str, value: object, arms: Mapping[str, ArmNames]) -> StateTele
     if unknown:
         raise SettingsError('{}/{}'.format(key, unknown[0]), found[unknown[0]],
                           'the keys arm, outputs')
-    if found.get('arm', next(iter(arms))) not in arms:
+    if found.get('arm', next(iter(arms))) not in list(arms):  # a list: it need not be hashable
         raise SettingsError(key + '/arm', found['arm'], ', '.join(sorted(arms)))
     outputs = checked_mapping(key + '/outputs', found.get('outputs', {}))
     for name, pose in outputs.items():

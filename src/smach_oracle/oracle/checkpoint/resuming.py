@@ -15,6 +15,7 @@ from ..machine.tree_node import TreeNode
 from ..places.place import Place, place_named, places_of
 from ..places.way import way_to
 from ..records.events import EventKind, FailureKind
+from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
 from ..records.state_record import StateRecord, Unfinished
 from .checkpointer import SEQ_RESERVE, must_stop
@@ -58,7 +59,7 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
         smach.logwarn('{}: goes on with {} as {}'.format(top.path, old, new))
     _end_goals(top, resumption)
     top.emit(EventKind.RESUMED, data={
-        'last_seq': resumption.seq, 'moment': resumption.moment,
+        LAST_SEQ: resumption.seq, 'moment': resumption.moment,
         'stopped_s': round(resumption.age_s, 3), 'changes': resumption.changes})
 
 

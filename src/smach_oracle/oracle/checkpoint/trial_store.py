@@ -22,6 +22,7 @@ from ..settings.on_resume import ASK, RESTART
 from .changed_script import changed_script
 from .checkpointer import Checkpointer
 from .container_facts import fact_of
+from .damaged import understood
 from .resuming import Resumption, go_on
 from .storable import CODECS
 from .stored_tree import StoredTree, read_tree
@@ -59,7 +60,8 @@ class TrialStore:
         :raises SettingsError: for a moment to go on from that is none of the trial.
         """
         try:
-            return self._to_resume()
+            with understood(self._store.path):
+                return self._to_resume()
         except (StoreError, sqlite3.Error) as err:
             self._let_go()
             raise _refused(err, self._top) from err
@@ -130,16 +132,13 @@ class TrialStore:
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
         """Store the trial from now on, and set the tree to where it was where it is resumed.
 
+        :raises CheckpointError: where what the store holds cannot be understood.
         :raises SettingsError: where it is to go on in a state that is not there.
         """
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            try:
-                go_on(top, resumed)
-            except BaseException:
-                self._let_go()
-                raise
+            self._go_on(resumed)
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
@@ -156,6 +155,17 @@ class TrialStore:
             return []
         return [fact_of('', STRUCTURE, self._structure.id),
                 fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
+
+    def _go_on(self, resumed: Resumption) -> None:
+        try:
+            with understood(self._store.path):
+                go_on(self._top, resumed)
+        except StoreError as err:
+            self._let_go()
+            raise _refused(err, self._top) from err
+        except BaseException:
+            self._let_go()
+            raise
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""

@@ -53,7 +53,8 @@ class UserdataFacts:
             yield from self._look(key, value, before)
         for key in [key for key in known if key not in data]:
             stored = known.pop(key).stored
-            yield Fact(self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + str(key), None)
+            yield Fact(self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + _told(key),
+                       None)
 
     def _look(self, key: str, value: object, before: Optional[_Known]) -> Iterator[Fact]:
         print_ = _print_of(value)
@@ -62,6 +63,8 @@ class UserdataFacts:
                 self._known[key] = before._replace(value=value)
             return
         try:
+            if _told(key) != str(key):
+                raise NotStorable('its name is no UTF-8')
             encoded = self._codecs.encode(value)
         except NotStorable as err:
             yield from self._keep_out(key, value, str(err), before)
@@ -82,8 +85,13 @@ class UserdataFacts:
             return
         if before is not None and not isinstance(before.stored, str):
             yield Fact(self._path, KEY + str(key), None)
-        yield Fact(self._path, KEPT_OUT + str(key), self._codecs.encode([kind, why]))
-        self._tell(KeptOut(str(key), kind, why))
+        yield Fact(self._path, KEPT_OUT + _told(key), self._codecs.encode([kind, why]))
+        self._tell(KeptOut(_told(key), kind, why))
+
+
+def _told(key: object) -> str:
+    """Return a key as a file can hold it: one made of a file's name may be no UTF-8."""
+    return str(key).encode('utf-8', 'backslashreplace').decode('utf-8')
 
 
 def _print_of(value: object) -> Optional[bytes]:

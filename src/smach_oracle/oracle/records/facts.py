@@ -6,12 +6,14 @@ are known here and nowhere else. Pure; no smach.
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Tuple
 
+from ..number_checks import is_whole
 from .events import NO_OUTCOME, Event
 
 DECIDED_BY = 'decided_by'  # key in the data of DECISION
 JUMPED_TO = 'to'  # key in the data of JUMP: path of the state, where it is in a container below
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
 BRANCHES = 'branches'  # key in the data of CONTAINER_START: states that have oracles of their own
+LAST_SEQ = 'last_seq'  # key in the data of RESUMED: number of the last event that was stored
 # key in the data of TRANSITION: true where it says nothing of how good the state is
 NOT_COUNTED = 'not_counted'
 # fields of such a TRANSITION: the author's own, from a failure while the robot was not well
@@ -82,6 +84,12 @@ def branches_of(event: Event) -> Tuple[str, ...]:
     """Return the states of a container that just began, where each has an oracle of its own."""
     stated = _stated(event, BRANCHES)
     return tuple(map(str, stated)) if isinstance(stated, (list, tuple)) else ()
+
+
+def last_stored(event: Event) -> int:
+    """Return the number of the last event that was stored before a RESUMED one, -1 for none."""
+    stated: Any = _stated(event, LAST_SEQ)
+    return int(stated) if is_whole(stated, -1) else -1
 
 
 def is_counted(event: Event) -> bool:

@@ -181,7 +181,7 @@ def kitchen_at(parameter: str) -> Kitchen:
         return Kitchen()
     try:
         return kitchen_from(_read(path_of(value)) if isinstance(value, str) else value)
-    except (OSError, ValueError, yaml.YAMLError) as err:
+    except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
         raise ValueError('{}: {}'.format(rospy.resolve_name(parameter), err)) from err
 
 

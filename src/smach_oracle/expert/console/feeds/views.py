@@ -13,6 +13,7 @@ from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_w
 from ...wording import event_words
 
 LONGEST_TEXT = 8000
+LATEST_S = 1e11  # s since the epoch: a later time is none
 _KINDS = {int(kind): kind for kind in EventKind}
 
 
@@ -26,16 +27,17 @@ def event_of(message: OracleEvent) -> Event:
         data = {NOT_COUNTED: True}
     elif kind in (EventKind.JUMP, EventKind.DECISION):
         data = told_in_words(_parsed(message.data))
-    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
-                 message.state, message.outcome, message.target, message.failure_kind,
-                 message.failure_class, message.rate, message.continuous, message.query_id,
-                 message.by, message.text, data)
+    time_s = message.wall_time if 0 <= message.wall_time <= LATEST_S else 0.0  # NaN is neither
+    return Event(kind, message.trial_id, message.seq, time_s, message.path, message.state,
+                 message.outcome, message.target, message.failure_kind, message.failure_class,
+                 message.rate, message.continuous, message.query_id, message.by, message.text,
+                 data)
 
 
 def _parsed(data: str) -> Any:
     try:
         return json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
 
 

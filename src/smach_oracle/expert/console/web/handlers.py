@@ -209,7 +209,7 @@ class SessionHandler(CheckedHandler):
     def _token(self) -> str:
         try:
             body = json.loads(self.request.body if len(self.request.body) <= LONGEST_BODY else b'')
-        except ValueError as err:
+        except (ValueError, RecursionError) as err:
             raise tornado.web.HTTPError(400) from err
         token = body.get('token') if isinstance(body, dict) else None
         if not isinstance(token, str):

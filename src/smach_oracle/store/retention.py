@@ -1,0 +1,125 @@
+"""Which trials of a store go, and how: those that have ended, the oldest first."""
+import re
+import sqlite3
+from typing import Iterable, List, NamedTuple, Set
+
+from .errors import StoreError
+from .holding import MachineLock
+from .rows import StoredTrial
+from .store_file import StoreFile, transaction
+
+_PART = re.compile(r'"\$part":"([0-9a-f]+)"')
+
+
+class Dropped(NamedTuple):
+    """A trial that goes, or stays although the limits are over it, and why."""
+
+    trial: StoredTrial
+    why: str
+
+
+class Retention:
+    """What is kept of one store; nothing is changed before `drop`."""
+
+    def __init__(self, store: StoreFile, days: float = 0.0, size: float = 0.0) -> None:
+        """`days`: since a trial ended; `size`: bytes of the store. 0: no limit."""
+        self._store, self._days, self._size = store, days, size
+        self.going: List[Dropped] = []
+        self.kept: List[Dropped] = []
+
+    def plan(self, now: float) -> None:
+        """Choose what goes; `now`: s since the epoch.
+
+        :raises StoreError: where the store cannot be read, or another program writes all the time.
+        """
+        trials = sorted(self._store.trials(), key=lambda trial: trial.ended or trial.begun)
+        with transaction(self._store, keep=False) as database:
+            for trial in trials:
+                why = self._why(database, trial, now)
+                if not why:
+                    continue
+                stays = self._why_kept(trial)
+                (self.kept if stays else self.going).append(Dropped(trial, stays or why))
+                if not stays and self._size:
+                    _take_out(database, [trial.number])
+
+    def _why(self, database: sqlite3.Connection, trial: StoredTrial, now: float) -> str:
+        age = (now - (trial.ended or trial.begun)) / 86400.0
+        if self._days and age > self._days:
+            return '{:.1f} days old'.format(age)
+        if self._size and size_of(database) > self._size:
+            return 'the oldest of {:.3f} GB'.format(size_of(database) / 1e9)
+        return ''
+
+    def _why_kept(self, trial: StoredTrial) -> str:
+        if trial.ended is None:
+            return 'it has not ended'
+        if MachineLock(self._store.path, trial.machine).is_held_elsewhere():
+            return 'a program holds machine ' + trial.machine
+        return ''
+
+    def drop(self) -> None:
+        """Take out what goes, and what nothing refers to any more; compact the file.
+
+        A machine that a program holds by now keeps its trials.
+
+        :raises StoreError: where the store cannot be written.
+        """
+        locks = []
+        try:
+            numbers = []
+            for machine in sorted({each.trial.machine for each in self.going}):
+                lock = MachineLock(self._store.path, machine)
+                lock.take()
+                locks.append(lock)
+                numbers += [each.trial.number for each in self.going
+                            if each.trial.machine == machine]
+            with transaction(self._store) as database:
+                _take_out(database, numbers)
+        finally:
+            for lock in locks:
+                lock.release()
+        self._store.compact()
+
+
+def size_of(database: sqlite3.Connection) -> int:
+    """Return the bytes of a store that are in use."""
+    pages, free, size = (database.execute('PRAGMA ' + name).fetchone()[0]
+                         for name in ('page_count', 'freelist_count', 'page_size'))
+    return int((pages - free) * size)
+
+
+def _take_out(database: sqlite3.Connection, trials: Iterable[int]) -> None:
+    for number in trials:  # each has ended: see `_why_kept`
+        database.execute('DELETE FROM facts WHERE moment IN '
+                         '(SELECT number FROM moments WHERE trial = ?)', (number,))
+        database.execute('DELETE FROM moments WHERE trial = ?', (number,))
+        database.execute('DELETE FROM trials WHERE number = ?', (number,))
+    database.execute('DELETE FROM structures WHERE id NOT IN (SELECT structure FROM trials)')
+    used = _used_parts(database)
+    for digest, in database.execute('SELECT digest FROM parts').fetchall():
+        if bytes(digest) not in used:
+            database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
+
+
+def _used_parts(database: sqlite3.Connection) -> Set[bytes]:
+    """Return the digests of the bytes that a fact refers to, by itself or within its value."""
+    used: Set[bytes] = set()
+    for text, in database.execute("SELECT text FROM facts WHERE text LIKE '%$part%'"):
+        used.update(map(bytes.fromhex, _PART.findall(text)))
+    wholes = database.execute('SELECT DISTINCT whole FROM facts WHERE whole IS NOT NULL').fetchall()
+    for digest, in wholes:
+        used.add(bytes(digest))
+        for data, in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):
+            used.update(map(bytes.fromhex, _PART.findall(bytes(data).decode('ascii', 'replace'))))
+    return used
+
+
+def check(store: StoreFile) -> None:
+    """Check a store that is to be pruned.
+
+    :raises StoreError: where SQLite finds it damaged: nothing is taken out of it then.
+    """
+    for found, in store.integrity():
+        if found != 'ok':
+            raise StoreError('{}: is damaged ({}); nothing is removed'.format(store.path, found))

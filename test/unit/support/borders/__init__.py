@@ -1,0 +1,1 @@
+"""What comes in over each border of the project, drawn by Hypothesis, and what takes it."""
