@@ -190,7 +190,7 @@ class OperatorHand:
     def set_breakpoint(self, pattern: str, by: str = '') -> str:
         """Pause the tree before each state that is meant.
 
-        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :param pattern: LABEL or PATH/LABEL, with `*` and `**`.
         :raises OperatorError: where it cannot be read.
         """
         meant = _pattern(pattern)
@@ -213,7 +213,7 @@ class OperatorHand:
     def set_autonomy(self, pattern: str, level: str, by: str = '') -> str:
         """Set the autonomy of states; the latest that is set for a state counts.
 
-        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :param pattern: LABEL or PATH/LABEL, with `*` and `**`.
         :param level: 'run', 'announce' or 'confirm'; '': as the settings say.
         :raises OperatorError: for another level, or a pattern that cannot be read.
         """
@@ -276,9 +276,9 @@ class OperatorHand:
         return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
 
     def _what_runs(self) -> List[str]:
-        """Return the states that run, in words, but for those within which others are active.
+        """Return the states that run, in words, except those within which others are active.
 
-        A Concurrence or an Iterator is such a one, too, and the oracle's own is none.
+        A Concurrence or an Iterator is such a state too, the oracle's own is not.
         """
         active = self._active()
         around = [each.path + '/' for each in active]

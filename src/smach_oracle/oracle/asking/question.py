@@ -65,7 +65,7 @@ class PreconditionProbe:
     def status(self, number: int) -> PreconditionStatus:
         """Return how the precondition of that number stands.
 
-        It may call a user's function, and so take for ever.
+        It may call a user's function, and so take forever.
         """
         raise NotImplementedError
 

@@ -90,7 +90,7 @@ class HealthWatch:
     def _listen_to(self, conditions: Tuple[HealthCondition, ...]) -> Optional[HealthPort]:
         heard = [each for each in conditions if each.kind is not HealthKind.FUNCTION]
         if heard and self.listen is None:
-            smach.logwarn('healthy: nobody listens to {} here, as this process is no ROS node; '
+            smach.logwarn('healthy: nobody listens to {} here, as this process is not a ROS node; '
                           'it counts as well'.format(', '.join(sources_of(conditions))))
         return self.listen(heard) if heard and self.listen is not None else None
 
