@@ -17,11 +17,10 @@ MOST_WORDS = 35
 STYLE = 'doc/style.md'
 # pages and folders that are still to be mended; the list only ever gets shorter
 NOT_YET: Tuple[str, ...] = (
-    'doc/architecture.md', 'doc/console.md', 'doc/console_inside.md', 'doc/console_security.md',
-    'doc/control.md', 'doc/executive.md', 'doc/perception.md', 'doc/policies.md',
-    'doc/recording.md', 'doc/results.md', 'doc/second_robot.md', 'doc/shared_autonomy.md',
-    'doc/simulation.md', 'doc/simulation_inside.md', 'doc/smach_engine.md', 'doc/smach_ros.md',
-    'doc/statistics.md', 'doc/survive.md', 'doc/testing.md', 'doc/trees.md',
+    'doc/console.md', 'doc/console_inside.md', 'doc/console_security.md', 'doc/perception.md',
+    'doc/policies.md', 'doc/recording.md', 'doc/results.md', 'doc/second_robot.md',
+    'doc/shared_autonomy.md', 'doc/simulation.md', 'doc/simulation_inside.md', 'doc/statistics.md',
+    'doc/survive.md', 'doc/testing.md', 'doc/trees.md',
     'doc/troubleshooting.md', 'doc/use_cases.md', 'src/smach_oracle/analysis/',
     'src/smach_oracle/expert/console/', 'src/smach_oracle/experiment/',
     'src/smach_oracle/geometry/', 'src/smach_oracle/inspection_robot/', 'src/smach_oracle/pr2/',
