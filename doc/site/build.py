@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Iterator, List, Tuple
 
+import theme
 from interfaces import interface_pages
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -128,6 +129,7 @@ def main() -> int:
          '--keep-going', '-d', str(target.with_name(target.name + '_state')), '-c',
          str(Path(__file__).parent), str(source), str(target)], check=False).returncode
     if not status and not quick:
+        theme.complete(target / '_static')
         print('The site: {}'.format(target / 'index.html'))
     return status
 

@@ -67,7 +67,7 @@ def interface_pages(root: Path) -> List[Tuple[str, str]]:
     """(name, Markdown) of the three pages."""
     pages = []
     for title, folder, sides in KINDS:
-        lines = ['# {}'.format(title), '', 'From the comments in `{0}/`; `ros{0} show -r` prints '
+        lines = ['# {}'.format(title), '', 'From the comments in `{0}/`. `ros{0} show -r` prints '
                  'them too.'.format(folder) if folder != 'action' else
                  'From the comments in `action/`.', '']
         for path in sorted((root / folder).glob('*.' + folder)):

@@ -16,8 +16,8 @@ import rostest
 
 PAGE = os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'tutorial.md')
 LIMIT_S = 60.0
-# the test runs in an environment that has been set up, and on the master of rostest
-DONE_BEFORE = {'scripts/setup', 'source scripts/ros_env', 'roscore'}
+# the test runs in an environment that has been set up, in a folder and on a master of its own
+DONE_BEFORE = {'scripts/setup', 'source scripts/ros_env', 'roscore', 'mkdir ~/fetch', 'cd ~/fetch'}
 # a file with its name in the line above, or what is typed and shown, with what the test does there
 BLOCK = re.compile(r'(?:`(\S+)`:\n\n|<!-- test: (.*?) -->\n\n)?^```(\w+)\n(.*?)^```$', re.M | re.S)
 CONTROL = re.compile(r'\x1b\[[0-9;?]*[A-Za-z]|[\r╭╮╰╯│─█░]')
