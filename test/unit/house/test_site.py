@@ -47,15 +47,15 @@ def test_every_page_is_in_the_table_of_contents():
 def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
     for name, text in (('styles/furo.css', '@import url(/javascript/normalize.css/normalize.css);\n'
                         'p {margin: 1px}'), ('normalize.css', 'body {margin: 0}\n'),
-                       ('scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
-                       ('scripts/furo.js', 'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
+                       ('./scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
+                       ('./scripts/furo.js', 'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(theme, 'NORMALIZE', tmp_path / 'normalize.css')
     for _ in range(2):  # a second build finds them complete
         theme.complete(tmp_path)
         assert (tmp_path / 'styles/furo.css').read_text() == 'body {margin: 0}\np {margin: 1px}'
-        assert (tmp_path / 'scripts/furo.js').read_text() == 'window.Gumshoe = 1;\nmain()'
+        assert (tmp_path / './scripts/furo.js').read_text() == 'window.Gumshoe = 1;\nmain()'
 
 
 def test_a_link_into_the_repository_leads_to_a_copy(tmp_path):
