@@ -48,7 +48,8 @@ def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
     for name, text in (('styles/furo.css', '@import url(/javascript/normalize.css/normalize.css);\n'
                         'p {margin: 1px}'), ('normalize.css', 'body {margin: 0}\n'),
                        ('./scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
-                       ('./scripts/furo.js', 'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
+                       ('./scripts/furo.js',
+                        'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(theme, 'NORMALIZE', tmp_path / 'normalize.css')

@@ -143,7 +143,7 @@ class FailureRate:
 class ExponentialFailureRate:
     """Exponentially weighted mean of the results, beginning with the prior.
 
-    Each result replaces a share 1/memory of what was believed.
+    Each result replaces a share 1/memory of the estimate.
 
     It agrees with `FailureRate` on the first result and forgets gradually instead of all at once.
     """
