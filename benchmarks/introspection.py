@@ -218,7 +218,7 @@ def make_server(kind: str, tree: Any) -> Any:
 
 
 def be_viewer(options: argparse.Namespace) -> int:
-    """Count the containers that tell of themselves within the measured time."""
+    """Count the containers that publish within the measured time."""
     import rospy
 
     from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure

@@ -116,7 +116,7 @@ def measure(transitions: int, folder: str) -> int:
     whole = recorded_numbers(folder + '/bags') == list(range(count.events)) and closed
     print('{} transitions, {} events, {:.1f} MB of bag'.format(transitions, count.events,
                                                                bag_mb(folder + '/bags')))
-    for name, seconds in (('no observer', bare_s), ('an observer that counts', counted_s),
+    for name, seconds in (('no observer', bare_s), ('a counting observer', counted_s),
                           ('recorded', recorded_s)):
         print('{:<24} {:8.2f} us per transition {:10.0f} events/s {:7.1f} x'.format(
             name, seconds / transitions * 1e6, count.events / seconds, seconds / bare_s))

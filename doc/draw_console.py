@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Take the pictures of the operator console anew: a real console, real machines under a real
+"""Take the pictures of the operator console again: a real console, real machines under a real
 oracle, the simulated PR2, a headless Chromium.
 
     python3 doc/draw_console.py [--to FOLDER] [--of kitchen|pr2]

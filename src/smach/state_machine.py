@@ -20,7 +20,7 @@ class StateMachine(Container):
     the first one added is where it begins unless :meth:`set_initial_state` says otherwise.
     """
 
-    # Made anew rather than copied or pickled.
+    # Made again rather than copied or pickled.
     _UNPICKLED = ('_state_transitioning_lock', '_visits')
 
     _is_preempt_passed_on = False  # whether a state was asked since the latest request

@@ -222,7 +222,7 @@ class SimpleActionState(smach.State):
             say("Giving up the goal of action '%s': %s" % (self._action_name, problem))
             run.abandon()
         if self._goal_status is None:
-            # A subclass took over _goal_done_cb, or there was no end to tell of.
+            # A subclass took over _goal_done_cb, or there was no end to report.
             self._goal_status, self._goal_result = run.status, run.result
 
     def _follow(self, run: GoalRun, deadline: Optional[float],

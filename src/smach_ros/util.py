@@ -16,7 +16,7 @@ STOP_WITHIN_S = 10.0
 
 def _executes_beneath_us(container: Any) -> bool:
     """Whether this very thread is inside ``container.execute``: waiting for its end here would wait
-    for ever.
+    forever.
     """
     frame: Optional[FrameType] = inspect.currentframe()
     while frame is not None:

@@ -77,7 +77,7 @@ class Aside(threading.Thread):
     hear a preempt.
 
     It also keeps talk with the master out of the main thread: rospy's own handling of Ctrl-C, which
-    runs there, waits for the lock of an interrupted call for ever. The event ``stopped`` is set by
+    runs there, waits for the lock of an interrupted call forever. The event ``stopped`` is set by
     ``stop()``; ``ended`` is true once ``value`` or ``error`` is set.
     """
 

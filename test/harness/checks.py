@@ -53,12 +53,14 @@ def _command(name: str, command: List[str], bench: Bench, timeout_s: float = 300
 
 
 def lint_checks(root: Path) -> Dict[str, Check]:
-    """Linters, types and of the page's scripts, Python 3.8, catkin_lint, and every launch file."""
+    """Linters, types and of the page's scripts, pages, Python 3.8, catkin_lint, launches."""
     checks = {
         'ruff': ['ruff', 'check', '--no-cache', '--output-format', 'concise', '.'],
         'mypy': [sys.executable, '-m', 'mypy', '--cache-dir', os.devnull],
         'python 3.8': [sys.executable, '-c', VERMIN, '--target=3.8-', '--no-tips', '--violations'] +
         PYTHON_SOURCES,
+        'pages and links': [sys.executable, 'doc/site/build.py', '--check'],
+        'words': [sys.executable, 'test/unit/house/plain_words.py'],
         'javascript types': ['tsc', '-p', 'jsconfig.json'],
         'catkin_lint': ['catkin_lint', '--offline', '--strict', '-W2',
                         str(root)],

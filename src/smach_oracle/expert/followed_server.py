@@ -85,7 +85,7 @@ class FollowedServer:
         if self.connected:
             return list(known)
         if self._questions is known:
-            self._questions = []  # of whoever comes next under this name they are none
+            self._questions = []  # the next server of this name has others
         return []
 
     def claim(self, query_id: str, expert: str, action: int = ClaimQueryRequest.CLAIM,
@@ -107,7 +107,7 @@ class FollowedServer:
                           CALL_LIMIT_S)
 
     def refresh(self, advertised: bool, patience_s: float = 3.0) -> None:
-        """Subscribe anew where the master knows the list and we do not hear it.
+        """Subscribe again where the master knows the list and we do not hear it.
 
         We were registered with an earlier master, or its address has changed.
         """

@@ -41,7 +41,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
         OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(
             outcome, clean(goal.container_path)),
         OracleEvent.EXCEPTION: 'raised an exception',
-        OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is no outcome of it'.format(
+        OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is not one of its outcomes'.format(
             outcome or 'nothing'),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
         ExpertQueryGoal.HELD_BACK: 'was not executed',

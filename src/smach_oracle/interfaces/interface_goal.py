@@ -65,7 +65,7 @@ class InterfaceGoal:
         self._asker_seen_s = 0.0
         self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal,
                                               self._on_cancel, auto_start=False)
-        # its callbacks come under it; another one beside it would invite a deadlock
+        # its callbacks come under it; a second lock would invite a deadlock
         self._lock = self._action.lock
         self._action.start()
 

@@ -42,8 +42,8 @@ class _Shown:
 class OracleContainer(smach.StateMachine):
     """A `smach.StateMachine` with an ORACLE state.
 
-    It is built like any state machine, or made of one with `wrap`. All that it keeps beside the
-    machine is behind one attribute, `_oracle`, so that it meets no name of a subclass.
+    It is built like any state machine, or made of one with `wrap`. All its own data
+    is in one attribute, `_oracle`, so that it hides no name of a subclass.
     """
 
     _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none; never written
@@ -74,7 +74,7 @@ class OracleContainer(smach.StateMachine):
              health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put `machine` under an oracle and return it.
 
-        It stays the same object; its class is made of this one and its own.
+        It stays the same object, with a class made of this class and its own.
 
         With `nested` (default: the setting of this name) every StateMachine inside it, at any
         depth, is wrapped too, or those at the paths of a list.
@@ -105,8 +105,8 @@ class OracleContainer(smach.StateMachine):
 
         Settings of the container for the same state win.
 
-        :raises SettingsError: for a setting that is not allowed. What `StateMachine.add` raises
-            beside stays.
+        :raises SettingsError: for a setting that is not allowed. `StateMachine.add` may raise other
+            errors.
         """
         own = {'preconditions': preconditions, 'prior': prior, 'time_limit_s': time_limit_s,
                'on_retry': on_retry, 'autonomy': autonomy}
@@ -135,7 +135,7 @@ class OracleContainer(smach.StateMachine):
 
     @property
     def expert(self) -> Optional[Expert]:
-        """Who is asked, by any container of the tree."""
+        """The expert whom every container of the tree asks."""
         return oracle_of(self).expert
 
     @expert.setter
@@ -143,15 +143,15 @@ class OracleContainer(smach.StateMachine):
         oracle_of(self).expert = expert
 
     def new_trial_id(self) -> str:
-        """Return the id of the trial about to begin; override it where ids come from elsewhere."""
+        """Return the id of the trial about to begin. Override it to give your own ids."""
         return new_id()
 
     def rates(self) -> List[StateRateRow]:
-        """Return what was learned of every state, of this container and all below it."""
+        """Return the learned rate of every state, of this container and all below it."""
         return oracle_of(self).rates()
 
     def transition_counts(self) -> List[TransitionRow]:
-        """Return how often each edge was taken, of this container and all below it."""
+        """Return how often each transition was taken, in this container and all below it."""
         return oracle_of(self).transition_counts()
 
     def save_rates(self, path: str) -> None:
@@ -253,7 +253,7 @@ class OracleContainer(smach.StateMachine):
     # -- execution
 
     def execute(self, *args: Any, **kwargs: Any) -> Optional[str]:
-        """Run the machine; the outermost running one of a tree begins and ends a trial.
+        """Run the machine. The outermost running machine of a tree begins and ends a trial.
 
         It raises what a StateMachine raises.
         """

@@ -16,10 +16,11 @@ class OracleError(Exception):
 
 
 class SettingsError(OracleError, ValueError):
-    """A setting is wrong; the text names the key, the value and what is allowed."""
+    """A setting is wrong. The text names the key, the value and what is allowed, or is `text`."""
 
-    def __init__(self, key: str, value: object, allowed: str) -> None:
-        super().__init__('{}: {!r} is not allowed; allowed: {}'.format(key, value, allowed))
+    def __init__(self, key: str, value: object, allowed: str, text: str = '') -> None:
+        super().__init__(
+            text or '{}: {!r} is not allowed; allowed: {}'.format(key, value, allowed))
         self.key = key
         self.value = value
         self.allowed = allowed

@@ -45,14 +45,14 @@ class HandStatus(NamedTuple):
 class OperatorHand:
     """A person's commands for one tree of machines. Safe to use from several threads.
 
-    Each command returns what comes of it, as a sentence, and tells it to the observers. `by` is the
-    name of who commands.
+    Each command returns its effect as a sentence, and publishes it as an event. `by` is the name
+    of the operator.
     """
 
     def __init__(self, machine: object) -> None:
         """Be the hand on the tree to which a wrapped machine belongs.
 
-        :raises TrialError: for what is not under an oracle.
+        :raises TrialError: for a machine that is not under an oracle.
         """
         node = getattr(machine, '_oracle', None)
         if not isinstance(node, TreeNode):
@@ -165,7 +165,7 @@ class OperatorHand:
     def send(self, state: str, by: str, written: Sequence[str] = ()) -> bool:
         """Send this machine to a state for somebody who hears no answer, such as a viewer.
 
-        What is refused is told as a warning. `state`, `by` and `written` are those of `go_to`.
+        A refusal is logged as a warning. `state`, `by` and `written` are those of `go_to`.
         """
         node = self._node
         try:
@@ -190,7 +190,7 @@ class OperatorHand:
     def set_breakpoint(self, pattern: str, by: str = '') -> str:
         """Pause the tree before each state that is meant.
 
-        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :param pattern: LABEL or PATH/LABEL, with `*` and `**`.
         :raises OperatorError: where it cannot be read.
         """
         meant = _pattern(pattern)
@@ -199,7 +199,7 @@ class OperatorHand:
             self._top.path, self._states_meant(meant)), by, meant.text)
 
     def remove_breakpoint(self, pattern: str, by: str = '') -> str:
-        """Take a breakpoint away; a pause by it stays.
+        """Remove a breakpoint. A pause that it caused stays.
 
         :raises OperatorError: where there is none of this pattern.
         """
@@ -211,9 +211,9 @@ class OperatorHand:
                           meant.text)
 
     def set_autonomy(self, pattern: str, level: str, by: str = '') -> str:
-        """Set the autonomy of states; the latest that is set for a state counts.
+        """Set the autonomy of states. The latest setting for a state applies.
 
-        :param pattern: LABEL or PATH/LABEL, with * and **.
+        :param pattern: LABEL or PATH/LABEL, with `*` and `**`.
         :param level: 'run', 'announce' or 'confirm'; '': as the settings say.
         :raises OperatorError: for another level, or a pattern that cannot be read.
         """
@@ -276,9 +276,9 @@ class OperatorHand:
         return '{} is paused; {}'.format(top.path, '; '.join(told) or 'it waits at the next state')
 
     def _what_runs(self) -> List[str]:
-        """Return the states that run, in words, but for those within which others are active.
+        """Return the states that run, in words, except those within which others are active.
 
-        A Concurrence or an Iterator is such a one, too, and the oracle's own is none.
+        A Concurrence or an Iterator is such a state too, the oracle's own is not.
         """
         active = self._active()
         around = [each.path + '/' for each in active]

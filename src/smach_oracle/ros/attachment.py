@@ -87,7 +87,7 @@ class Attachments:
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
         self._hand: Optional[HandServer] = None
-        # bound once: a machine listens anew where it is given another one
+        # bound once: a machine listens again where it is given another one
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
@@ -131,7 +131,7 @@ class Attachments:
     def detach(self, machine: OracleContainer) -> None:
         """Let go of a top-level machine that has ended and is about to come out of its oracle.
 
-        Where it is wrapped again, its first execute attaches it anew.
+        Where it is wrapped again, its first execute attaches it again.
         """
         with self._lock:
             self._on_ros.discard(machine)

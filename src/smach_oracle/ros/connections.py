@@ -54,7 +54,7 @@ class ConnectionGrace:
     """
 
     def __init__(self) -> None:
-        # sockets: a connection that is made anew stays the same object
+        # sockets: a connection that is made again stays the same object
         self._known: Tuple[socket.socket, ...] = ()
 
     def wait(self, connections: Sequence[Connection]) -> None:

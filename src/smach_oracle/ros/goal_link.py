@@ -34,7 +34,7 @@ class SentGoal:
     """One goal on its way; `poll` waits for its next event."""
 
     def __init__(self, sent_s: float) -> None:
-        # not a SimpleQueue: its timed get waits for ever where a signal handler takes longer than
+        # not a SimpleQueue: its timed get waits forever where a signal handler takes longer than
         # the timeout
         self._events: 'queue.Queue[GoalEvent]' = queue.Queue()
         self._sent_s = sent_s

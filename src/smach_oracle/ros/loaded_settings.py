@@ -93,6 +93,9 @@ def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
     """
     try:
         text = Path(path).read_text(encoding='utf-8')
+    except FileNotFoundError as err:
+        raise SettingsError('settings file', str(path), 'a readable YAML file',
+                            'settings file: no such file: {}'.format(path)) from err
     except (OSError, UnicodeDecodeError) as err:
         raise SettingsError('settings file', str(path),
                           'a readable YAML file ({})'.format(err)) from err

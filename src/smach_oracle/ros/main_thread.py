@@ -49,7 +49,7 @@ def keep_log_from_master() -> None:
     """Let rospy remember that the parameter of its log is not set.
 
     It forgets, and asks the master again at each line of the log, in whichever thread. A value that
-    is set later arrives all the same: rospy has subscribed to the parameter.
+    is set later arrives anyway: rospy has subscribed to the parameter.
     """
     if rospy.get_param_cached(_ROSOUT_PARAM, None) is None:
         get_param_server_cache().set(_ROSOUT_PARAM, False)

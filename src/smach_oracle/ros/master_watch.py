@@ -20,7 +20,7 @@ from rospy.impl.registration import (
 )
 
 POLL_S = 1.0
-CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch for ever
+CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch forever
 
 
 class MasterCallError(Exception):

@@ -46,7 +46,7 @@ class ShutdownGuard:
 
         SIGTERM, which would end the process on the spot, becomes SystemExit in the main thread. A
         handler that is installed later (rospy.init_node's among them) overrides that; the guard
-        hears the signal all the same.
+        hears the signal anyway.
         """
         receiver, self._wake_sender = socket.socketpair()
         self._wake_sender.setblocking(False)
@@ -83,7 +83,7 @@ class ShutdownGuard:
 
 
 def exit_on_sigterm(number: int, frame: Optional[FrameType]) -> None:
-    """SIGTERM's handler in a process that is no ROS node: unwind the main thread.
+    """SIGTERM's handler in a process that is not a ROS node: unwind the main thread.
 
     rospy's handler calls the one before it; then it is rospy that ends the process, and this one
     keeps quiet.

@@ -7,8 +7,8 @@ from typing import Any, NoReturn
 def load_json(text: str) -> Any:
     """The value of a JSON text.
 
-    :raises ValueError: where it is no JSON, or holds a number that is none (NaN, Infinity) or is
-        too large for a float (1e999).
+    :raises ValueError: where it is not JSON, or holds NaN, Infinity or a
+        number that is too large for a float (1e999).
     :raises RecursionError: where it is nested too deep.
     """
     return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)

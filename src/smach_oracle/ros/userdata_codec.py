@@ -95,7 +95,7 @@ def check(item: UserdataItem) -> None:
     _check_type_name(item)
     if not _MD5SUM.match(item.md5sum):
         raise UserdataCodecError(
-            'userdata {!r}: md5sum {!r} of {} is none; `rosmsg md5 {}` tells it'.format(
+            'userdata {!r}: md5sum {!r} of {} is wrong. `rosmsg md5 {}` prints it'.format(
                 item.key, item.md5sum, item.type, item.type))
     if getattr(roslib.message.get_message_class(item.type), '_md5sum', '') == item.md5sum:
         decode(item)

@@ -288,7 +288,8 @@ def test_down_time_is_in_the_table_and_in_the_csv():
     text = io.StringIO()
     write_csv(text, [trial])
     header, row = text.getvalue().splitlines()
-    assert header.endswith('unwell_s,resumed,down_s') and row.endswith(',1,7.5')
+    assert header.endswith('unwell_s,resumed,down_s,wrong_object,damage')
+    assert row.endswith(',1,7.5,,')
     told = format_text(count_variants([trial, trial]))
     assert '2 trials were resumed after their program was stopped; it was down for 15 s' in told
 

@@ -22,11 +22,10 @@ from smach_oracle.expert.terminal.prompts import JsonValidator
 from smach_oracle.expert.wording import next_step_words
 from smach_oracle.interfaces.manipulation.settings import _state
 from smach_oracle.msg import OracleEvent
-from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.errors import CheckpointError, SettingsError
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.ros.loaded_settings import read_yaml
 from smach_oracle.store import state_command
-from smach_oracle.store.errors import StoreDamaged
 from smach_oracle.store.store_file import StoreFile
 
 DEEP = '[' * 4000
@@ -99,14 +98,14 @@ def test_a_store_that_makes_no_sense_is_refused_by_its_name(store, monkeypatch, 
     monkeypatch.setattr('sys.stderr', said)
     assert state_command.main([path, 'show']) == 2
     assert said.getvalue().startswith('oracle_state: ' + path + ': ')
-    with pytest.raises(StoreDamaged, match='robot.db: .*'):
+    with pytest.raises(CheckpointError, match='robot.db: .*'):
         machine(checkpoint=path, on_resume='recover').execute()
 
 
 def test_what_a_store_says_of_a_state_must_make_sense(store):
     path, change = store
     change('state:A', '[]')
-    with pytest.raises(StoreDamaged, match='robot.db: is damaged'):
+    with pytest.raises(CheckpointError, match='robot.db: is damaged'):
         machine(checkpoint=path, on_resume='recover').execute()
 
 
@@ -114,7 +113,7 @@ def test_a_store_that_was_refused_is_let_go_of(store):
     path, change = store
     change('at', '7')
     for _ in range(2):
-        with pytest.raises(StoreDamaged):
+        with pytest.raises(CheckpointError):
             machine(checkpoint=path, on_resume='recover').execute()
 
 

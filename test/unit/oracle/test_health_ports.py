@@ -74,8 +74,8 @@ def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
     assert machine.run() == 'done'
     assert len(machine.of(EventKind.FAILURE)) == 1
     said = [text for level, text in log if level == 'warn' and text.startswith('healthy')]
-    assert said == ['healthy: nobody listens to topic /motors_on here, as this process is no ROS '
-                    'node; it counts as well']
+    assert said == ['healthy: this process is not a ROS node, so topic /motors_on is not listened '
+                    'to, and its condition holds']
 
 
 def test_a_port_for_topics_is_made_once(health):

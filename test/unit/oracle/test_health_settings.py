@@ -76,7 +76,7 @@ def test_a_function_of_a_module_is_found_by_its_name():
     ({'diagnostics': 'a', 'worst': 'error'}, 'healthy.worst', 'ok, warn'),
     ({'diagnostics': 'a', 'field': 'x'}, 'healthy.field', 'diagnostics, worst, name, max_age_s'),
     ({'function': 'my_robot.health'}, 'healthy.function', 'python:module:attribute'),
-    ({'function': 'python:a:b'}, 'healthy.function', 'nobody told how to import names'),
+    ({'function': 'python:a:b'}, 'healthy.function', 'names cannot be imported here'),
     ({'function': 7}, 'healthy.function', 'a function without arguments'),
     ({'function': is_well, 'max_age_s': 1}, 'healthy.max_age_s', 'function, name'),
     ({'function': is_well, 'name': ''}, 'healthy.name', 'a string that is not empty'),

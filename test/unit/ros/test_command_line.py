@@ -52,10 +52,10 @@ def test_options_become_settings_and_options_of_the_process(script, tmp_path):
     (['--conf', 'x.yaml', 'task.py'], 'unrecognized arguments: --conf'),
     (['--record'], 'expected one argument'),
     (['no_such.py'], 'no_such.py: no such file'),
-    (['--no-nested'], 'which SCRIPT'),
-    (['__name:=x'], 'which SCRIPT'),
+    (['--no-nested'], 'no script is given'),
+    (['__name:=x'], 'no script is given'),
     (['--config', 'o.yaml', 'none', '--speed', '2'
-      ], 'which SCRIPT? (under roslaunch: script:=FILE)'),
+      ], 'with script:=FILE under roslaunch'),
 ])
 def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
     with pytest.raises(SystemExit) as caught:

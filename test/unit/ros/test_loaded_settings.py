@@ -61,7 +61,7 @@ def test_an_empty_file_sets_nothing(write):
 
 
 def test_a_missing_file_is_named():
-    with pytest.raises(SettingsError, match='no_such_file.yaml.*readable YAML file'):
+    with pytest.raises(SettingsError, match='^settings file: no such file: no_such_file.yaml$'):
         read_yaml('no_such_file.yaml')
 
 

@@ -37,7 +37,7 @@ def test_the_launch_file_without_a_script_asks_which(capsys):
     for given in ((), ('args:=5 --speed 2',)):
         with pytest.raises(SystemExit) as caught:
             parse(arguments_of(*given))
-        assert caught.value.code == 2 and 'which SCRIPT?' in capsys.readouterr().err
+        assert caught.value.code == 2 and 'no script is given' in capsys.readouterr().err
 
 
 def test_the_launch_file_runs_the_script_that_it_is_given(tmp_path):

@@ -86,7 +86,7 @@ class Terminal:
                     continue
                 picked = self._pick_from(waiting)
             except PromptInterrupted:
-                continue  # the list has changed: show it anew
+                continue  # the list has changed: show it again
             if picked is not None:
                 return picked
 

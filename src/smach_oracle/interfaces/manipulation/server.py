@@ -187,7 +187,7 @@ class TeleoperationServer:
     def _let_go(self, arrived: ArrivedCommand) -> None:
         """The operator lets go, or is refused."""
         operator = arrived.command.operator
-        if not operator and not arrived.command.dead_man:  # somebody stops whoever drives
+        if not operator and not arrived.command.dead_man:  # somebody stops the driver
             self._dead_man.drop(arrived.at_s)
             self._stop_moving()
             return

@@ -65,13 +65,13 @@ class PreconditionProbe:
     def status(self, number: int) -> PreconditionStatus:
         """Return how the precondition of that number stands.
 
-        It may call a user's function, and so take for ever.
+        It may call a user's function, and so take forever.
         """
         raise NotImplementedError
 
 
 class Question(NamedTuple):
-    """Everything an expert is told.
+    """Everything that an expert is shown.
 
     The fields are those of the ExpertQuery goal, where `question_id` is called `query_id`.
     """
@@ -127,9 +127,9 @@ class Answer(NamedTuple):
     container: str = ''
 
     def named(self) -> str:
-        """Return what it names: a state, an interface or an outcome.
+        """Return the state, interface or outcome that it names.
 
-        What is in another container than the failed state has its path in front.
+        A name in another container than the failed state's has its path in front.
         """
         name = {AnswerKind.GOTO: self.state,
                 AnswerKind.INTERFACE: self.interface}.get(self.kind, self.outcome)
@@ -151,8 +151,8 @@ class Expert:
             progress: Progress) -> Optional[Answer]:
         """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
 
-        It is called in a thread of its own. Must return soon (tens of milliseconds) after
-        `cancelled` is set; a second after, it is left behind, and what it returns is dropped. An
+        It is called in its own thread. It must return soon (tens of milliseconds) after `cancelled`
+        is set. A second later it is abandoned, and its answer is dropped. An
         INTERFACE answer is handed back as it is; `run_interface` is then called. Deadlines are
         monotonic wall time. May raise AnswerError for an answer that cannot be used; the question
         is then put again.

@@ -48,7 +48,7 @@ def _take_notice(border: Border, parent: TreeNode, below: Labels, put_under: Put
     if border.top is None or border.top.tree is not parent.tree:
         border.top, border.below = parent, below
     if border.top is not parent:
-        return  # it is in two places: the first one counts
+        return  # it is in two places: the first one is used
     found: Dict[str, WrappedMachine] = {}
     for label, state in _plain_states(border):
         machine = border.machines.get(label)

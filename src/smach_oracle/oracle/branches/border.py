@@ -184,7 +184,7 @@ class IteratorBorder(Border):
         super().__init__(container)
         self._items: Optional[TrackedItems] = None
         self._trial_id = ''  # that of `_items`
-        self._rounds = 0  # how often it has begun anew
+        self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
         self._begun: Dict[str, Any] = {}  # what its io keys were when it began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
@@ -204,7 +204,7 @@ class IteratorBorder(Border):
     # -- going on
 
     def ask_to_go_on(self, go_on: bool) -> None:
-        """Let the next execution go on where the one before has stopped, or begin anew."""
+        """Let the next execution go on where the one before has stopped, or begin again."""
         self._is_asked_to_go_on = go_on
 
     def outcome_before(self) -> Optional[str]:

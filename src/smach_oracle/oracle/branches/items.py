@@ -17,7 +17,7 @@ class TrackedItems:
         """`given`: an iterable, or a callable that returns one; `tell` takes words for the log."""
         self.given = given
         self.goes_on = False
-        self.begins_with = 1  # number of the item that is the first where it begins anew
+        self.begins_with = 1  # number of the item that is the first where it begins again
         self.number = 0  # of the item under way, from 1; 0: none
         self.is_finished = True  # the item under way
         self.is_exhausted = False
@@ -92,7 +92,7 @@ class TrackedItems:
             self._count = count
 
     def _begin_behind_finished(self) -> None:
-        """After an error in getting an item: get the items anew, and pass over those handed out.
+        """After an error in getting an item: get the items again, and pass over those handed out.
 
         :raises Exception: the same error, where they can be got only once.
         """
@@ -152,6 +152,6 @@ def can_be_indexed(iterator: Any) -> bool:
     items = getattr(iterator, '_items', None)
     items = items.given if isinstance(items, TrackedItems) else items
     if callable(items):
-        return True  # whoever makes them anew says what they are
+        return True  # whoever makes them again says what they are
     return (hasattr(items, '__len__') and hasattr(items, '__getitem__')
             and not hasattr(items, 'keys'))

@@ -194,7 +194,7 @@ class _Setting:
         if node.branch is None:
             node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
         record = node.record(stored.label)
-        # a question of an earlier moment may have been answered since: it is asked anew
+        # a question of an earlier moment may have been answered since: it is asked again
         if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
             record.open_question = stored.asked[1]
         if stored.phase == FAILED or record.open_question:

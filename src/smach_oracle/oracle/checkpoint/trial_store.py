@@ -187,7 +187,7 @@ def _tell_what_begins_anew(top: TreeNode) -> None:
         for below, container in borders_below(node.machine):
             if isinstance(container, smach.Iterator) and not can_be_indexed(container):
                 smach.logwarn('{}/{}: begins again with its first item where the machine is '
-                              'resumed, since what it goes through is no sequence'.format(
+                              'resumed, since its items are not a sequence'.format(
                                   node.path, '/'.join(below)))
 
 

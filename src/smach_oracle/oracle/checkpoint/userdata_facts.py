@@ -1,4 +1,4 @@
-"""Which keys of a container's userdata are to be stored anew."""
+"""Which keys of a container's userdata are to be stored again."""
 import marshal
 from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union, cast
 

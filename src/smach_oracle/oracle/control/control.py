@@ -304,7 +304,7 @@ class Control:
             return tuple(self._breakpoints)
 
     def set_level(self, pattern: PathPattern, level: str) -> None:
-        """Set the autonomy of states; the latest that is set for a state counts.
+        """Set the autonomy of states. The latest setting for a state applies.
 
         :param level: '' lets the settings decide again.
         """

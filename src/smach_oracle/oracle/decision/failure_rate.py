@@ -11,7 +11,7 @@ from typing import Any, Callable, Deque, Dict, Mapping, Tuple, Union
 from ..errors import SettingsError
 from ..number_checks import is_number, is_whole
 
-_ROUNDING = 1e-9  # a rate that equals a threshold but for binary rounding has reached it
+_ROUNDING = 1e-9  # a rate that equals a threshold except for binary rounding has reached it
 
 
 class FailureClass(IntEnum):
@@ -143,7 +143,7 @@ class FailureRate:
 class ExponentialFailureRate:
     """Exponentially weighted mean of the results, beginning with the prior.
 
-    Each result replaces a share 1/memory of what was believed.
+    Each result replaces a share 1/memory of the estimate.
 
     It agrees with `FailureRate` on the first result and forgets gradually instead of all at once.
     """

@@ -1,6 +1,6 @@
 """What a policy is asked, and what it may answer (paper, IV-C). Pure.
 
-A policy is asked three things, in this order: is this a continuous failure; shall the preconditions
+A policy is asked three things, in this order: is this a continuous failure; must the preconditions
 be run; and, once they have run, what now. Where a step back leads is the policy's business too.
 """
 from enum import Enum

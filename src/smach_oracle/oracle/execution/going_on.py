@@ -9,7 +9,7 @@ from ..settings.failing_outcomes import is_preempted
 def ask_to_go_on(node: TreeNode, target: str) -> None:
     """Note that the oracle goes to a state: an Iterator that has failed or was left goes on there.
 
-    Any other Iterator of the container begins anew when it is entered.
+    Any other Iterator of the container begins again when it is entered.
     """
     for label, state in list(node.machine._states.items()):
         border = border_of(state)

@@ -100,7 +100,7 @@ class OracleVisit:
         node.records.history.supersede(outcome)
 
     def _count_superseded(self, outcome: str) -> None:
-        """Count a visit that was none before: an expert did the work of the state."""
+        """Count a visit that was not one before: an expert did the work of the state."""
         self._node.records.visit_ended(self._record, outcome, VisitResult.SUPERSEDED)
         note_superseded(self._node, self._record.label)
 

@@ -78,7 +78,7 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
-    """What the oracle of the top machine decides by, but for what is set for single states."""
+    """What the oracle of the top machine decides by, except what is set for single states."""
     settings, defaults = node.settings, node.settings.defaults
     parameters = sorted(settings.policy_parameters.items())
     return {'policy': settings.policy,

@@ -59,7 +59,7 @@ class UnwellVisit(OracleVisit):
             self._node.path, self._record.label, self._failure.details or in_words(self._failure)))
 
     def _note_passage(self, outcome: str, what: str) -> None:
-        """Tell nothing: the visit was none."""
+        """Record nothing: the visit does not count."""
 
     def _note_superseded(self, outcome: str) -> None:
         self._count_superseded(outcome)

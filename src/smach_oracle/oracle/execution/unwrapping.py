@@ -13,10 +13,10 @@ from .wrapped_classes import two_classes
 
 
 def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
-    """Give a machine, and what was wrapped with it, back as before `OracleContainer.wrap`.
+    """Undo `OracleContainer.wrap` of a machine and of those wrapped with it.
 
-    It stays the same object. What was learned of it is lost. A nested machine that was wrapped on
-    its own stays wrapped.
+    It stays the same object. Its learned rates are lost. A nested machine that was wrapped
+    separately stays wrapped.
 
     :raises TrialError: for a machine that was not wrapped, that runs, or that was wrapped together
         with a machine around it.

@@ -56,7 +56,7 @@ class AlarmClock:
 
 
 def _call(ring: Ring) -> None:
-    """Call it; the others that wait are called all the same."""
+    """Call it; the others that wait are called anyway."""
     try:
         ring()
     except Exception as err:

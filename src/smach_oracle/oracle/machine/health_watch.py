@@ -90,8 +90,8 @@ class HealthWatch:
     def _listen_to(self, conditions: Tuple[HealthCondition, ...]) -> Optional[HealthPort]:
         heard = [each for each in conditions if each.kind is not HealthKind.FUNCTION]
         if heard and self.listen is None:
-            smach.logwarn('healthy: nobody listens to {} here, as this process is no ROS node; '
-                          'it counts as well'.format(', '.join(sources_of(conditions))))
+            smach.logwarn('healthy: this process is not a ROS node, so {} is not listened to, and '
+                          'its condition holds'.format(', '.join(sources_of(conditions))))
         return self.listen(heard) if heard and self.listen is not None else None
 
     def why_unwell(self, stopped: Stopped) -> str:

@@ -137,18 +137,18 @@ class Oracle:
         return self._node.tree.recover
 
     def rates(self) -> List[StateRateRow]:
-        """Return what was learned of every state, of this container and all below it."""
+        """Return the learned rate of every state, of this container and all below it."""
         return rate_rows(self._node.machine)
 
     def transition_counts(self) -> List[TransitionRow]:
-        """Return how often each edge was taken, of this container and all below it."""
+        """Return how often each transition was taken, in this container and all below it."""
         return transition_rows(self._node.machine)
 
 
 def oracle_of(machine: object) -> Oracle:
     """Return the oracle of a wrapped machine.
 
-    :raises TrialError: for what is not under an oracle.
+    :raises TrialError: for a machine that is not under an oracle.
     """
     node = getattr(machine, '_oracle', None)
     if not isinstance(node, TreeNode):

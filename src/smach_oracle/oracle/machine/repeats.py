@@ -1,7 +1,8 @@
 """States that are not repeated by themselves: `on_retry: confirm` or `never`.
 
 A repeat is a state that was executed in this trial and that the oracle leads the machine to again,
-at once or by the author's transitions from where it has jumped to. The author's own loops are none.
+at once or by the author's transitions from where it has jumped to. The author's own loops
+are not repeats.
 """
 from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 

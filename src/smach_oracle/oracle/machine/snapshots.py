@@ -24,7 +24,7 @@ def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
 
 def restore(data: Dict[str, Any], snapshot: Mapping[str, Any], keep: Iterable[str],
             deep_copy_keys: Iterable[str]) -> None:
-    """Make `data` in place what it was at `snapshot`, but for the keys in `keep`.
+    """Make `data` in place what it was at `snapshot`, except the keys in `keep`.
 
     In place, because scripts hold on to the dictionary. Deep copies are handed out as copies, so
     that the snapshot itself stays what it was.

@@ -68,7 +68,7 @@ class Tree:
         self._lock = threading.Lock()
 
     def begin_trial(self, trial_id: str) -> None:
-        """Number events and questions anew."""
+        """Number events and questions again."""
         self.trial_id = trial_id
         self.trials += 1
         self._questions = 0

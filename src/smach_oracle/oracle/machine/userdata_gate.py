@@ -16,7 +16,7 @@ from .protocols import Machine
 class UserdataGate(MutableMapping):
     """The dictionary of a container's userdata, with a record of the keys written.
 
-    It looks the dictionary up anew each time.
+    It looks the dictionary up again each time.
 
     After `shut` writes are dropped, and told to `on_late_write(key)`. Safe to use from several
     threads.

@@ -49,7 +49,7 @@ class WriteWatch:
     def take_back(self, begun: UserdataMark) -> None:
         """Make the userdata what it was; it no longer counts as written.
 
-        Objects that were changed inside stay changed, but for the deep-copied keys.
+        Objects that were changed inside stay changed, except the deep-copied keys.
         """
         data = self._machine.userdata._data
         if getattr(self._machine, 'shares_userdata', False):

@@ -36,7 +36,7 @@ class Failure(NamedTuple):
 
     @property
     def is_held_back(self) -> bool:
-        """Whether it is none: the state was not executed, since it is not to be repeated."""
+        """Whether the state was not executed, since it is not to be repeated: no failure."""
         return self.kind is FailureKind.HELD_BACK
 
 

@@ -89,7 +89,7 @@ def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, Fai
 
 def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
                   text: str) -> Optional[Failure]:
-    """Return the failure that the end of a container is on the level above, None where it is none.
+    """Return the failure that the end of a container is on the level above, else None.
 
     :param label: of the state there that holds the container.
     """

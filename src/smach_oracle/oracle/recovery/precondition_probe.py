@@ -1,7 +1,7 @@
 """How the preconditions of the states that an expert may choose stand now.
 
 Only a callable, and the check of a pair where it is one, can be asked without bringing anything
-about; a state is never run for it. A user's callable may take for ever, so it is called in threads
+about; a state is never run for it. A user's callable may take forever, so it is called in threads
 that nobody waits for.
 """
 from typing import List, NamedTuple, Optional
@@ -45,7 +45,7 @@ class LivePreconditionProbe(PreconditionProbe):
     def status(self, number: int) -> PreconditionStatus:
         """Return how the precondition of that number stands now.
 
-        It calls a user's function, which may take for ever.
+        It calls a user's function, which may take forever.
         """
         spec = self._items[number].spec
         if not self._node.settings.watch_preconditions:

@@ -222,7 +222,7 @@ class PreconditionRunner:
         if self._cancelled:
             raise NotMet('preempted')
         if outcome not in state.get_registered_outcomes():
-            raise NotMet('returned {!r}, which is no outcome of it'.format(outcome))
+            raise NotMet('returned {!r}, which is not one of its outcomes'.format(outcome))
         failing = site.node.in_force.failing
         if label:
             listed = site.node.settings_of(label).failure_outcomes

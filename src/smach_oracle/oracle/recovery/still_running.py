@@ -183,7 +183,7 @@ class WatchedVisit:
         with self._lock:
             self._open_id = question.question_id
         # no interface can do the work of a state that runs, and no function of a user's is called
-        # beside it
+        # meanwhile
         choices = tuple(choice._replace(blocked='', repeats=())
                         if (choice.container, choice.state) == ('', self._record.label)
                         else choice

@@ -43,7 +43,7 @@ class UnwellRecovery(Recovery):
 
 
 class OftenUnwellRecovery(Recovery):
-    """Waits until the robot is well again, and then recovers as ever.
+    """Waits until the robot is well again, and then recovers as usual.
 
     For a state that has been repeated uncounted too often: it may be what makes the robot unwell.
     """

@@ -30,7 +30,7 @@ _CHECKS: Dict[str, values.Check] = {
 
 
 def checked_budget(key: str, given: object) -> Budget:
-    """Check for a budget; a limit that is not given, or None, is none.
+    """Check for a budget; a limit that is not given, or is None, does not apply.
 
     :raises SettingsError: naming key, value and what is allowed.
     """

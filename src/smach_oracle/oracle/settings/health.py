@@ -154,7 +154,7 @@ def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, 
     if not given.startswith(PYTHON):
         raise SettingsError(key, given, "'python:module:attribute'")
     if resolver is None:
-        raise SettingsError(key, given, 'a function here: nobody told how to import names')
+        raise SettingsError(key, given, 'a function, since names cannot be imported here')
     try:
         return given.rpartition(':')[2], resolver(given)
     except Exception as err:

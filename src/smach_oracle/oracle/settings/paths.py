@@ -15,7 +15,7 @@ def path_of(text: str) -> str:
 def check_writable(key: str, path: str, replaced: bool = False) -> None:
     """Find out before it is needed whether a file can be written.
 
-    :param replaced: whether a file beside it is to take its place: then its folder is written in
+    :param replaced: whether a file next to it is to take its place: then its folder is written in
         any case.
     :raises SettingsError: naming the key, the path and what is wrong with it.
     """

@@ -101,7 +101,7 @@ def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> Precondit
     if not given.startswith(PYTHON):
         return PreconditionSpec(PreconditionKind.LABEL, given, given)
     if resolver is None:
-        raise SettingsError(key, given, 'an object here: nobody told how to import names')
+        raise SettingsError(key, given, 'an object, since names cannot be imported here')
     try:
         found = resolver(given)
     except SettingsError:

@@ -118,7 +118,7 @@ class Settings:
     # how long it must hold after a failure and at the end of a wait
     health_settle_s: float = 0.5
     # a state that the oracle has entered is asked about when it takes so long, and so many times as
-    # long as ever before; 0 s: never
+    # long as before; 0 s: never
     still_running_s: float = 60.0
     still_running_factor: float = 10.0
     # whether a step back may lead to what ran before in the container above

@@ -224,7 +224,7 @@ class _SentQuestion:
         return event
 
     def _send(self, now_s: float) -> None:
-        """Send the question; the deadline does not begin anew."""
+        """Send the question; the deadline does not begin again."""
         if self._deadline_s < math.inf:
             self._goal.deadline = max(self._deadline_s - now_s, 1e-3)
         self._sent = self._link.send(self._goal, now_s)

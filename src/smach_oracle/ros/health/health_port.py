@@ -24,7 +24,8 @@ class _Heard(NamedTuple):
 class TopicHealth:
     """Conditions of topics and diagnostics, of which all must hold.
 
-    What was never heard of counts as well where it has no `max_age_s`, and is warned of once.
+    If a source never published, its condition holds, unless it has a `max_age_s`. One warning
+    names the source.
     """
 
     def __init__(self, conditions: Sequence[HealthCondition], topics: HealthTopics) -> None:
@@ -64,8 +65,8 @@ class TopicHealth:
             source, warned = _source_of(condition), self._topics.warned
             if latest.age_s() is None and source not in warned and not rospy.is_shutdown():
                 warned.add(source)
-                rospy.logwarn('healthy: nothing was heard of %s so far; it counts as %s', source,
-                              'well' if condition.max_age_s is None else 'not well')
+                rospy.logwarn('healthy: %s has not published yet, so its condition %s', source,
+                              'holds' if condition.max_age_s is None else 'does not hold')
 
 
 def _source_of(condition: HealthCondition) -> str:

@@ -104,7 +104,7 @@ def is_watched(container: Any) -> bool:
 
 def _children(container: Any) -> Dict[str, Any]:
     # A machine that is being built in another thread may grow while we look. One that is half built
-    # may raise anything: what is around it is shown all the same.
+    # may raise anything: what is around it is shown anyway.
     for _ in range(10):
         try:
             return dict(container.get_children())

@@ -53,7 +53,7 @@ def serialised(message: genpy.Message) -> WireMessage:
 
 
 class LatestMessages(object):
-    """The latest message of each container; serialised anew only where a field has changed."""
+    """The latest message of each container; serialised again only where a field has changed."""
 
     def __init__(self, message_class: Type[genpy.Message]) -> None:
         self._message_class = message_class

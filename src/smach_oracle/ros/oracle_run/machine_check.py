@@ -14,7 +14,7 @@ from ..machine_names import machine_names
 from .check_report import lines_of, wrapped
 from .interception import MARK, family, machines_inside
 
-# new machines of one structure after which a script is taken for one that builds them for ever
+# new machines of one structure after which a script is taken for one that builds them forever
 MAX_ALIKE = 10
 
 
@@ -33,7 +33,7 @@ class MachineCheck:
         self._tell = tell
         self._lock = threading.RLock()
         self._seen: List[smach.Container] = []  # the objects themselves, so that no id comes again
-        self._told: List[Tuple[str, ...]] = []  # of each machine, but for its name
+        self._told: List[Tuple[str, ...]] = []  # of each machine, except its name
         self.machines = 0  # of different structure
         self.warnings = 0
 

@@ -16,7 +16,7 @@ USAGE_ERROR = 2  # exit code
 class Refusal:
     """Once a machine is refused, no other one begins, and the process ends.
 
-    The machine's thread is left by SystemExit. Where the script goes on all the same, or waits in
+    The machine's thread is left by SystemExit. Where the script goes on anyway, or waits in
     another thread, the guard ends the process as it does on a signal.
     """
 

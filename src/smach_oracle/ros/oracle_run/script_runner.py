@@ -144,7 +144,8 @@ def parse(args: Sequence[str]) -> Invocation:
     if '/' in given.name:
         parser.error('--name {}: a name without / is wanted'.format(given.name))
     if line.script is None or line.script == NONE:
-        parser.error('which SCRIPT? (under roslaunch: script:=FILE)')
+        parser.error('no script is given: name it after the options, or with script:=FILE '
+                     'under roslaunch')
     script = path_of(line.script)
     why = _why_not_readable(script)
     if why:
@@ -276,7 +277,7 @@ class MachineWrapper:
                                  recover=self._invocation.recover)
 
     def _check_preconditions(self, machine: smach.StateMachine, settings: Settings) -> None:
-        """Refuse what is nowhere, before anything has moved; warn of it at a later machine.
+        """Refuse undefined names before anything has moved, warn of them at a later machine.
 
         One file serves all machines of a script, and not each of them has every state.
         """

@@ -6,7 +6,7 @@ record` names its files alike.
 
 `NAME.bag.active` is copied, as far as it can be read, to `NAME.bag.mending`. Then it is renamed to
 `NAME.bag.damaged` and the copy to `NAME.bag`. When that has been read back, the damaged one goes.
-Whatever moment the process dies at, the next start goes on from there.
+If the process is killed at any moment, the next start goes on from there.
 """
 import fcntl
 import os

@@ -69,7 +69,7 @@ def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
 
 
 def event_number(data: bytes) -> Optional[int]:
-    """The sequence number of a serialised OracleEvent; None where the bytes are none."""
+    """The sequence number of a serialised OracleEvent; None where the bytes are not an event."""
     try:
         position = _after_strings(data, _HEAD.size - _LENGTH.size, 1)
         position = _after_strings(data, position + _WALL_TIME.size, 1)

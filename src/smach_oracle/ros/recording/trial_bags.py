@@ -15,7 +15,7 @@ from .recorder_status import DiskWatch, LossCounter, RecorderState, RecordingSta
 from .trial_bag import SyncBudget, TrialBag
 
 FIRST_RETRY_S, LONGEST_RETRY_S = 0.5, 5.0
-MEND_WAIT_S = 2.0  # for bags to be mended, before the robot goes on beside it
+MEND_WAIT_S = 2.0  # for bags to be mended, before the robot goes on meanwhile
 KeptKey = Tuple[Union[str, bytes], ...]
 KEPT_FOR_NEXT_BAG = 500  # latched messages and structures with which every bag begins
 

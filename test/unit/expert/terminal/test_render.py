@@ -77,7 +77,8 @@ def test_what_is_not_there_takes_no_room():
 @pytest.mark.parametrize('kind, outcome, text', [
     (FailureKind.FAILING_OUTCOME, 'failed', 'PICK ended with the failing outcome failed'),
     (FailureKind.EXCEPTION, '', 'PICK raised an exception'),
-    (FailureKind.UNREGISTERED_OUTCOME, '', 'PICK returned nothing, which is no outcome of it'),
+    (FailureKind.UNREGISTERED_OUTCOME, '',
+     'PICK returned nothing, which is not one of its outcomes'),
     (FailureKind.TIME_LIMIT, '', 'PICK ran over its time limit')])
 def test_every_kind_of_failure_has_its_words(kind, outcome, text):
     assert text in shown(render.question(goal(failure_kind=kind, outcome=outcome)))

@@ -25,8 +25,8 @@ def decision(**fields):
 @pytest.mark.parametrize('fields, text', [
     ({'type': ''}, "'grasped': the type .* is missing, such as"),
     ({'type': 'PoseStamped'}, "'PoseStamped' is not the name of a message type"),
-    ({'md5sum': ''}, "md5sum '' .* is none; `rosmsg md5 std_msgs/Empty` tells it"),
-    ({'md5sum': '*'}, "md5sum '\\*' .* is none"),
+    ({'md5sum': ''}, "md5sum '' .* is wrong. `rosmsg md5 std_msgs/Empty` prints it"),
+    ({'md5sum': '*'}, "md5sum '\\*' .* is wrong"),
     ({'value': b'12'}, 'are not those of a std_msgs/Empty'),
     ({'encoding': UserdataItem.ROS_MESSAGES, 'value': b'1', 'type': 'their_robot/Thing'},
      'cut off at byte 0'),

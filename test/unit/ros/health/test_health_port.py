@@ -46,8 +46,8 @@ def test_what_was_never_heard_of_is_well_and_warned_of_once(warnings):
     port = port_of(FakeTopics(), {'topic': '/motors_on'}, {'diagnostics': 'Power'})
     assert [port.why_unwell(), port.why_unwell()] == ['', '']
     assert warnings == [
-        'healthy: nothing was heard of topic /motors_on so far; it counts as well',
-        'healthy: nothing was heard of diagnostics Power so far; it counts as well']
+        'healthy: topic /motors_on has not published yet, so its condition holds',
+        'healthy: diagnostics Power has not published yet, so its condition holds']
 
 
 def test_a_machine_for_each_trial_warns_of_it_once_and_starts_one_timer(warnings, monkeypatch):
@@ -63,7 +63,7 @@ def test_with_a_largest_age_it_is_not_well(warnings):
     port = port_of(FakeTopics(), {'topic': '/motors_on', 'max_age_s': 5})
     assert port.why_unwell() == 'motors_on: not heard of yet'
     assert warnings == [
-        'healthy: nothing was heard of topic /motors_on so far; it counts as not well']
+        'healthy: topic /motors_on has not published yet, so its condition does not hold']
 
 
 def test_all_that_is_wrong_is_named(warnings, now):

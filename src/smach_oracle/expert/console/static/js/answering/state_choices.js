@@ -11,8 +11,8 @@ const LIKELIEST = 6;
 const MOST_HELPFUL = 2;
 
 /**
- * Of very many states those that are chosen most: what has helped, the failed one, where its
- * success leads, and whence the machine came.
+ * The likeliest of very many states: those that helped before, the failed one, the one that
+ * follows its success, and those that succeeded last.
  * @param {Question} question
  */
 export function likeliest({ choices, state, supersede, history }) {

@@ -1,0 +1,25 @@
+"""Completes the theme furo as Debian ships it.
+
+Debian's package takes normalize.css from a web server's /javascript, and its script is an ES module
+that the pages load as a plain one. Both do nothing where a page is opened as a file: margins,
+the switch between light and dark and the marks in the table of contents would be missing.
+"""
+import re
+from pathlib import Path
+
+NORMALIZE = Path('/usr/share/javascript/normalize.css/normalize.css')
+IMPORT_CSS = re.compile(r'@import url\(/javascript/normalize\.css/normalize\.css\);\n?')
+IMPORT_GUMSHOE = re.compile(r'import Gumshoe from "\./gumshoe-patched\.js";\n?')
+
+
+def complete(static: Path) -> None:
+    """Put the missing parts into the theme's own files, where they are Debian's."""
+    style, script = static / 'styles' / 'furo.css', static / 'scripts' / 'furo.js'
+    text = style.read_text(encoding='utf-8')
+    if IMPORT_CSS.match(text):
+        normalize = NORMALIZE.read_text(encoding='utf-8')
+        style.write_text(normalize + IMPORT_CSS.sub('', text), encoding='utf-8')
+    text = script.read_text(encoding='utf-8')
+    if IMPORT_GUMSHOE.match(text):
+        gumshoe = script.with_name('gumshoe-patched.js').read_text(encoding='utf-8')
+        script.write_text(gumshoe + IMPORT_GUMSHOE.sub('', text), encoding='utf-8')

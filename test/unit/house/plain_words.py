@@ -1,0 +1,188 @@
+"""What a rule can see of doc/style.md: long sentences, semicolons, inverted sentences, terms.
+
+``python3 test/unit/house/plain_words.py [FILE]...`` prints what it and proselint find in files.
+Without names it reads all files except those of `NOT_YET`.
+"""
+import ast
+import io
+import re
+import sys
+import tokenize
+from pathlib import Path
+from typing import Iterator, List, NamedTuple, Pattern, Tuple
+
+from house import ROOT, is_python, shown, tracked_text
+
+MOST_WORDS = 35
+STYLE = 'doc/style.md'
+# pages and folders that are still to be mended; the list only ever gets shorter
+NOT_YET: Tuple[str, ...] = (
+    'doc/console.md', 'doc/console_inside.md', 'doc/console_security.md', 'doc/perception.md',
+    'doc/results.md', 'doc/second_robot.md', 'doc/shared_autonomy.md',
+    'doc/simulation.md', 'doc/simulation_inside.md', 'doc/statistics.md', 'doc/survive.md',
+    'doc/testing.md', 'doc/trees.md', 'doc/use_cases.md', 'src/smach_oracle/analysis/',
+    'src/smach_oracle/expert/console/', 'src/smach_oracle/experiment/',
+    'src/smach_oracle/geometry/', 'src/smach_oracle/inspection_robot/', 'src/smach_oracle/pr2/',
+    'src/smach_oracle/scripted_operator/', 'src/smach_oracle/simulation/',
+    'src/smach_oracle/tasks/', 'src/smach_oracle/testing/', 'test/')
+INTERFACES = ('.msg', '.srv', '.action')
+
+
+class Fault(NamedTuple):
+    """A place where a reader stops."""
+
+    line: int
+    rule: str
+    text: str
+
+
+class Prose(NamedTuple):
+    """A piece of text for people, and where it begins; `page` is a paragraph of a page."""
+
+    line: int
+    text: str
+    page: bool = False
+    table: bool = False
+
+
+SENTENCE = re.compile(r'(?<=[.?!:])\s+(?=[A-Z`*"(])')
+INVERTED = re.compile(
+    r'(?:\* +|\d+\. +)?\**'
+    r'(?:What|Who|Whoever|Whom|Whose|Of (?:an?|the|what|such|more|less|each|its|which|two|those)) '
+    r'(?![^.?]*\?)')
+NOT_A = re.compile(r'(?<!there )(?<!There )\b(?:is|are|was|were) none\b(?! of)')
+CODE = re.compile(r'``.*?``|`[^`]*`|"[^"]*"|(?<=\]\()[^)]*(?=\))', re.DOTALL)
+
+
+def terms() -> List[Pattern[str]]:
+    """The phrases in code font in the last column of the table of terms."""
+    rows = re.findall(r'^\|.*\|(.*)\|$', (ROOT / STYLE).read_text(encoding='utf-8'), re.MULTILINE)
+    phrases = [phrase for row in rows for phrase in re.findall('`([^`]+)`', row)]
+    return [re.compile(r'(?<!there )\b{}\b(?! as\b)'.format(re.escape(phrase)), re.IGNORECASE)
+            for phrase in phrases]
+
+
+TERMS = terms()
+
+
+def quotations_out(text: str) -> str:
+    """`text` without code, quotations and targets of links, each as one word."""
+    return CODE.sub('X', text)
+
+
+def page_prose(text: str) -> Iterator[Prose]:
+    """The paragraphs, points of lists and table rows of Markdown, without its code blocks."""
+    begun, kept, code = 0, [], False
+    for number, line in enumerate(text.splitlines() + [''], 1):
+        code ^= line.lstrip().startswith('```')
+        table = line.startswith('|')
+        ends = code or not line.strip() or table or re.match(r'[#`<]|\s*([*-]|\d+\.) ', line)
+        if kept and ends:
+            yield Prose(begun, ' '.join(kept), page=True)
+            kept = []
+        if table:
+            yield Prose(number, line, page=True, table=True)
+        elif line.strip() and not code and not re.match('[#<]|```', line.lstrip()):
+            begun = begun if kept else number
+            kept.append(line.strip())
+
+
+def python_prose(text: str) -> Iterator[Prose]:
+    """Docstrings, comments, and strings of at least four words."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(
+                node.value.split()) >= 4:
+            yield Prose(node.lineno, node.value)
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            yield Prose(token.start[0], token.string)
+
+
+def interface_prose(text: str) -> Iterator[Prose]:
+    """The comments of a message, a service or an action; those that go on are one."""
+    begun, kept = 0, []
+    for number, line in enumerate(text.splitlines() + [''], 1):
+        alone = line.strip().startswith('#')
+        if kept and not alone:
+            yield Prose(begun, ' '.join(kept))
+            kept = []
+        if '#' in line:
+            begun = begun if kept else number
+            kept.append(line.split('#', 1)[1].strip())
+    if kept:
+        yield Prose(begun, ' '.join(kept))
+
+
+def prose_of(path: Path) -> List[Prose]:
+    """The text for people in a file, none for a kind of file that is not looked at."""
+    text = path.read_text(encoding='utf-8')
+    if path.suffix == '.md':
+        return list(page_prose(text))
+    if path.suffix in INTERFACES:
+        return list(interface_prose(text))
+    return list(python_prose(text)) if is_python(path) else []
+
+
+def faults(piece: Prose) -> Iterator[Fault]:
+    """What the rules find in one piece."""
+    text = quotations_out(piece.text)
+    for pattern in TERMS + [NOT_A]:
+        for match in pattern.finditer(text):
+            yield Fault(piece.line, 'term', match.group())
+    if not piece.page or piece.table:
+        return
+    if '; ' in text:
+        yield Fault(piece.line, 'semicolon', text[max(0, text.index('; ') - 40):][:60])
+    for sentence in SENTENCE.split(text):
+        if INVERTED.match(sentence):
+            yield Fault(piece.line, 'inverted', sentence[:60])
+        if len(sentence.split()) > MOST_WORDS:
+            yield Fault(piece.line, 'long', '{} words: {}'.format(len(sentence.split()),
+                                                                  sentence[:60]))
+
+
+def faults_of(path: Path) -> List[Fault]:
+    """What the rules find in one file."""
+    return [fault for piece in prose_of(path) for fault in faults(piece)]
+
+
+def proselint_faults(path: Path) -> Iterator[Fault]:
+    """What proselint finds in a page: its words, for typography is the browser's matter."""
+    from proselint.tools import lint
+    text = re.sub(r'^```.*?^```', lambda block: re.sub(r'[^\n]', '', block.group()),
+                  path.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL)
+    for found in lint(quotations_out(text)):
+        if not found[0].startswith('typography'):
+            yield Fault(found[2] + 1, found[0], found[1])
+
+
+def is_checked(path: Path) -> bool:
+    """Whether the rules hold for a file."""
+    name = shown(path)
+    kind = path.suffix == '.md' or path.suffix in INTERFACES or is_python(path)
+    quotes_them = name == STYLE or name.endswith('plain_words.py')
+    return kind and not quotes_them
+
+
+def checked_files() -> List[Path]:
+    """The files for which the rules hold today."""
+    return [path for path in tracked_text()
+            if is_checked(path) and not shown(path).startswith(NOT_YET)]
+
+
+def main() -> int:
+    paths = [Path(name).resolve() for name in sys.argv[1:]] or checked_files()
+    count = 0
+    for path in paths:
+        found = faults_of(path)
+        if path.suffix == '.md':
+            found += proselint_faults(path)
+        for fault in found:
+            print('{}:{}: {}: {}'.format(shown(path), *fault))
+        count += len(found)
+    print('{} faults in {} files; the rules: {}'.format(count, len(paths), STYLE))
+    return 1 if count else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""The texts for people keep the rules of doc/style.md, and the rules find what they are for."""
+from pathlib import Path
+
+import pytest
+from house import ROOT, shown
+from plain_words import (
+    NOT_YET,
+    STYLE,
+    TERMS,
+    Prose,
+    checked_files,
+    faults,
+    faults_of,
+    interface_prose,
+    is_checked,
+    page_prose,
+    python_prose,
+    tracked_text,
+)
+
+LONG = ' '.join(['The machine goes on'] + ['and on'] * 16) + '.'
+PAGES = [path for path in checked_files() if path.suffix == '.md']
+# words that made a reader stop, with the rule that sees them
+STOPPED = [
+    ('A program that is no ROS node has nobody to ask, and does so at once.', 'term'),
+    ('Each goes over those above it.', 'term'),
+    ('The cookie is none any more.', 'term'),
+    ('Joints that nobody tells of stand at zero.', 'term'),
+    ('No pickle is ever loaded, but for that of the viewer.', 'term'),
+    ('Of two lines of one seed the later counts.', 'term'),
+    ('What raises is not met.', 'inverted'),
+    ('Of a state only running it would tell.', 'inverted'),
+    ('Whoever still presses is refused.', 'inverted'),
+    ('A lease runs out; the next front end takes it.', 'semicolon'),
+    (LONG, 'long'),
+]
+UNDERSTOOD = [
+    'A precondition that raises counts as not met.',
+    'What should the robot do? Of 450 trials, 111 failed.',
+    'If there is none, the priors are used.',
+    'Run `a; b` and see "nothing; at all".',
+    'Later rows override earlier ones.',
+]
+
+
+def rules_of(text):
+    return {fault.rule for fault in faults(Prose(1, text, page=True))}
+
+
+@pytest.mark.parametrize('text, rule', STOPPED, ids=lambda each: each[:30])
+def test_a_rule_sees_what_made_a_reader_stop(text, rule):
+    assert rule in rules_of(text)
+
+
+@pytest.mark.parametrize('text', UNDERSTOOD, ids=lambda each: each[:30])
+def test_no_rule_stops_at_plain_words(text):
+    assert not rules_of(text)
+
+
+def test_the_list_of_terms_is_there():
+    rows = (ROOT / STYLE).read_text(encoding='utf-8').split('| write |')[1].splitlines()
+    assert len(rows) > 30 and len(TERMS) > 25
+
+
+def test_a_page_is_read_without_its_code_and_by_paragraphs():
+    page = ('# Of a title\n\nOne line\nand one more.\n* a point\n\n'
+            '```\ncode; more\n```\n| a | b; c |\n')
+    pieces = [(piece.line, piece.text, piece.table) for piece in page_prose(page)]
+    assert pieces == [(3, 'One line and one more.', False), (5, '* a point', False),
+                      (10, '| a | b; c |', True)]
+
+
+def test_code_is_read_by_docstrings_comments_and_longer_strings():
+    code = 'def f():\n    """Says what."""\n    # a comment\n    raise E("no such file as that")\n'
+    assert {piece.text for piece in python_prose(code)} == {'# a comment', 'no such file as that'}
+    comments = [piece.text for piece in interface_prose('# first\n# second\nint32 a  # third\n')]
+    assert comments == ['first second', 'third']
+
+
+@pytest.mark.parametrize('path', PAGES, ids=shown)
+def test_a_page_keeps_the_rules(path):
+    assert not faults_of(path)
+
+
+def test_the_texts_in_the_code_keep_the_rules():
+    found = {shown(path): faults_of(path) for path in checked_files() if path.suffix != '.md'}
+    assert len(found) > 300
+    assert not {name: each for name, each in found.items() if each}
+
+
+@pytest.mark.parametrize('prefix', NOT_YET)
+def test_what_is_not_mended_yet_has_faults(prefix):
+    """A page that has none any more is taken from the list."""
+    paths = [path for path in tracked_text() if shown(path).startswith(prefix) and is_checked(path)]
+    assert any(faults_of(Path(path)) for path in paths)
