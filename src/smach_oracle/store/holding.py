@@ -45,7 +45,7 @@ class MachineLock:
         try:
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, '{}\n'.format(os.getpid()).encode('ascii'), 0)
-        except OSError:  # such as a full disk: it is held, and nobody is told by whom
+        except OSError:  # such as a full disk: it is held, and the others cannot read by whom
             pass
 
     def release(self) -> None:

@@ -77,7 +77,7 @@ class StoreFile:
         except sqlite3.OperationalError:
             if not self.read_only or os.path.exists(where + '-wal'):
                 raise
-        # such as on a medium that is read only, where SQLite can put no log beside it
+        # such as on a medium that is read only, where SQLite can write no log
         return self._connected('file:{}?immutable=1'.format(quote(where)), synchronous)
 
     def _connected(self, where: str, synchronous: str) -> sqlite3.Connection:
@@ -271,9 +271,9 @@ class StoreFile:
 
     def _renamings(self, trial: int, stretches: List[Tuple[int, int]]
                    ) -> List[Tuple[Tuple[int, int], Renaming]]:
-        """Return by which names the states go from certain moments on, oldest first.
+        """Return the names of states from certain moments on, oldest first.
 
-        A moment is told by the position of its stretch, and its number.
+        Each moment is the position of its stretch, and its number.
         """
         found = []
         for position, (first, last) in enumerate(stretches):

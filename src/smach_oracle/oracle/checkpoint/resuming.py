@@ -248,7 +248,7 @@ class _Setting:
         top = node.top()
         place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
         way = None if place is None else way_to(top, place)
-        # beside it others may run, which would be left
+        # others may run next to it, which would be left
         if place is None or way is None or any(
                 len(each.below) > 1 or each.branch is not None for each in _up_from(node)):
             self._ask_at_beginning(node, stored, stored.label)

@@ -48,7 +48,7 @@ class Plan(NamedTuple):
 def planned(bags: Iterable[KnownBag], limits: Limits, now: float) -> Plan:
     """Return what goes.
 
-    All bags of a trial go together, so that what remains tells of whole trials.
+    All bags of a trial go together, so that whole trials remain.
 
     :param now: s since the epoch.
     """

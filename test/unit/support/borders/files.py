@@ -23,12 +23,12 @@ from smach_oracle.analysis.trials import load_trials
 from smach_oracle.analysis.variants import count_variants, time_series
 from smach_oracle.expert.console.feeds.views import event_view
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.errors import CheckpointError
 from smach_oracle.oracle.records import rates_file
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.store import state_command
 from smach_oracle.store.codecs import Codecs, NotReadable, NotStorable
-from smach_oracle.store.errors import StoreError
 
 from .border import REFUSED, TAKEN, Border, refused
 from .json_texts import json_texts
@@ -228,7 +228,7 @@ def _resumed(path: str) -> str:
         made = machine(checkpoint=path, checkpoint_synchronous='OFF', on_resume='recover')
         try:
             assert made.execute() in ('done', 'aborted', 'preempted')
-        except StoreError as err:
+        except CheckpointError as err:
             return refused(err, path)
     return TAKEN if ends == {0} else REFUSED
 

@@ -1,0 +1,96 @@
+"""What is kept out of a store."""
+from killed_machines import Diary, KilledMachine, Noted
+
+import smach
+from smach_oracle.oracle import OracleContainer
+
+ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+
+
+class Opens(smach.State):
+    """Writes an open file, which no codec knows."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded'], [], ['file'])
+
+    def execute(self, userdata):
+        userdata.file = open('/dev/null')
+        return 'succeeded'
+
+
+def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp_path, log):
+    inner = smach.StateMachine(['succeeded'], [], ['file'])
+    with inner:
+        smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'succeeded'})
+    machine = smach.StateMachine(['succeeded'])
+    machine.userdata.mine = open('/dev/null')
+    with machine:
+        smach.StateMachine.add('A', Opens(), {'succeeded': 'AGAIN'}, remapping={'file': 'other'})
+        smach.StateMachine.add('AGAIN', Opens(), {'succeeded': 'IN'}, remapping={'file': 'other'})
+        smach.StateMachine.add('IN', inner, {'succeeded': 'succeeded'})
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named = [text.split(' cannot be stored')[0] for level, text in log
+             if level == 'warn' and 'cannot be stored' in text]
+    kind = '(_io.TextIOWrapper)'
+    assert named == ["TOP: userdata key 'mine' {} of the script".format(kind),
+                     "TOP: userdata key 'other' {} of TOP/A".format(kind),
+                     "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind),
+                     "TOP: userdata key 'file' {} of TOP/IN".format(kind)]
+
+
+class Looks(smach.State):
+    """Notes which keys it finds."""
+
+    def __init__(self, diary):
+        smach.State.__init__(self, ['succeeded'], ['file', 'mine', 'cup'])
+        self._diary = diary
+
+    def execute(self, userdata):
+        self._diary.write('finds', ','.join(
+            key for key in ('file', 'mine', 'cup') if userdata._ud._data.get(key) is not None))
+        return 'succeeded'
+
+
+def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
+    def build(diary, points):
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        machine.userdata.mine = open('/dev/null')
+        machine.userdata.cup = 'red'
+        with machine:
+            smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'A'})
+            smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'LOOK'})
+            smach.StateMachine.add('LOOK', Looks(diary), {'succeeded': 'succeeded'})
+        return machine
+
+    for is_killed, found in ((False, 'file,mine,cup'), (True, 'mine,cup')):
+        folder = tmp_path / str(is_killed)
+        folder.mkdir()
+        killed = KilledMachine(folder, build)
+        if is_killed:
+            assert killed.run(kill_at=6) is None
+            assert killed.diary.count('begins')['A'] == 1
+        assert killed.run(states={'LOOK': {}})['outcome'] == ('succeeded')
+        assert list(killed.diary.count('finds')) == [found]
+
+
+def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
+    def iterated(items):
+        iterator = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=items,
+                                  it_label='item', exhausted_outcome='succeeded')
+        with iterator:
+            smach.Iterator.set_contained_state(
+                'I', Noted('I', Diary(str(tmp_path / 'diary')), lambda: None,
+                           keys=('done', 'item')), loop_outcomes=['succeeded'])
+        return iterator
+
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'ONCE'})
+        smach.StateMachine.add('ONCE', iterated(iter([1, 2])), ENDS)
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named = [text for level, text in log if level == 'warn' and 'begins again' in text]
+    assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
