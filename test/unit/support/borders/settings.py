@@ -47,7 +47,8 @@ _MACHINE = {
     'still_running_factor': st.floats(1, 9), 'watch_preconditions': flags,
     'history_length': counts, 'rates_file': texts, 'checkpoint': texts,
     'checkpoint_wait_s': seconds, 'on_resume': words('ask', 'recover', 'restart', 'state:A'),
-    'resume_from': counts, 'checkpoint_synchronous': words('FULL', 'OFF'), 'oracle_label': names,
+    'resume_from': counts, 'resume_map': st.dictionaries(names, names, max_size=2),
+    'checkpoint_synchronous': words('FULL', 'OFF'), 'oracle_label': names,
     'nested': st.one_of(flags, lists), 'health_settle_s': seconds}
 assert set(_EACH_STATE) == set(executive._STATE_CHECKS)
 assert set(_MACHINE) == set(executive._MACHINE_CHECKS)
