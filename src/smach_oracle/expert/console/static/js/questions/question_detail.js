@@ -36,7 +36,6 @@ export class QuestionDetail {
   constructor(app, question, ways) {
     this.app = app;
     this.question = question;
-    this.key = question.key;
     this.ways = ways;
     this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
@@ -96,6 +95,8 @@ export class QuestionDetail {
         h('p', { class: 'dim' }, robot, ' · ', path, ' ', this.silence.age)),
       h('span', { class: 'spacer' }), this.time);
   }
+
+  get key() { return this.question.key; }
 
   /** The question as it stands; undefined where it is open no longer. */
   get now() { return this.app.store.questions.find((each) => each.key === this.key); }
