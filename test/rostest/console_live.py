@@ -10,7 +10,7 @@ import unittest
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage
+from console_page import OF_A_QUESTION, WITH_BROWSER, ConsolePage
 from expert_fixtures import Process
 from own_master import wait_for_master
 from waiting import wait_for
@@ -37,6 +37,26 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
   tell(9);
   return [silent, liveness.gone({ server: "s", robot: "/r" })];
 });'''
+# a claim that runs out, and cannot be made again at once: whether it is kept, and how often it was
+# asked for
+KEPT = OF_A_QUESTION % '''
+  const asked = async () => {
+    await new Promise((done) => { setTimeout(done); });
+    return told.filter((name) => name === "claim").length;
+  };
+  said("");
+  await detail.claim("claim");
+  said("ann");
+  detail.claimedAt = -Infinity;
+  replies.push({ ok: false, message: "cannot be reached" });
+  said("");
+  const found = [await asked(), detail.held];
+  detail.tick();
+  found.push(await asked());
+  detail.claimedAt = -Infinity;
+  detail.tick();
+  found.push(await asked(), said("ann"));
+  return found;'''
 # which commands wait for nothing, where all are silent and the person has no name
 PASSES = '''
 return import("/static/js/page/gate.js").then(({ Gate }) => {
@@ -127,11 +147,16 @@ class Live(ConsolePage, unittest.TestCase):
     def test_2_what_stops_or_lets_go_waits_for_nothing(self):
         self.assertEqual(self.browser.run(PASSES, STOPS + ANSWERS), STOPS)
 
+    def test_2_a_claim_that_could_not_be_made_again_is_tried_again(self):
+        self.assertEqual(self.browser.run(KEPT),
+                         [2, True, 2, 3, 'It is yours. Leave it to others'])
+
     def test_3_with_a_dead_master_no_answer_is_sent(self):
         self.master.kill()
         try:
             self.assertTrue(self.browser.says('master silent for', '#status'))
             self.assertTrue(self.refused('the ROS master'))
+            self.assertTrue(self.browser.says('Your claim has run out', '.claim-bar'))
             # the robot hears of a stop nevertheless
             self.browser.click('.detail [data-action=pause-machine]')
             self.assertTrue(self.browser.says('KITCHEN is paused', '.detail .hand-reply'))

@@ -11,7 +11,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage
+from console_page import OF_A_QUESTION, WITH_BROWSER, ConsolePage
 from waiting import stays, wait_for
 
 from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent
@@ -49,32 +49,11 @@ document.querySelector(".answer-form").prepend(box);
 document.querySelector(selector).click();
 box.remove();'''
 # somebody takes a question over; the list that tells of it comes later than the reply
-TAKEN = '''
-const paths = ["questions/question_detail.js", "page/store.js", "page/liveness.js"];
-return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
-  [{ QuestionDetail }, { Store }, { Liveness }]) => {
-  const store = new Store();
-  const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
-    state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
-    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
-    asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
-    give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
-  const request = async () => ({ ok: true, message: "" });
-  const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
-    connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
-    isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
-  const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
-  store.onChange((names) => detail.update(names));
-  const said = (holder) => {
-    const session = holder === "ann" ? "b1" : "";
-    store.receive({ now: 0, sections: { questions: [{ ...question, holder, session }] } });
-    return detail.claimBar.root.textContent;
-  };
+TAKEN = OF_A_QUESTION % '''
   said("bob");
   await detail.claim("take_over");
   said("bob");
-  return [said("ann"), said("carl")];
-});'''
+  return [said("ann"), said("carl")];'''
 # "No, go back" from giving up a container above that may end as the failed one may
 GO_BACK = '''
 return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {

@@ -28,6 +28,37 @@ const look = () => {
   done(Number(document.body.dataset.refused || 0));
 };
 look();'''
+# a page's view of a question of the robot /r, for ann, and what a test does with it: `said` has the
+# list tell who holds it, `replies` are those to claims, `told` are the names of all commands
+OF_A_QUESTION = '''
+const paths = ["questions/question_detail.js", "page/store.js", "page/liveness.js"];
+return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
+  [{ QuestionDetail }, { Store }, { Liveness }]) => {
+  const store = new Store();
+  const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
+    state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
+    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
+    asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
+    give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
+  const replies = [];
+  const told = [];
+  const request = async (name) => {
+    told.push(name);
+    return (name === "claim" && replies.shift()) || { ok: true, message: "" };
+  };
+  const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
+    connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
+    isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
+  const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
+  store.onChange((names) => detail.update(names));
+  const said = (holder) => {
+    const session = holder === "ann" ? "b1" : "";
+    const status = holder ? "claimed" : "pending";
+    store.receive({ now: 0, sections: { questions: [{ ...question, holder, session, status }] } });
+    return detail.claimBar.root.textContent;
+  };
+%s
+});'''
 
 
 class Node:

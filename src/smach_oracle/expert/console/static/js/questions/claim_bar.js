@@ -16,6 +16,7 @@ import { h, replace } from '../page/dom.js';
  * @property {string} problem
  * @property {string} expert who uses this page
  * @property {string} gone how the robot went, and the question with it; '' where it is there
+ * @property {boolean} silent somebody who must be heard for an answer is not
  */
 /**
  * @typedef {object} Use
@@ -28,6 +29,7 @@ import { h, replace } from '../page/dom.js';
 const CLOSED = 'This question is closed: it was answered elsewhere, taken back, or its time was '
   + 'over. ';
 const ELSEWHERE = ' (the same name, in another browser or front end)';
+const RUN_OUT = 'Your claim has run out. It is made again as soon as all are heard.';
 const VIEWER = 'You are signed in as a viewer: you can watch, others answer.';
 
 export class ClaimBar {
@@ -64,7 +66,7 @@ export class ClaimBar {
    * @param {ClaimState} state
    * @returns {Bar}
    */
-  barOf({ settled, now, mine, held, claiming, sending, mayAnswer, expert, gone }) {
+  barOf({ settled, now, mine, held, claiming, sending, mayAnswer, expert, gone, silent }) {
     if (settled) return { kind: '', words: null };
     if (!now) {
       return { kind: 'warn', words: [gone || CLOSED, button('Back to the list', this.use.leave)] };
@@ -83,6 +85,7 @@ export class ClaimBar {
     if (now.holder && !taken) {
       return { kind: 'warn', words: [holder, ' works on it. ', this.takeOver()] };
     }
+    if (held && silent) return { kind: '', words: RUN_OUT };
     if (claiming || held) return { kind: '', words: 'Taking it…' };
     const take = button('Take it', this.use.claim, 'claim');
     return { kind: '', words: ['Nobody works on it. ', take] };

@@ -21,6 +21,7 @@ import { SituationCamera } from './situation_camera.js';
 /** @typedef {import('../server').Question} Question */
 
 export const URGENT_S = 20;
+const RETRY_MS = 3000; // after a claim that was lost, and could not be made again
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
 const UNKNOWN = 'The robot has not confirmed in time: whether it has your answer is not known. The '
@@ -35,12 +36,12 @@ export class QuestionDetail {
   constructor(app, question, ways) {
     this.app = app;
     this.question = question;
-    this.key = question.key;
     this.ways = ways;
     this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
     this.claiming = false;
     this.held = false; // this page has claimed it
+    this.claimedAt = -Infinity; // ms, when it was tried last
     this.sending = false;
     this.ended = false; // it is shown no longer
     this.problem = '';
@@ -95,6 +96,8 @@ export class QuestionDetail {
       h('span', { class: 'spacer' }), this.time);
   }
 
+  get key() { return this.question.key; }
+
   /** The question as it stands; undefined where it is open no longer. */
   get now() { return this.app.store.questions.find((each) => each.key === this.key); }
 
@@ -144,9 +147,11 @@ export class QuestionDetail {
     this.claiming = true;
     this.problem = '';
     this.holderBefore = this.otherHolder;
+    this.claimedAt = performance.now();
     try {
       const reply = await this.app.connection.request(command, { question: this.key });
-      this.held = reply.ok;
+      // who is out of reach has given it to nobody else
+      this.held = reply.ok || (command === 'claim' && this.held && this.free);
       if (!reply.ok) this.problem = reply.message;
       if (this.ended && reply.ok && !this.settled) this.release();
     } catch (err) {
@@ -189,7 +194,7 @@ export class QuestionDetail {
   }
 
   tick() {
-    this.show();
+    this.showClaim();
     this.hand.update();
   }
 
@@ -298,12 +303,18 @@ export class QuestionDetail {
     return now.session ? now.holder + ' (in another browser)' : ''; // '': it is not told yet
   }
 
+  /** Whether nobody works on it. */
+  get free() {
+    const { now } = this;
+    return Boolean(now && !now.holder && now.status === 'pending');
+  }
+
   /** Keep the claim, or see that it is lost. */
   showClaim() {
-    const { now } = this;
-    const free = now && !now.holder && now.status === 'pending';
-    // a server that was restarted knows nobody who holds it
-    if (free && this.held && this.app.connection.connected) this.claim('claim');
+    // a server that was restarted, or not reached for long, knows nobody who holds it
+    if (this.held && this.free && this.app.connection.connected
+      && !this.app.liveness.whoIsSilent(this.question)
+      && performance.now() - this.claimedAt > RETRY_MS) this.claim('claim');
     if (this.mine) this.holderBefore = ''; // whoever holds it next has taken it over
     const other = this.otherHolder;
     if (this.held && other && other !== this.holderBefore) { // else it is not told yet
@@ -325,7 +336,7 @@ export class QuestionDetail {
     const silent = Boolean(now && !settled && this.silence.show());
     this.robotGone = this.howItWent();
     this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
-      gone: this.robotGone || '' });
+      gone: this.robotGone || '', silent });
     this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
     this.form.enable(mine && !sending && !settled && !silent);
     this.showTime();
