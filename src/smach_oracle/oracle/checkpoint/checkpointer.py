@@ -12,6 +12,7 @@ from ..branches.around import borders_around
 from ..branches.border import Border
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
+from ..places.place import Place
 from ..records.events import Event, EventKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
@@ -167,10 +168,12 @@ class Checkpointer:
         """Yield where the container stands after an event."""
         kind, label = event.kind, event.state
         if kind is EventKind.STATE_START:
-            yield fact_of(node.key, AT, [label, IN])
             path = '{}/{}'.format(node.key, label)
-            if isinstance(node.machine._states.get(label), smach.Container) and not any(
-                    _goes_on(each) for each in self._below(path)):
+            is_container = isinstance(node.machine._states.get(label), smach.Container)
+            below = self._below(path) if is_container else []
+            sent_to = [Place(each, each.entry).path for each in below if each.entry]
+            yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
+            if is_container and not any(_goes_on(each) for each in below):
                 yield from self._not_begun_below(path)
         elif kind is EventKind.CONTAINER_START and node is self._top and node.resuming is None:
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet

@@ -192,7 +192,7 @@ class _Setting:
             self._ask_at_beginning(node, stored, stored.label)
             return
         if node.branch is None:
-            node.resuming = EntryPoint(stored, _down_to(node, stored.jumped_to))
+            node.resuming = EntryPoint(stored, self._way_down(node, stored))
         record = node.record(stored.label)
         # a question of an earlier moment may have been answered since: it is asked again
         if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
@@ -216,6 +216,15 @@ class _Setting:
                 border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
         for each in inside:
             self._set(each)
+
+    def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[Place]:
+        """Return the rest of a jump: below, nothing has begun yet. Empty for no jump."""
+        tree, state = self._resumption.tree, '{}/{}/'.format(node.key, stored.label)
+        down = _down_to(node, stored.jumped_to)
+        # the jump led to the first item of an Iterator
+        has_begun = any(tree.container(place.node.key).phase for place in down) or any(
+            told.item > 1 for key, told in tree.containers.items() if (key + '/').startswith(state))
+        return () if stored.phase == IN and has_begun else down
 
     def _has_begun(self, path: str) -> bool:
         """Whether anything has run in a Concurrence or Iterator, in its present execution."""

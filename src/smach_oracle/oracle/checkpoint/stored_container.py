@@ -1,7 +1,7 @@
 """What a store says of one container at one moment."""
 from typing import Any, Dict, List, Mapping
 
-from smach_oracle.store.names import BEFORE, MOVED
+from smach_oracle.store.names import BEFORE, IN, MOVED
 
 from ..records.visits import Visit
 
@@ -50,8 +50,12 @@ class StoredContainer:
 
     @property
     def jumped_to(self) -> str:
-        """Path of the place to which a jump was under way, '' for none."""
-        return str(self.at[2] or '') if self.phase == BEFORE and len(self.at) > 2 else ''
+        """Path of the place below to which a jump was under way, '' for none.
+
+        Once a container below has begun, it knows better.
+        """
+        has_it = self.phase in (BEFORE, IN) and len(self.at) > 2
+        return str(self.at[2] or '') if has_it else ''
 
     @property
     def label(self) -> str:

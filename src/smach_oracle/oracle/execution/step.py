@@ -125,29 +125,32 @@ class Step:
             why_not = note_visit(node, record)
             if why_not:
                 return HeldBack(why_not)
-        node.emit(EventKind.STATE_START, state=record.label)
-        blocked = node.tree.workers.blocked(state) if node.abandoned else ''
-        if blocked:
-            return Overrun(blocked)
-        begun_s = time.monotonic()
-        outcome: object = None
-        for place in way_down:
+        for place in way_down:  # before STATE_START, with which a checkpoint stores it
             place.node.entry = place.label
         try:
-            if record.settings.time_limit_s is not None and node.tree.recover:
-                outcome = self._execute_limited(state, record.settings.time_limit_s)
-            elif entered_by_oracle:
-                outcome = WatchedVisit(node, record).execute(userdata)
-            else:
-                outcome = state.execute(userdata)
-            return outcome
+            node.emit(EventKind.STATE_START, state=record.label)
+            blocked = node.tree.workers.blocked(state) if node.abandoned else ''
+            if blocked:
+                return Overrun(blocked)
+            begun_s = time.monotonic()
+            outcome: object = None
+            try:
+                if record.settings.time_limit_s is not None and node.tree.recover:
+                    outcome = self._execute_limited(state, record.settings.time_limit_s)
+                elif entered_by_oracle:
+                    outcome = WatchedVisit(node, record).execute(userdata)
+                else:
+                    outcome = state.execute(userdata)
+                return outcome
+            finally:
+                took_s = time.monotonic() - begun_s
+                if took_s > (record.longest_s or 0.0) and not (
+                        isinstance(outcome, (Overrun, TakenOut))
+                        or self._machine._preempt_requested):
+                    record.longest_s = took_s
         finally:
             for place in way_down:
                 place.node.entry = ''
-            took_s = time.monotonic() - begun_s
-            if took_s > (record.longest_s or 0.0) and not (
-                    isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested):
-                record.longest_s = took_s
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
