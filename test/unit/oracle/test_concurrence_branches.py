@@ -285,6 +285,42 @@ def test_the_question_above_says_which_branches_run_again():
     assert (left.runs, right.runs) == (2, 2)
 
 
+def test_the_question_says_what_runs_again_if_a_single_branch_is_gone_to():
+    expert = FakeExpert(goto('LEFT', container='SM_ROOT/ALL'))
+    left, right = Scripted(), Scripted()
+    machine = inside(both(left, right), transitions={'done': 'AFTER'})
+    with machine:
+        smach.StateMachine.add('AFTER', Scripted('aborted'), {'ok': 'done'})
+    machine = Watched(machine, expert=expert, settings=ASKS)
+    assert machine.run() == 'done'
+    choices = {choice.state: choice for choice in expert.questions[0].choices}
+    assert choices['LEFT'].runs_again == ('LEFT', 'RIGHT')
+    assert (left.runs, right.runs) == (2, 2)
+
+
+def test_the_question_says_so_of_a_concurrence_in_an_iterator():
+    expert = FakeExpert(give_up())
+    iterator = smach.Iterator(outcomes=['done', 'aborted'], input_keys=[], output_keys=[],
+                              it=[1], it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('BOTH', both(Scripted(), Scripted()),
+                                           loop_outcomes=['done'])
+    machine = inside(iterator, transitions={'done': 'AFTER'})
+    with machine:
+        smach.StateMachine.add('AFTER', Scripted('aborted'), {'ok': 'done'})
+    Watched(machine, expert=expert, settings=ASKS).run()
+    choices = {choice.state: choice for choice in expert.questions[0].choices}
+    assert choices['RIGHT'].runs_again == ('LEFT', 'RIGHT')
+    assert choices['AFTER'].runs_again == ()
+
+
+def test_a_branch_that_is_tried_again_by_itself_says_of_no_other_that_it_runs_again():
+    expert = FakeExpert(give_up())
+    Watched(inside(both(Scripted('aborted'), Scripted())), expert=expert, settings=ASKS).run()
+    choices = {choice.state: choice for choice in expert.questions[0].choices}
+    assert choices['LEFT'].runs_again == ()
+
+
 @pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
 def test_an_error_of_a_branch_that_gives_up_is_that_of_the_bare_concurrence():
     bare = inside(both(Scripted(KeyError('lost')), Scripted()))

@@ -32,7 +32,8 @@ class StateChoice(NamedTuple):
     # themselves; its own label: going there repeats it
     repeats: Tuple[str, ...] = ()
     container: str = ''  # path of its container; '': that of the failed state
-    # of a Concurrence: the labels of its branches, which all run again
+    # of a Concurrence, and of what lies in one that is entered for it: the labels of its branches,
+    # which all run again
     runs_again: Tuple[str, ...] = ()
 
 

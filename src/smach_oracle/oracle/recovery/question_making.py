@@ -76,8 +76,7 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             label, 1.0 - record.rate, int(record.failure_class), record.visits,
             missing_on(way, () if way.left else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed_on(way), repeated_on(way), container,
-            running_again(way.down[-1].node, label))
+            why_closed_on(way), repeated_on(way), container, running_again(way))
 
 
 def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
