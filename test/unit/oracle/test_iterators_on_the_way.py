@@ -90,3 +90,16 @@ def test_an_item_that_was_given_up_and_passed_over_settles_no_failure_beside_it(
     assert machine.run() == 'done'
     assert [(event.state, event.outcome) for event in machine.of(EventKind.DECISION)] == [
         ('A', 'ask'), ('BOTH', 'revisit')]
+
+
+@pytest.mark.parametrize('back_to, told', [
+    ('FIRST', ['TOP/ALL: begins with its first item again: items 1 to 2 that had ended are '
+               'repeated']),
+    ('ALL', [])])
+def test_items_that_are_repeated_on_the_authors_way_are_told(log, back_to, told):
+    items = each_of(chain(A=Scripted('ok', 'ok', 'aborted')), 'item', (1, 2, 3))
+    machine = Watched(chain(FIRST=Scripted(), ALL=items), name='TOP', settings=ASKS,
+                      expert=FakeExpert(goto(back_to, container='TOP')))
+    assert machine.run() == 'done'
+    assert machine.visits().count('A') == (6 if told else 4)
+    assert [text for level, text in log if 'that had ended' in text] == told

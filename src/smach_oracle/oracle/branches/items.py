@@ -41,6 +41,13 @@ class TrackedItems:
             return 'item {}'.format(self.number)
         return 'item {} of {}'.format(self.number, count)
 
+    def tell_of_repeats(self) -> None:
+        """Say which items are done again, as it begins with the first one after it was left."""
+        done = self.number if self.is_finished else self.number - 1
+        if done:
+            self._tell('begins with its first item again: {} that had ended {} repeated'.format(
+                *(('item 1', 'is') if done == 1 else ('items 1 to {}'.format(done), 'are'))))
+
     def __iter__(self) -> 'TrackedItems':
         if self.goes_on and self.has_rest():
             self._go_on()
