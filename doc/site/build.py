@@ -25,7 +25,7 @@ API = [
      ['FailureRate', 'ExponentialFailureRate', 'FailureClass']),
     ('Errors', 'smach_oracle.oracle.errors',
      ['OracleError', 'SettingsError', 'AnswerError', 'OperatorError', 'InterfaceError',
-      'TrialError']),
+      'CheckpointError', 'TrialError']),
     ('Front ends', 'smach_oracle.expert.front_end', ['FrontEnd', 'wait_for_question']),
     ('Tests of your machines', 'smach_oracle.testing', []),
 ]
@@ -89,11 +89,14 @@ def write_sources(folder: Path, quick: bool) -> None:
     """Put all pages into one folder, with links that hold there."""
     shutil.rmtree(str(folder), ignore_errors=True)
     shutil.copytree(str(DOC / 'images'), str(folder / 'images'))
+    for table in DOC.glob('*.csv'):
+        shutil.copy(str(table), str(folder))
     readme = (ROOT / 'README.md').read_text(encoding='utf-8')
     readme = re.sub(r'((?:\]\(|src="))doc/', r'\1', readme)
     (folder / 'readme.md').write_text(readme.replace('](LICENSE)', '](../LICENSE)'), 'utf-8')
     for page in DOC.glob('*.md'):
         text = page.read_text(encoding='utf-8').replace('](../README.md', '](readme.md')
+        text = text.replace('```frozen\n', '```text\n')  # Pygments does not know the first
         (folder / page.name).write_text(text, 'utf-8')
     generated = [*interface_pages(ROOT), ('api.md', '# Python API\n' if quick else api_page()),
                  ('commands.md', '# Commands\n' if quick else commands_page())]
