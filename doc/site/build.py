@@ -110,11 +110,16 @@ def write_sources(folder: Path, quick: bool) -> None:
 
 
 def _copied(link: 're.Match[str]', folder: Path) -> str:
-    """The link to a file of the repository that is copied to the pages."""
-    target = folder / 'files' / link.group(2)
+    """The link to a file of the repository that is copied to the pages.
+
+    It gets another name: roslaunch looks for a launch file in all folders below the package, and
+    refuses one of which it finds two.
+    """
+    name = link.group(2) + '.txt'
+    target = folder / 'files' / name
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copy(str(ROOT / link.group(2)), str(target))
-    return '{}files/{})'.format(link.group(1), link.group(2))
+    shutil.copyfile(str(ROOT / link.group(2)), str(target))
+    return '{}files/{})'.format(link.group(1), name)
 
 
 def main() -> int:
