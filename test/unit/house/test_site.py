@@ -1,21 +1,70 @@
-"""The site's files do not get into the way of ROS."""
-import importlib.util
+"""The site: its table of contents, and the reference that is made from comments."""
 import sys
-from pathlib import Path
 
-SITE = Path(__file__).resolve().parents[3] / 'doc' / 'site'
+from house import ROOT
+
+sys.path.insert(0, str(ROOT / 'doc' / 'site'))
+import build
+import interfaces
+import theme
+
+MESSAGE = """# A wheel of a robot.
+# It turns.
+float64 speed    # rad/s,
+                 # positive forwards
+# where it is, in the frame of the base
+geometry_msgs/Point at
+bool is_stuck
+"""
 
 
-def test_a_launch_file_on_the_site_has_another_name(tmp_path, monkeypatch):
-    """Roslaunch looks in all folders of the package, and refuses one of which it finds two."""
-    monkeypatch.syspath_prepend(str(SITE))
-    spec = importlib.util.spec_from_file_location('site_build', str(SITE / 'build.py'))
-    build = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, 'site_build', build)
-    spec.loader.exec_module(build)
-    page = build.FILES.sub(lambda link: build._copied(link, tmp_path),
-                           'See [it](../launch/inspection.launch).')
-    assert page == 'See [it](files/launch/inspection.launch.txt).'
-    copy, = (path for path in tmp_path.rglob('*') if path.is_file())
-    assert copy.name == 'inspection.launch.txt'
-    assert copy.read_bytes() == (SITE.parents[1] / 'launch/inspection.launch').read_bytes()
+def test_comments_become_the_meaning_of_fields():
+    part = interfaces.read_part(MESSAGE)
+    assert part.about == 'A wheel of a robot. It turns.'
+    assert part.fields == [
+        ('float64', 'speed', 'rad/s, positive forwards'),
+        ('geometry_msgs/Point', 'at', 'where it is, in the frame of the base'),
+        ('bool', 'is_stuck', ''),
+    ]
+
+
+def test_every_message_service_and_action_is_in_the_reference():
+    pages = dict(interfaces.interface_pages(ROOT))
+    for name, folder in (('messages.md', 'msg'), ('services.md', 'srv'), ('actions.md', 'action')):
+        files = list((ROOT / folder).glob('*.' + folder))
+        assert files and all('\n## {}\n'.format(path.stem) in pages[name] for path in files)
+
+
+def test_every_page_is_in_the_table_of_contents():
+    index = (ROOT / 'doc/index.md').read_text(encoding='utf-8')
+    listed = [page for _, pages in build.sections(index) for page in pages]
+    there = {path.stem for path in (ROOT / 'doc').glob('*.md')} - {'index'}
+    assert sorted(listed) == sorted(there)
+    contents = build.contents(index).splitlines()
+    assert set(listed) | {'commands', 'messages', 'services', 'actions', 'api'} <= set(contents)
+
+
+def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
+    for name, text in (('styles/furo.css', '@import url(/javascript/normalize.css/normalize.css);\n'
+                        'p {margin: 1px}'), ('normalize.css', 'body {margin: 0}\n'),
+                       ('./scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
+                       ('./scripts/furo.js',
+                        'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(theme, 'NORMALIZE', tmp_path / 'normalize.css')
+    for _ in range(2):  # a second build finds them complete
+        theme.complete(tmp_path)
+        assert (tmp_path / 'styles/furo.css').read_text() == 'body {margin: 0}\np {margin: 1px}'
+        assert (tmp_path / './scripts/furo.js').read_text() == 'window.Gumshoe = 1;\nmain()'
+
+
+def test_a_link_into_the_repository_leads_to_a_copy(tmp_path):
+    build.write_sources(tmp_path / 'source', quick=True)
+    page = (tmp_path / 'source' / 'testing.md').read_text(encoding='utf-8')
+    assert '](files/examples/fetch_task.py.txt)' in page
+    assert (tmp_path / 'source' / 'files' / 'examples' / 'fetch_task.py.txt').is_file()
+    assert 'src="images/robot.png"' in (tmp_path / 'source' / 'readme.md').read_text('utf-8')
+    # roslaunch looks in all folders of a package, and refuses a launch file of which it finds two
+    assert (tmp_path / 'source' / 'files' / 'launch' / 'inspection.launch.txt').is_file()
+    assert not list(tmp_path.rglob('*.launch'))
