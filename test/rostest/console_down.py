@@ -1,10 +1,8 @@
 #!/usr/bin/env python3
 """A machine that was killed, on the console in a real browser: until it goes on."""
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import unittest
 
 import rospy
@@ -44,7 +42,7 @@ class DownTest(ConsolePage, unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.port = free_port()
-        cls.folder = tempfile.mkdtemp()
+        cls.folder = cls.make_folder()
         cls.store = os.path.join(cls.folder, 'robot.db')
         cls.console = cls.start_console('_stores:=' + cls.store)
         cls.browser = Browser(1360, 1000)
@@ -56,7 +54,6 @@ class DownTest(ConsolePage, unittest.TestCase):
     def tearDownClass(cls):
         cls.browser.close()
         cls.console.stop()
-        shutil.rmtree(cls.folder, ignore_errors=True)
 
     def test_a_killed_machine_is_shown_until_it_goes_on(self):
         browser, done = self.browser, os.path.join(self.folder, 'done')

@@ -90,7 +90,6 @@ class Node:
 class ConsolePage:
     """Beside unittest.TestCase."""
 
-    folders = ()  # that go when the class is done
 
     @classmethod
     def begin(cls, robot, *arguments, size=(), name='operator'):
@@ -123,14 +122,13 @@ class ConsolePage:
         cls.browser.close()
         cls.robot.stop()
         cls.console.stop()
-        for folder in cls.folders:
-            shutil.rmtree(folder, ignore_errors=True)
 
     @classmethod
     def make_folder(cls):
         """An empty one, for as long as the class runs."""
-        cls.folders += (tempfile.mkdtemp(),)
-        return cls.folders[-1]
+        folder = tempfile.mkdtemp()
+        cls.addClassCleanup(shutil.rmtree, folder, ignore_errors=True)
+        return folder
 
     @classmethod
     def start_console(cls, *more):

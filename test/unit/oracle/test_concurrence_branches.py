@@ -271,31 +271,27 @@ def test_an_iterator_in_a_concurrence_recovers_its_items():
     assert each.runs == 3
 
 
-def test_the_question_above_says_which_branches_run_again():
-    expert = FakeExpert(goto('ALL'))
+def both_again(expert):
+    """Run two branches, then a state that fails, from which the expert goes to them again."""
     left, right = Scripted(), Scripted()
     machine = inside(both(left, right), transitions={'done': 'AFTER'})
     with machine:
         smach.StateMachine.add('AFTER', Scripted('aborted'), {'ok': 'done'})
     machine = Watched(machine, expert=expert, settings=ASKS)
     assert machine.run() == 'done'
-    choices = {choice.state: choice for choice in expert.questions[0].choices}
-    assert choices['ALL'].runs_again == ('LEFT', 'RIGHT')
-    assert choices['AFTER'].runs_again == ()
     assert (left.runs, right.runs) == (2, 2)
+    return {choice.state: choice.runs_again for choice in expert.questions[0].choices}
+
+
+def test_the_question_above_says_which_branches_run_again():
+    again = both_again(FakeExpert(goto('ALL')))
+    assert again['ALL'] == ('LEFT', 'RIGHT')
+    assert again['AFTER'] == ()
 
 
 def test_the_question_says_what_runs_again_if_a_single_branch_is_gone_to():
-    expert = FakeExpert(goto('LEFT', container='SM_ROOT/ALL'))
-    left, right = Scripted(), Scripted()
-    machine = inside(both(left, right), transitions={'done': 'AFTER'})
-    with machine:
-        smach.StateMachine.add('AFTER', Scripted('aborted'), {'ok': 'done'})
-    machine = Watched(machine, expert=expert, settings=ASKS)
-    assert machine.run() == 'done'
-    choices = {choice.state: choice for choice in expert.questions[0].choices}
-    assert choices['LEFT'].runs_again == ('LEFT', 'RIGHT')
-    assert (left.runs, right.runs) == (2, 2)
+    again = both_again(FakeExpert(goto('LEFT', container='SM_ROOT/ALL')))
+    assert again['LEFT'] == ('LEFT', 'RIGHT')
 
 
 def test_the_question_says_so_of_a_concurrence_in_an_iterator():

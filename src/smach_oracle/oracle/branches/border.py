@@ -222,14 +222,13 @@ class IteratorBorder(Border):
         iterator = self.container
         items, trial_id = self._items, self._trial_now()
         inside = tuple(border.mark() for border in self._iterators_around())
-        is_again = (items is not None and items.given is iterator._items
-                    and (trial_id, inside) == (self._trial_id, self._inside))
-        may = self._is_asked_to_go_on and is_again
-        self._is_asked_to_go_on = False
         if items is None or items.given is not iterator._items:
             items = TrackedItems(iterator._items, self._tell)
-        self.goes_on = items.goes_on = may and items.has_rest()
-        if is_again and self._ended_with is None and items.has_rest() and not self.goes_on:
+        has_rest = (items.has_rest()
+                    and (trial_id, inside) == (self._trial_id, self._inside))
+        self.goes_on = items.goes_on = self._is_asked_to_go_on and has_rest
+        self._is_asked_to_go_on = False
+        if has_rest and self._ended_with is None and not self.goes_on:
             items.tell_of_repeats()
         items.begins_with = 1 if self._resumed is None else self._resumed.item
         if self.goes_on:

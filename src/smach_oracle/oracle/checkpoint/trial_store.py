@@ -2,7 +2,8 @@
 import os
 import sqlite3
 import time
-from typing import List, Optional, Set, Tuple
+from functools import partial
+from typing import Callable, List, Optional, Set, Tuple, TypeVar
 
 import smach
 from smach_oracle.store.errors import StoreError
@@ -31,6 +32,7 @@ from .structure import structure_of
 # what may be resumed: the program was stopped, and the task was not done
 _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
+_Read = TypeVar('_Read')
 RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
 
 
@@ -59,15 +61,7 @@ class TrialStore:
         :raises CheckpointError: where the store cannot be read or written.
         :raises SettingsError: for a moment to go on from that is none of the trial.
         """
-        try:
-            with understood(self._store.path):
-                return self._to_resume()
-        except (StoreError, sqlite3.Error) as err:
-            self._let_go()
-            raise _refused(err, self._top) from err
-        except BaseException:
-            self._let_go()
-            raise
+        return self._or_let_go(self._to_resume)
 
     def _to_resume(self) -> Optional[Resumption]:
         trials = self._store.trials(self._top.name)
@@ -138,7 +132,7 @@ class TrialStore:
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            self._go_on(resumed)
+            self._or_let_go(partial(go_on, top, resumed))
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
@@ -156,11 +150,12 @@ class TrialStore:
         return [fact_of('', STRUCTURE, self._structure.id),
                 fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
 
-    def _go_on(self, resumed: Resumption) -> None:
+    def _or_let_go(self, read: Callable[[], _Read]) -> _Read:
+        """Return what is read of the store; let go of it where that fails."""
         try:
             with understood(self._store.path):
-                go_on(self._top, resumed)
-        except StoreError as err:
+                return read()
+        except (StoreError, sqlite3.Error) as err:
             self._let_go()
             raise _refused(err, self._top) from err
         except BaseException:

@@ -129,29 +129,28 @@ def test_renamed_states_go_on_wherever_it_was_killed(folder):
         anew(folder)
 
 
-def test_what_has_moved_into_another_container_goes_on_there(folder):
-    names = {'B': 'IN/B', 'C': 'IN/C'}
-    for point in range(1, points_of(folder, flat_before)):  # at the last one it has ended
-        before, after = both_scripts(folder, flat_before, nested_after, resume_map=names)
+def told_at_each_point(folder, before_it, after_it, names):
+    """Yield what the changed script tells, killed before at each point but the last one."""
+    for point in range(1, points_of(folder, before_it)):  # at the last one it has ended
+        before, after = both_scripts(folder, before_it, after_it, resume_map=names)
         before.run(kill_at=point)
         told = after.run()
         assert told.get('outcome') == 'succeeded', (point, told)
         begun = after.diary.count('begins')
         assert sum(begun[name] > 1 for name in begun) <= 1 and max(begun.values()) <= 2, point
-        assert told['done'][-1] == 'D', point
+        yield point, told
         anew(folder)
+
+
+def test_what_has_moved_into_another_container_goes_on_there(folder):
+    names = {'B': 'IN/B', 'C': 'IN/C'}
+    for point, told in told_at_each_point(folder, flat_before, nested_after, names):
+        assert told['done'][-1] == 'D', point
 
 
 def test_what_has_moved_out_of_a_container_goes_on_there(folder):
     names = {'IN': 'B', 'IN/B': 'B', 'IN/C': 'C'}
-    for point in range(1, points_of(folder, nested_after)):  # at the last one it has ended
-        before, after = both_scripts(folder, nested_after, flat_before, resume_map=names)
-        before.run(kill_at=point)
-        told = after.run()
-        assert told.get('outcome') == 'succeeded', (point, told)
-        begun = after.diary.count('begins')
-        assert sum(begun[name] > 1 for name in begun) <= 1 and max(begun.values()) <= 2, point
-        anew(folder)
+    assert list(told_at_each_point(folder, nested_after, flat_before, names))
 
 
 def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
