@@ -62,4 +62,4 @@ def test_a_command_whose_reader_has_gone_ends_without_a_word(line, what_of_it):
 def test_catkins_own_tools_read_the_change_log():
     changes = get_changelog_from_path(str(ROOT))
     versions = [version for version, _, _ in changes.foreach_version()]
-    assert versions[0] == __version__ and changes.get_content_of_version(__version__)
+    assert versions[-1] == __version__ and changes.get_content_of_version(__version__)
