@@ -1,7 +1,12 @@
 """What is told where a Python package is missing. Pure."""
+import os
 import re
 import sys
+import sysconfig
 
+# as doc/install.md says it
+VENV = ('{} -m venv --system-site-packages ~/ros_venv && . ~/ros_venv/bin/activate && '
+        'python3 -m pip install ')
 # module: package, where it has another name
 _PACKAGES = {
     'cv2': 'opencv-python-headless', 'yaml': 'PyYAML', 'ruamel': 'ruamel.yaml',
@@ -29,7 +34,14 @@ def lacking(err: ImportError) -> str:
             'the ROS package {} cannot be imported ({}); build the workspace and source its '
             'setup.bash (in a '
             'checkout: scripts/setup && source scripts/ros_env)'.format(package, err))
-    return (
-        'the Python package {} cannot be imported ({}); install it: {} -m pip install {} (in a '
-        'checkout: '
-        'scripts/setup)'.format(package, err, sys.executable, _PACKAGES.get(package, package)))
+    return 'the Python package {} cannot be imported ({}); install it: {} (in a checkout: ' \
+        'scripts/setup)'.format(package, err, _how_to_install(_PACKAGES.get(package, package)))
+
+
+def _how_to_install(package: str) -> str:
+    """The command that installs a package of PyPI for this Python."""
+    marker = os.path.join(sysconfig.get_path('stdlib'), 'EXTERNALLY-MANAGED')
+    if sys.prefix == sys.base_prefix and os.path.exists(marker):
+        # pip would refuse: Debian 12, Ubuntu 24.04
+        return VENV.format(sys.executable) + package
+    return '{} -m pip install {}'.format(sys.executable, package)
