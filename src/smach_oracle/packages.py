@@ -1,8 +1,10 @@
-"""What is told where a Python package is missing. Pure."""
+"""What is told where a Python package is missing, and how a command does without one."""
 import os
 import re
 import sys
 import sysconfig
+from importlib import import_module
+from typing import Any
 
 # as doc/install.md says it
 VENV = ('{} -m venv --system-site-packages ~/ros_venv && . ~/ros_venv/bin/activate && '
@@ -15,6 +17,14 @@ _PACKAGES = {
 _OF_ROS = re.compile(r'(ros(?!bags)|smach|actionlib|genpy|tf2_|message_filters)\w*|\w+_(msgs|srvs)')
 _PYTHON = frozenset(getattr(sys, 'stdlib_module_names', ()))  # known from 3.10 on
 _BUILT = ('smach_oracle.msg', 'smach_oracle.srv')  # of our own, by catkin
+
+
+def optional(name: str) -> Any:
+    """The module of that name, or None where no such package is installed."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        return None
 
 
 def lacking(err: ImportError) -> str:
