@@ -37,7 +37,7 @@ def find_checks(group: str, upstream: Optional[Path], python: Optional[Path]) ->
     """The checks of one group, by name."""
     if python is not None:
         return pytest_checks(ROOT, 'unit', by_folder=True, python=str(python),
-                             env=interpreter.environment(ROOT, python))
+                             env=interpreter.environment(python))
     if group == 'upstream':
         return upstream_checks(ROOT, upstream) if upstream is not None else {}
     if group == 'lint':

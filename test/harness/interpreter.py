@@ -66,12 +66,7 @@ def make_venv(root: Path, python: Path) -> Path:
     return venv / 'bin' / 'python'
 
 
-def environment(root: Path, python: Path) -> Dict[str, str]:
+def environment(python: Path) -> Dict[str, str]:
     """Variables for the tests under the venv's `python`."""
-    built = root / 'build' / 'devel' / 'lib' / 'python3' / 'dist-packages'
-    noetic = '/opt/ros/noetic/lib/python3/dist-packages'
-    path = [str(built)] + ([noetic] if os.path.isdir(noetic) else [])
-    return {
-        'PYTHONPATH': os.pathsep.join(path), MAY_LACK: ' '.join(COMPILED),
-        'PATH': os.pathsep.join([str(python.parent), os.environ['PATH']])
-    }
+    path = os.pathsep.join([str(python.parent), os.environ['PATH']])
+    return {MAY_LACK: ' '.join(COMPILED), 'PATH': path}
