@@ -78,7 +78,7 @@ def sections(index: str) -> Iterator[Tuple[str, List[str]]]:
 
 def contents(index: str) -> str:
     """The site's table of contents, from the tables of the index."""
-    lines = ['', '```{toctree}', ':hidden:', 'readme', '```', '']
+    lines = ['', '```{toctree}', ':hidden:', 'readme', 'contributing', '```', '']
     for name, pages in sections(index):
         lines += ['```{toctree}', ':hidden:', ':caption: ' + name, *pages,
                   *GENERATED.get(name, []), '```', '']
@@ -91,9 +91,11 @@ def write_sources(folder: Path, quick: bool) -> None:
     shutil.copytree(str(DOC / 'images'), str(folder / 'images'))
     for table in DOC.glob('*.csv'):
         shutil.copy(str(table), str(folder))
-    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
-    readme = re.sub(r'((?:\]\(|src="))doc/', r'\1', readme)
-    (folder / 'readme.md').write_text(readme.replace('](LICENSE)', '](../LICENSE)'), 'utf-8')
+    for name in ('README.md', 'CONTRIBUTING.md'):
+        text = (ROOT / name).read_text(encoding='utf-8').replace('](LICENSE)', '](../LICENSE)')
+        text = re.sub(r'((?:\]\(|src="))doc/', r'\1', text)
+        (folder / name.lower()).write_text(
+            text.replace('](CONTRIBUTING.md)', '](contributing.md)'), 'utf-8')
     for page in DOC.glob('*.md'):
         text = page.read_text(encoding='utf-8').replace('](../README.md', '](readme.md')
         text = text.replace('```frozen\n', '```text\n')  # Pygments does not know the first

@@ -6,6 +6,7 @@ up on first use, so that `smach_oracle.analysis` needs neither ROS nor SMACH.
 from typing import Any
 
 __all__ = ['OracleContainer']
+__version__ = '0.2.0'  # as in package.xml
 
 
 def __getattr__(name: str) -> Any:

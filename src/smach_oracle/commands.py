@@ -1,18 +1,68 @@
 """How the commands in scripts/ start."""
+import io
 import os
 import sys
 from importlib import import_module
+from typing import NoReturn, TextIO
+
+from smach_oracle import __version__
 
 LACKING = 2  # exit code where a package is missing
+NO_READER = 141  # exit code where nobody reads the output any more, as a shell gives it for SIGPIPE
+# rooms whose commands print a result; the others have nodes, which go on without a reader of
+# their log
+PRINTING = ('analysis.', 'experiment.', 'store.', 'ros.disk.', 'simulation.rehearsal.')
+
+
+class _Printed(io.TextIOWrapper):
+    """Standard output or error of a command that prints.
+
+    Where it is a pipe whose reader has gone (`| head`), the process ends without a word.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        super().__init__(stream.buffer, stream.encoding, stream.errors,
+                         line_buffering=stream.isatty() or stream is sys.stderr)
+
+    def write(self, text: str) -> int:
+        """Write as usual.
+
+        :raises SystemExit: where nobody reads it any more.
+        """
+        try:
+            return super().write(text)
+        except BrokenPipeError:
+            self._end()
+
+    def flush(self) -> None:
+        """Flush as usual.
+
+        :raises SystemExit: where nobody reads it any more.
+        """
+        try:
+            super().flush()
+        except BrokenPipeError:
+            self._end()
+
+    def _end(self) -> NoReturn:
+        # what is left in the buffer is written at the end of the process
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+        raise SystemExit(NO_READER)
 
 
 def run(module: str) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
-    The process ends with the code that it returns.
+    The process ends with the code that it returns. `--version` alone prints the version.
 
     Where a package is missing that the module imports, one line says which, and what installs it.
     """
+    if sys.argv[1:] == ['--version']:
+        told = '{} of smach_oracle {}\n'.format(os.path.basename(sys.argv[0]), __version__)
+        sys.stdout.write(told)
+        return
+    if module.startswith(PRINTING):
+        sys.stdout, sys.stderr = _Printed(sys.stdout), _Printed(sys.stderr)
     try:
         main = import_module('smach_oracle.' + module).main
     except ImportError as err:
@@ -22,6 +72,10 @@ def run(module: str) -> None:
             raise
         sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), told))
         sys.exit(LACKING)
-    code = main()
+    try:
+        code = main()
+    finally:
+        if isinstance(sys.stdout, _Printed):
+            sys.stdout.flush()
     if code:
         sys.exit(code)

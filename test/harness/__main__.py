@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Dict, List, Optional
 
+import interpreter
 from checks import (
     Bench,
     Check,
@@ -32,8 +33,11 @@ ROOT = Path(__file__).resolve().parents[2]
 JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'upstream': 2, 'package': 1, 'bench': 1}
 
 
-def find_checks(group: str, upstream: Optional[Path]) -> Dict[str, Check]:
+def find_checks(group: str, upstream: Optional[Path], python: Optional[Path]) -> Dict[str, Check]:
     """The checks of one group, by name."""
+    if python is not None:
+        return pytest_checks(ROOT, 'unit', by_folder=True, python=str(python),
+                             env=interpreter.environment(python))
     if group == 'upstream':
         return upstream_checks(ROOT, upstream) if upstream is not None else {}
     if group == 'lint':
@@ -86,7 +90,19 @@ def parse_arguments() -> argparse.Namespace:
         '--upstream', metavar='PATH', type=Path,
         help='a checkout of ros/executive_smach, branch noetic-devel: the tests of the executive, '
         'of SMACH and of wrapped machines run on it too')
+    parser.add_argument(
+        '--python', metavar='PATH', type=Path,
+        help='run the unit tests under this interpreter, 3.8 or later, in a venv of its own '
+        '(.venv-X.Y.Z), made of requirements-noetic.txt and requirements-noetic-dev.txt')
     arguments = parser.parse_args()
+    if arguments.python is not None:
+        if arguments.group not in ('all', 'unit') or arguments.upstream is not None:
+            parser.error('--python runs the unit tests alone')
+        arguments.group = 'unit'
+        try:
+            arguments.python = interpreter.make_venv(ROOT, arguments.python)
+        except interpreter.InterpreterError as err:
+            parser.error('--python: {}'.format(err))
     if arguments.group == 'upstream' and arguments.upstream is None:
         parser.error('upstream needs --upstream PATH')
     if arguments.upstream is not None:
@@ -114,7 +130,8 @@ def main() -> int:
     outcomes: List[Outcome] = []
     try:
         for group in JOBS if arguments.group == 'all' else [arguments.group]:
-            checks = select(find_checks(group, arguments.upstream), arguments.pattern)
+            checks = select(find_checks(group, arguments.upstream, arguments.python),
+                            arguments.pattern)
             if checks:
                 print('--- {}'.format(group))
                 outcomes += run_group(checks, bench, arguments.jobs or JOBS[group])

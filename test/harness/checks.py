@@ -75,21 +75,25 @@ def _roslaunch_check() -> str:
     return os.path.join(rospkg.RosPack().get_path('roslaunch'), 'scripts', 'roslaunch-check')
 
 
-def pytest_checks(root: Path, folder: str, by_folder: bool) -> Dict[str, Check]:
-    """pytest on test/FOLDER, as one check or as one per folder and file in it."""
+def pytest_checks(root: Path, folder: str, by_folder: bool, python: str = sys.executable,
+                  env: Optional[Dict[str, str]] = None) -> Dict[str, Check]:
+    """pytest on test/FOLDER, as one check or as one per folder and file in it.
+
+    :param python: the interpreter that it runs under, with the variables `env`.
+    """
     top = root / 'test' / folder
     parts = sorted({path.relative_to(top).parts[0]
                     for path in top.rglob('test_*.py')}) if by_folder else ['']
     names = ['/'.join(filter(None, [folder, part])) for part in parts]
-    return {name: partial(_pytest, name) for name in names}
+    return {name: partial(_pytest, name, env=env, python=python) for name in names}
 
 
-def _pytest(name: str, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None
-            ) -> Outcome:
+def _pytest(name: str, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None,
+            python: str = sys.executable) -> Outcome:
     shown = shown or name
     result = bench.results / '{}.xml'.format(shown.replace('/', '-'))
     command = [
-        sys.executable, '-m', 'pytest', '-q', '--tb=short', '--junit-xml',
+        python, '-m', 'pytest', '-q', '--tb=short', '--junit-xml',
         str(result), 'test/' + name
     ]
     return _with_junit(bench.run(shown, command, 600.0, env), [result])

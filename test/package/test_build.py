@@ -111,44 +111,57 @@ def test_the_page_of_the_console_is_installed_whole(installed):
     assert len(names) > 40
 
 
+def test_no_file_of_ours_is_where_upstreams_belongs(installed):
+    prefix = installed / 'installed'
+    assert not [path for name in NAMES for path in prefix.rglob(name)
+                if 'share/smach_oracle/stand_ins' not in str(path)]
+    assert (prefix / 'share/smach_oracle/stand_ins/smach_msgs/share/smach_msgs/msg').is_dir()
+
+
+def test_upstream_may_come_after_the_installation_and_go_again(installed, tmp_path):
+    setup = str(installed / 'installed/setup.bash')
+    for name in NAMES:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / '__init__.py').write_text('')
+    assert 'stand_ins' in run(WHERE, tmp_path, setup)
+    come = 'export PYTHONPATH="$PYTHONPATH:{}"; source "{}"; '.format(tmp_path, setup)
+    names = 'import smach, smach_ros, smach_msgs, control_msgs; print(smach.__file__)'
+    told = run(come + 'python3 -c "{}"; echo $PYTHONPATH $ROS_PACKAGE_PATH'.format(names),
+               tmp_path, setup)
+    assert str(tmp_path / 'smach') in told and 'stand_ins' not in told
+
+
 def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     copy_sources(tmp_path / 'src/smach_oracle')
     for name in NAMES:
         fake_upstream(tmp_path / 'src', name)
-    output = run('catkin_make {}'.format(PYTHON), tmp_path)
-    assert output.count("upstream's is used, from this workspace") == len(NAMES)
+    run('catkin_make {}'.format(PYTHON), tmp_path)
     where = run(WHERE, tmp_path, str(tmp_path / 'devel/setup.bash'))
     assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
+    assert 'stand_ins' not in where
     check = ('import smach_oracle, smach, smach_ros, smach_msgs; '
              'print(smach.upstream, smach_ros.upstream)')
     assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path,
                               str(tmp_path / 'devel/setup.bash'))
 
 
-def test_an_isolated_workspace_builds_upstream_first_and_uses_it(tmp_path):
+def test_an_isolated_workspace_takes_of_ours_what_it_lacks(tmp_path):
     copy_sources(tmp_path / 'src/smach_oracle')
     fake_upstream(tmp_path / 'src', 'smach')
-    output = run('catkin_make_isolated --cmake-args {}'.format(PYTHON), tmp_path)
-    assert "smach: upstream's is used" in output
-    assert "smach_ros: upstream's is absent, ours stands in" in output
-    check = 'import smach_oracle, smach; print(smach.upstream)'
-    assert 'True' in run('python3 -c "{}"'.format(check), tmp_path,
-                         str(tmp_path / 'devel_isolated/setup.bash'))
+    run('catkin_make_isolated --cmake-args {}'.format(PYTHON), tmp_path)
+    check = 'import smach_oracle, smach, control_msgs; ' \
+            'print(smach.upstream, control_msgs.__file__)'
+    told = run('python3 -c "{}"'.format(check), tmp_path,
+               str(tmp_path / 'devel_isolated/setup.bash'))
+    assert 'True' in told and 'stand_ins/control_msgs' in told
 
 
-def test_our_stand_ins_go_when_upstream_comes(tmp_path):
+def test_what_release_0_1_staged_among_upstreams_is_taken_away(tmp_path):
     sources = copy_sources(tmp_path / 'smach_oracle')
     build = sources / 'build'
-    build.mkdir()
-    python = list(NAMES)
-    assert run('cmake .. {}'.format(PYTHON), build).count('ours stands in') == len(python)
-    assert run('cmake .. {}'.format(PYTHON), build).count('ours stands in') == len(python)
-    for name in NAMES:
-        (tmp_path / 'upstream' / name).mkdir(parents=True)
-        (tmp_path / 'upstream' / name / '__init__.py').write_text('')
-    output = run('PYTHONPATH="{}" cmake .. {}'.format(tmp_path / 'upstream', PYTHON), build)
-    assert output.count("upstream's is used") == len(python)
-    assert not [
-        path for name in NAMES
-        for path in (build / 'devel').glob('lib/python3/dist-packages/' + name)
-    ]
+    old = build / 'devel/lib/python3/dist-packages/smach'
+    old.mkdir(parents=True)
+    (old / '__init__.py').write_text('# Written by CMake. Relays from the devel space')
+    (old / '.smach_oracle_stand_in').write_text('')
+    run('cmake .. {}'.format(PYTHON), build)
+    assert not old.exists()

@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = ('.git', '.venv', 'build', '.build', 'trials', '__pycache__', '*.pyc', '.*_cache')
+LEFT_OUT = ('.git', '.venv*', 'build', '.build', 'trials', '__pycache__', '*.pyc', '.*_cache')
 UPSTREAM_CMAKE = '''cmake_minimum_required(VERSION 3.5)
 project({0})
 find_package(catkin REQUIRED)

@@ -2,8 +2,9 @@
 
 A bag that cannot be used is skipped and named, and the exit code is 1.
 """
+import json
 import sys
-from typing import Iterator, List, Sequence, Tuple, Union
+from typing import Dict, Iterator, List, Mapping, Sequence, Tuple, Union
 
 from smach_oracle.packages import lacking
 
@@ -36,6 +37,21 @@ def report_skipped(skipped: Sequence[SkippedBag]) -> int:
     for item in skipped:
         sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
     return SOME_SKIPPED if skipped else ALL_READ
+
+
+def plain(skipped: Sequence[SkippedBag]) -> List[Dict[str, str]]:
+    """What was skipped, for JSON."""
+    return [item._asdict() for item in skipped]
+
+
+def write_json(path: str, data: Mapping[str, object]) -> None:
+    """Write the result of a command to a file.
+
+    :raises OSError: where the file cannot be written.
+    """
+    with open(path, 'w', encoding='utf-8') as target:
+        json.dump(data, target, indent=2)
+        target.write('\n')
 
 
 def report_error(command: str, why: Union[str, Exception]) -> int:

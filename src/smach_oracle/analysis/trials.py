@@ -113,3 +113,27 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
         failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
         settings=counter.settings, unwell_s=counter.unwell_s,
         resumed=counter.resumed, down_s=counter.down_s)
+
+
+def load_replicates(places: Sequence[str],
+                    skipped: List[SkippedBag]) -> Dict[str, List[List[Event]]]:
+    """The trials with an oracle, by the folder they were recorded in, in order.
+
+    Bags that cannot be used go to `skipped`.
+
+    :raises BagError: where there are none, or no folder.
+    """
+    found: Dict[str, List[List[Event]]] = {}
+    for path, content in read_bags(places, skipped):
+        trials: Dict[str, List[Event]] = {}
+        for event in content.events:
+            trials.setdefault(event.trial_id, []).append(event)
+        for events in trials.values():
+            summary = summarise(events, (path,))
+            if summary.recovers and not summary.lost_events:
+                found.setdefault(summary.replicate,
+                                 []).append(sorted(events, key=lambda event: event.seq))
+    return {
+        folder: sorted(trials, key=lambda events: events[0].wall_time)
+        for folder, trials in found.items()
+    }

@@ -36,8 +36,8 @@ from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
-from .reading import read_bags, report_error, report_skipped
-from .trials import summarise
+from .reading import plain, report_error, report_skipped, write_json
+from .trials import load_replicates, summarise
 
 ENOUGH_VISITS = 50
 SAME, NOT_KNOWN = 'same', 'not known'
@@ -319,30 +319,6 @@ def _outcome(recorded: str, tried: str) -> str:
     return 'would recover' if recorded in _STAYS else 'recovers otherwise'
 
 
-def load_replicates(places: Sequence[str],
-                    skipped: List[SkippedBag]) -> Dict[str, List[List[Event]]]:
-    """The trials with an oracle, by the folder they were recorded in, in order.
-
-    Bags that cannot be used go to `skipped`.
-
-    :raises BagError: where there are none, or no folder.
-    """
-    found: Dict[str, List[List[Event]]] = {}
-    for path, content in read_bags(places, skipped):
-        trials: Dict[str, List[Event]] = {}
-        for event in content.events:
-            trials.setdefault(event.trial_id, []).append(event)
-        for events in trials.values():
-            summary = summarise(events, (path,))
-            if summary.recovers and not summary.lost_events:
-                found.setdefault(summary.replicate,
-                                 []).append(sorted(events, key=lambda event: event.seq))
-    return {
-        folder: sorted(trials, key=lambda events: events[0].wall_time)
-        for folder, trials in found.items()
-    }
-
-
 def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
     """A line for each oracle that was tried."""
     names = [
@@ -362,6 +338,15 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
+    """The table of a folder as plain data, with the decisions counted by what became of them."""
+    return {'folder': folder, 'tried': [{
+        'settings': row.settings, 'decisions': sum(row.counts.values()),
+        'outcomes': {name: row.counts[name] for name in OUTCOMES + (GIVES_UP,)},
+        'trials': row.trials, 'trials_with_another': row.other_trials
+    } for row in rows]}
+
+
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
@@ -373,14 +358,17 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     for name in ('moderate_from', 'high_from', 'prior'):
         parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X',
                             help='values to try')
+    parser.add_argument('--json', metavar='OUT', type=path_of,
+                        help='write the tables and what was skipped as JSON')
     args = parser.parse_args(argv)
-    varied = {name: values for name, values in vars(args).items() if name != 'folders' and values}
+    varied = {name: values for name, values in vars(args).items()
+              if name not in ('folders', 'json') and values}
     skipped: List[SkippedBag] = []
     try:
         replicates = load_replicates(args.folders, skipped)
     except (BagError, ImportError) as err:
         return report_error('what_if', err)
-    replayed = 0
+    replayed = []
     for folder, trials in sorted(replicates.items()):
         try:
             rows = [
@@ -391,8 +379,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             skipped.append(SkippedBag(folder, str(err)))
         else:
             sys.stdout.write('{}\n{}'.format(folder, format_tried_settings(rows)))
-            replayed += 1
+            replayed.append(as_data(folder, rows))
     code = report_skipped(skipped)
+    if args.json:
+        try:
+            write_json(args.json, {'folders': replayed, 'skipped': plain(skipped)})
+        except OSError as err:
+            return report_error('what_if', '{}: {}'.format(args.json, err.strerror))
     if not replayed:
         return report_error('what_if', '{}: no trials with an oracle that could be replayed'.format(
             ', '.join(args.folders)))

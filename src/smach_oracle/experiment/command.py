@@ -131,9 +131,15 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def parse(argv: Optional[List[str]]) -> argparse.Namespace:
-    """Parse the command line; `args.plan` is the experiment. A wrong one ends the process."""
+    """Parse the command line; `args.plan` is the experiment.
+
+    A wrong one ends the process, and so does an empty one.
+    """
     parser = make_parser()
-    args = parser.parse_args(argv)
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        parser.error('name what to run: --task {}, for example'.format(DEFAULT_TASK))
+    args = parser.parse_args(given)
     task = args.task or DEFAULT_TASK
     trials = TASKS[task][1] if args.trials is None else args.trials
     replicates = 1 if args.replicates is None else args.replicates

@@ -1,4 +1,5 @@
 """What another oracle would have decided: replayed from the events of real machines."""
+import json
 import random
 
 import pytest
@@ -206,6 +207,30 @@ def test_the_command(tmp_path, capsys):
     assert row.split()[4] == row.split()[5] and row.endswith('   0 of 40'), 'as recorded'
     assert what_if.main([str(tmp_path / 'nowhere')]) == 2
     assert 'no such folder' in capsys.readouterr().err
+
+
+def test_the_tables_as_json_are_those_that_are_printed(tmp_path, capsys):
+    record(tmp_path / 'bags', run(40))
+    capsys.readouterr()
+    assert what_if.main([str(tmp_path / 'bags'), '--memory', '1', '10', '--json',
+                         str(tmp_path / 'out.json')]) == 0
+    lines = capsys.readouterr().out.splitlines()[2:]
+    told = json.loads((tmp_path / 'out.json').read_text())
+    folder, = told['folders']
+    assert folder['folder'] == str(tmp_path / 'bags') and told['skipped'] == []
+    assert [each['settings'] for each in folder['tried']] == [{'memory': 1}, {'memory': 10}]
+    for line, tried in zip(lines, folder['tried']):
+        numbers = [int(word) for word in line.split()[2:] if word.isdigit()]
+        shown = [tried['outcomes'][name] for name in what_if.OUTCOMES]
+        assert numbers == [tried['decisions'], *shown, tried['trials_with_another'],
+                           tried['trials']]
+
+
+def test_json_that_cannot_be_written_is_told_in_one_line(tmp_path, capsys):
+    record(tmp_path, run(3))
+    capsys.readouterr()
+    assert what_if.main([str(tmp_path), '--json', str(tmp_path / 'no' / 'out.json')]) == 2
+    assert 'no/out.json: No such file' in capsys.readouterr().err
 
 
 def tried_under(recorded, settings):

@@ -15,7 +15,7 @@ import pytest
 
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.experiment import launching
-from smach_oracle.experiment.command import parse
+from smach_oracle.experiment.command import main, parse
 from smach_oracle.experiment.launching import MARK, end_marked, environment_of, free_port, marked
 from smach_oracle.experiment.plan import ExperimentError, enter_folder
 from smach_oracle.experiment.pool import alone_in, stop_all
@@ -146,10 +146,10 @@ def test_a_folder_goes_on_with_its_own_settings_alone(tmp_path: Path) -> None:
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / 'old.bag').touch()
     with pytest.raises(ExperimentError, match='not empty'):
-        enter_folder(tmp_path, parse([]).plan)
+        enter_folder(tmp_path, parse(['--trials', '300']).plan)
     (tmp_path / 'experiment.json').write_text('{"format": 1}')
     with pytest.raises(ExperimentError, match='no settings of an experiment'):
-        enter_folder(tmp_path, parse([]).plan)
+        enter_folder(tmp_path, parse(['--trials', '300']).plan)
 
 
 def test_two_runs_do_not_work_in_one_folder(tmp_path: Path) -> None:
@@ -308,3 +308,13 @@ input()
             process.kill()
             process.communicate()
     assert end_marked('/a') == 0
+
+
+def test_without_arguments_it_says_how_it_is_used_and_runs_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr('sys.argv', ['run_trials'])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capsys.readouterr().err
+    assert ended.value.code == 2 and told.startswith('usage: run_trials')
+    assert 'name what to run' in told and not list(tmp_path.iterdir())

@@ -12,7 +12,7 @@ import pytest
 from house import ROOT, shown
 
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
-DOCUMENTS = [ROOT / 'README.md'] + sorted((ROOT / 'doc').glob('**/*.md'))
+DOCUMENTS = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md'] + sorted((ROOT / 'doc').glob('**/*.md'))
 OURS = {'scripts', 'rosrun', 'roslaunch'}
 
 

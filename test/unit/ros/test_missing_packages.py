@@ -75,6 +75,20 @@ def test_packages_have_the_names_that_install_them(name, words):
     assert words in lacking(ModuleNotFoundError('No module named {!r}'.format(name), name=name))
 
 
+@pytest.mark.parametrize('managed, in_venv, first', [
+    (True, False, '-m venv --system-site-packages ~/ros_venv && . ~/ros_venv/bin/activate && '),
+    (True, True, '-m pip install rosbags'), (False, False, '-m pip install rosbags')
+])
+def test_where_pip_refuses_the_line_makes_a_venv_first(monkeypatch, tmp_path, managed, in_venv,
+                                                       first):
+    monkeypatch.setattr('sysconfig.get_path', lambda _name: str(tmp_path))
+    if managed:
+        (tmp_path / 'EXTERNALLY-MANAGED').touch()
+    monkeypatch.setattr(sys, 'prefix', '/venv' if in_venv else sys.base_prefix)
+    told = lacking(ModuleNotFoundError('no', name='rosbags'))
+    assert first in told and told.endswith('pip install rosbags (in a checkout: scripts/setup)')
+
+
 @pytest.mark.parametrize('err', [
     ModuleNotFoundError('broken', name='smach_oracle.oracle.nothing'),
     ModuleNotFoundError('broken'),

@@ -13,7 +13,7 @@ import tornado.netutil
 import tornado.web
 
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.command_line import init_beside_others, parameters_only
 from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
@@ -32,6 +32,7 @@ from .page_socket import OpenPages, PageSocket
 from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
 from .robots.machine_hand import MachineHand
+from .sensors.images import NO_PICTURES, cv2
 from .sensors.question_images import ImageStore, QuestionImages
 from .sensors.robot_clocks import ImageAges, RobotClocks
 from .sensors.sample_handlers import RobotAppearanceHandler, SampleHandler, SensorRequests
@@ -224,7 +225,7 @@ def main() -> None:
         '~cameras; '
         'see doc/console.md.'
     )
-    rospy.init_node('expert_console')
+    init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()
     try:
@@ -232,5 +233,7 @@ def main() -> None:
     except SettingsError as err:
         rospy.logfatal('%s', err)
         raise SystemExit(2) from err
+    if cv2 is None:
+        rospy.logwarn('%s', NO_PICTURES)
     rospy.loginfo('The operator console is at %s', console.url)
     console.run()

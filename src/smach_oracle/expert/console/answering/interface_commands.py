@@ -5,7 +5,6 @@ The interface is found by the action that the question names, and must be one of
 import base64
 from typing import Any, Callable, Dict, List, Mapping
 
-import cv2
 import numpy as np
 from geometry_msgs.msg import Point32, Polygon
 from sensor_msgs.msg import PointCloud2
@@ -29,6 +28,7 @@ from ...followed_server import ListedQuestion
 from ..commands.commands import CommandReply, PageCommand
 from ..commands.marking import FRESH
 from ..sensors.clouds import Cloud, CloudError, encode_points, thinned
+from ..sensors.images import cv2
 from ..web.audit import Person
 from .interface_actions import action_of
 from .question_commands import CommandWorker, items
@@ -137,8 +137,10 @@ def _points(message: PointCloud2) -> Dict[str, Any]:
 def outlines(mask: np.ndarray) -> List[List[int]]:
     """Outlines of a mask (h, w) uint8 where it is not 0, those of holes among them.
 
-    :returns: closed lines x, y, x, y, ... in px.
+    :returns: closed lines x, y, x, y, ... in px; none where OpenCV is missing.
     """
+    if cv2 is None:
+        return []
     found, _ = cv2.findContours(np.ascontiguousarray(mask), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     lines: List[List[int]] = []
     for line in sorted(found, key=len, reverse=True):

@@ -10,19 +10,22 @@ from typing import Any, Dict, List, NamedTuple, Union
 # before cv2 is there: small files of huge images
 os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2 ** 26))
 
-import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
 
+from smach_oracle.packages import optional  # noqa: E402
 from smach_oracle.ros.images import ImageError, colour_of, depth_of  # noqa: E402
 
+cv2 = optional('cv2')  # without it the page has everything but pictures
+NO_PICTURES = ('OpenCV is missing, so the console shows no pictures; install python3-opencv, or '
+               'opencv-python-headless by pip, and start the console again')
 WIDTHS = (320, 640, 1280)  # px that a browser may ask for
 MOST_BYTES = 2 ** 26  # of a message
 MOST_PIXELS = 2 ** 26
 JPEG_QUALITY = 88
 _DEPTHS = ('32FC1', '16UC1', 'mono16')
-_BAYER = {'bayer_rggb8': cv2.COLOR_BayerBG2RGB, 'bayer_bggr8': cv2.COLOR_BayerRG2RGB,
-          'bayer_gbrg8': cv2.COLOR_BayerGR2RGB, 'bayer_grbg8': cv2.COLOR_BayerGB2RGB}
+_BAYER = {'bayer_rggb8': 'COLOR_BayerBG2RGB', 'bayer_bggr8': 'COLOR_BayerRG2RGB',
+          'bayer_gbrg8': 'COLOR_BayerGR2RGB', 'bayer_grbg8': 'COLOR_BayerGB2RGB'}
 _DEPTH_HEADER = struct.Struct('<iff')  # compressed_depth_image_transport: format, quantisation
 
 
@@ -39,8 +42,10 @@ def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserF
 
     Its facts: `size` of the original in px, `range` in m of a depth image.
 
-    :raises ImageError: for what is no image, or too large a one.
+    :raises ImageError: for what is no image, or too large a one, and where OpenCV is missing.
     """
+    if cv2 is None:
+        raise ImageError(NO_PICTURES)
     if len(message.data) > MOST_BYTES:
         raise ImageError('the image has {} bytes; allowed: {}'.format(len(message.data),
                                                                       MOST_BYTES))
@@ -57,8 +62,8 @@ def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserF
         mosaic = colour_of(
             Image(height=message.height, width=message.width, step=message.step, data=message.data,
                   encoding='mono8'))[:, :, 0]
-        return _colour_file(cv2.cvtColor(np.ascontiguousarray(mosaic), _BAYER[message.encoding]),
-                            width)
+        return _colour_file(cv2.cvtColor(np.ascontiguousarray(mosaic),
+                                         getattr(cv2, _BAYER[message.encoding])), width)
     return _colour_file(colour_of(message), width)
 
 
