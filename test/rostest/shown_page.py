@@ -6,8 +6,8 @@ and some of the lines that they print. A comment above a block says what is spec
 * `test: this command goes on while the next ones run`. Later, above what it has printed since,
   `test: what the command that goes on has printed`.
 * `test: this command goes on until the end` of the page.
-* `test: type "A", at "PROMPT" "B", "C"`: what a person types at the block's prompt, at a later one,
-  and after what the next block shows.
+* `test: type "A", at "PROMPT" "B", after "TEXT" "C", "D"`: what a person types at the block's
+  prompt, at a later one, when any command has printed TEXT, and after what the next block shows.
 * `test: put above the last line of FILE`.
 """
 import os
@@ -27,6 +27,7 @@ LIMIT_S = 60.0
 DONE_BEFORE = {'scripts/setup', 'source scripts/ros_env', 'roscore', 'mkdir ~/fetch', 'cd ~/fetch'}
 # a file with its name in the line above, or what is typed and shown, with what is special there
 BLOCK = re.compile(r'(?:`(\S+)`:\n\n|<!-- test: (.*?) -->\n\n)?^```(\w+)\n(.*?)^```$', re.M | re.S)
+TYPED = re.compile(r'(?:(at|after) "(.*?)" )?"(.*?)"')
 CONTROL = re.compile(r'\x1b\[[0-9;?]*[A-Za-z]|[\r╭╮╰╯│─█░]')
 # times, ids, names of people, and which of several robots is the first
 CHANGING = re.compile(
@@ -160,7 +161,7 @@ class ShownPage:
         program = Program(command, self.folder)
         self.programs.append(program)
         if note.startswith('type'):
-            self.latest, self.typed = program, re.findall(r'(?:at "(.*?)" )?"(.*?)"', note)
+            self.latest, self.typed = program, TYPED.findall(note)
             before, prompt = shown.rstrip().rsplit('\n', 1)
             program.wait_for(before)
             program.wait_for(prompt[:prompt.rindex(':') + 1])
@@ -173,12 +174,23 @@ class ShownPage:
 
     def answer(self, shown):
         """Type what the page says, and see what it shows then."""
-        for prompt, line in self.typed[:-1]:
-            self.latest.wait_for(prompt)
+        for when, text, line in self.typed[:-1]:
+            self.wait_until(when, text)
             self.latest.type(line)
         self.latest.wait_for(shown)
-        self.latest.type(self.typed[-1][1])
+        self.latest.type(self.typed[-1][-1])
         self.latest.end_well()
+
+    def wait_until(self, when, text):
+        """Wait for a prompt of the latest command, or until any command has printed a text."""
+        if when != 'after':
+            self.latest.wait_for(text)
+            return
+        deadline = time.monotonic() + LIMIT_S
+        while not any(text in plain(program.text) for program in self.programs):
+            assert time.monotonic() < deadline, 'no command prints: ' + text
+            for program in self.programs:
+                program.read()
 
     def close(self):
         """Stop what still runs, and remove the folder."""
