@@ -32,7 +32,8 @@ ARROWS: Dict[str, Set[str]] = {
     'testing': {'oracle.OracleContainer', 'oracle.asking', 'oracle.background', 'oracle.errors',
                 'oracle.oracle_of', 'oracle.records', 'oracle.settings', 'oracle.unwrap', 'ros'},
     '__init__': {'oracle.OracleContainer', 'ros.container'},
-    'commands': {'packages'},  # it starts modules of the rooms by their names
+    'commands': {'documentation', 'packages'},  # it starts modules of the rooms by their names
+    'documentation': set(),
     'packages': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
