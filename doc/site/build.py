@@ -14,6 +14,8 @@ from typing import Iterator, List, Tuple
 import theme
 from interfaces import interface_pages
 
+from smach_oracle.documentation import PAGES
+
 ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / 'doc'
 GENERATED = {'Reference': ['commands', 'messages', 'services', 'actions', 'api']}
@@ -50,7 +52,7 @@ def help_of(script: Path) -> str:
     """What a command prints at --help."""
     run = subprocess.run([sys.executable, str(script), '--help'], stdout=subprocess.PIPE,
                          stderr=subprocess.STDOUT, check=False, timeout=120)
-    text = run.stdout.decode()
+    text = re.sub(r'\nMore: .*\n', '', run.stdout.decode())  # the page below, by a path of here
     if run.returncode:
         raise SystemExit('{} --help ends with exit code {}:\n{}'.format(script, run.returncode,
                                                                         text))
@@ -66,7 +68,9 @@ def commands_page() -> str:
     lines = ['# Commands', '', 'Run them with `rosrun smach_oracle NAME`. `--help` prints this.',
              '']
     for script, text in zip(scripts, helps):
-        lines += ['## ' + script.name, '', '```text', text.rstrip(), '```', '']
+        page = PAGES[script.name] + '.md'
+        lines += ['## ' + script.name, '', '```text', text.rstrip(), '```', '',
+                  'More: [{0}]({0})'.format(page), '']
     return '\n'.join(lines)
 
 

@@ -2,11 +2,14 @@
 import io
 import os
 import sys
+from contextlib import contextmanager
 from importlib import import_module
-from typing import NoReturn, TextIO
+from typing import Iterator, NoReturn, TextIO
 
 from smach_oracle import __version__
+from smach_oracle.documentation import page_of
 
+HELP = (['-h'], ['--help'])
 LACKING = 2  # exit code where a package is missing
 NO_READER = 141  # exit code where nobody reads the output any more, as a shell gives it for SIGPIPE
 # rooms whose commands print a result; the others have nodes, which go on without a reader of
@@ -53,7 +56,8 @@ class _Printed(io.TextIOWrapper):
 def run(module: str) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
-    The process ends with the code that it returns. `--version` alone prints the version.
+    The process ends with the code that it returns. `--version` alone prints the version. Below its
+    --help is the page that has more.
 
     Where a package is missing that the module imports, one line says which, and what installs it.
     """
@@ -73,9 +77,22 @@ def run(module: str) -> None:
         sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), told))
         sys.exit(LACKING)
     try:
-        code = main()
+        with _page_below_the_help():
+            code = main()
     finally:
         if isinstance(sys.stdout, _Printed):
             sys.stdout.flush()
     if code:
         sys.exit(code)
+
+
+@contextmanager
+def _page_below_the_help() -> Iterator[None]:
+    """Say below what --help prints which page has more. A script's own --help has no such line."""
+    try:
+        yield
+    except SystemExit as end:
+        page = page_of(os.path.basename(sys.argv[0])) if sys.argv[1:2] in HELP else None
+        if page is not None and not end.code:
+            print('\nMore: {}'.format(page))
+        raise

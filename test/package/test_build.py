@@ -1,6 +1,8 @@
 """The package builds alone and in catkin workspaces, installs, runs where it was installed, and
 yields to upstream.
 """
+import re
+
 import pytest
 from workspace import PYTHON, copy_sources, fake_upstream, run
 
@@ -63,6 +65,18 @@ def test_every_command_is_installed_for_rosrun(installed):
     commands = {path.name for path in (installed / 'moved_away/scripts').iterdir()
                 if path.read_text().startswith('#!/usr/bin/env python3')}
     assert commands == {path.name for path in (installed / 'installed/lib/smach_oracle').iterdir()}
+
+
+def test_help_points_to_a_page_that_is_installed_with_all_that_it_links_to(installed):
+    share = installed / 'installed/share/smach_oracle'
+    shown = in_installed(installed, 'rosrun smach_oracle oracle_disk --help')
+    assert shown.splitlines()[-1] == 'More: {}'.format(share / 'doc/recording.md')
+    for page in (share / 'doc').glob('*.md'):
+        text = re.sub(r'^```.*?^```', '', page.read_text(encoding='utf-8'),
+                      flags=re.MULTILINE | re.DOTALL)
+        links = [link.split('#')[0] for link in re.findall(r'\]\(([^)\s]+)\)', text)
+                 if '://' not in link]
+        assert not [link for link in links if not (page.parent / link).exists()], page
 
 
 def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):

@@ -43,8 +43,8 @@ sys.exit(machine.execute() != 'succeeded')
 
 def documented():
     """The files that the page has for `my_robot`, by name."""
-    with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'expert.md'),
-              encoding='utf-8') as page:
+    with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc',
+                           'own_rostest.md'), encoding='utf-8') as page:
         return dict(re.findall(r'^`(test/\S+)`[^\n]*\n\n```\w+\n(.*?)```', page.read(),
                                re.M | re.S))
 

@@ -27,17 +27,17 @@ from smach_oracle.ros.expert.client import ExpertQueryClient
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import FinishInterface, FinishInterfaceRequest
 
-PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'shared_autonomy.md')
-LAUNCH = '<launch><node pkg="my_robot" type="by_hand.py" name="by_hand" output="screen"/></launch>'
+PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'own_interface.md')
+LAUNCH = ('<launch><node pkg="my_robot" type="my_interface.py" name="by_hand" output="screen"/>'
+          '</launch>')
 BROKEN = '#!/bin/sh\necho it has no camera >&2\nexit 5\n'
 IDLE = '#!/bin/sh\nexec sleep 600\n'
 
 
 def blocks(language):
-    """The fenced blocks of a language on the page, in the section of the example."""
+    """The fenced blocks of a language on the page."""
     with open(PAGE) as file:
-        section = file.read().split('## An interface of your own')[1].split('\n## ')[0]
-    return re.findall('```{}\n(.*?)```'.format(language), section, re.S)
+        return re.findall('```{}\n(.*?)```'.format(language), file.read(), re.S)
 
 
 class InterfaceOnDemand(unittest.TestCase):
@@ -51,7 +51,7 @@ class InterfaceOnDemand(unittest.TestCase):
             'package.xml': '<package><name>my_robot</name><version>1.0.0</version>'
             '<description>x</description>'
             '<maintainer email="a@b.c">a</maintainer><license>BSD</license></package>',
-            'by_hand.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN,
+            'my_interface.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN,
             'idle': IDLE
         }
         for name, text in files.items():
@@ -69,7 +69,7 @@ class InterfaceOnDemand(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def offer(self, **changes):
-        entry = dict(yaml.safe_load(blocks('yaml')[0])['interfaces']['by_hand'], **changes)
+        entry = dict(yaml.safe_load(blocks('yaml')[-1])['interfaces']['by_hand'], **changes)
         entry = {key: value for key, value in entry.items() if value is not None}
         return Settings.from_dict({'interfaces': {'by_hand': entry}}).offers_for('', 'PICK')[0]
 
@@ -83,7 +83,7 @@ class InterfaceOnDemand(unittest.TestCase):
         thread.start()
         try:
             return self.client.run_interface(offer,
-                                             make_question(self.id(), output_keys=('object_name',)),
+                                             make_question(self.id(), output_keys=('cup',)),
                                              gone, lambda *what: None)
         finally:
             thread.join()
@@ -117,7 +117,7 @@ class InterfaceOnDemand(unittest.TestCase):
         answer = self.run_interface(offer, self.finish)
         self.assertTrue(self.seen, 'what it prints is told')
         self.assertIsNotNone(answer, 'it is finished')
-        self.assertEqual((answer.outcome, answer.outputs), ('succeeded', {'object_name': 'mug'}))
+        self.assertEqual((answer.outcome, answer.outputs), ('succeeded', {'cup': 'on the table'}))
         self.assert_gone()
         self.assertEqual(self.told[-1].status, InterfaceOutput.STOPPED)
 

@@ -120,7 +120,7 @@ class EventReader:
         if path.endswith('.active'):
             raise BagError(UNFINISHED)
         try:
-            if not stat.S_ISREG(os.stat(path).st_mode):  # to open a pipe may wait for ever
+            if not stat.S_ISREG(os.stat(path).st_mode):  # opening a pipe may wait forever
                 raise BagError('no plain file')
             return self._read(path)
         except BagError:

@@ -200,7 +200,7 @@ def _reply(request: BagRequest) -> str:
     try:
         text = json.dumps(read(request))
         if len(text) > request.reply_bytes:
-            raise BagReadError('it tells more than {:.0f} MB of its trials'.format(
+            raise BagReadError('its trials have more than {:.0f} MB'.format(
                 request.reply_bytes / 1e6))
         return text
     except BagReadError as err:

@@ -1,8 +1,9 @@
 """Compare variants that ran the same trials, from the rows that an experiment has kept.
 
-A row tells of one trial. Prints for each variant the shares of trials with their intervals, what it
-cost a trial and a robot hour, McNemar's exact test of the interventions for each two variants, and
-the best that any variant did in each trial (hindsight). Exit code: 0; 2, there was nothing to read.
+Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
+cost for a trial and for a robot hour. Prints McNemar's exact test of the interventions for each two
+variants, and the best that any variant did in each trial (hindsight). Exit code: 0, or 2 if there
+was nothing to read.
 """
 import argparse
 import itertools

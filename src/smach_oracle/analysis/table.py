@@ -145,7 +145,7 @@ def write_json(target: IO[str], variants: Sequence[VariantCounts], trials: Seque
 
 
 def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
-    """Write one line a trial, for a spreadsheet or for statistics of one's own."""
+    """Write one line a trial, for a spreadsheet or for your own statistics."""
     plain = [name for name in TrialSummary._fields
              if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth', 'unwell_s',
                              'resumed', 'down_s')]

@@ -1,6 +1,6 @@
 """Count what happened in one trial, one event after the other (definitions: doc/statistics.md).
 
-The one definition for trials in bags and for trials that a console hears of while they run.
+The one definition for trials in bags and for trials that a console follows while they run.
 """
 from collections import Counter
 from enum import Enum

@@ -141,7 +141,7 @@ def _written(value: object) -> object:
 
 
 def read_rows(path: Path) -> List[TrialRow]:
-    """Return the rows of a file; of the same trial of a variant the later one counts.
+    """Return the rows of a file. If a variant has a trial twice, the later row is used.
 
     A last line that was cut off in its writing is skipped.
 
@@ -192,7 +192,7 @@ def _parsed(line: Sequence[str], where: str) -> TrialRow:
     if len(line) != len(TrialRow._fields):
         raise BagError('{}: {} cells, not {}'.format(where, len(line), len(TrialRow._fields)))
     cells: Dict[str, Any] = dict(zip(TrialRow._fields, line))
-    # '' is no object; whether that is known is told beside, by the damage
+    # '' is no object; a row that has the damage has this, too
     cells['wrong_object'] = (None if cells['damage'] == '' and not cells['wrong_object']
                              else cells['wrong_object'])
     for name, parse in _PARSERS.items():
@@ -212,7 +212,7 @@ def _parsed(line: Sequence[str], where: str) -> TrialRow:
 def read_details(path: str) -> Dict[int, TruthDetails]:
     """Return the details by seed; if a seed appears twice, the later line is used.
 
-    What is no line of truth is passed over: `truth.read_truth` complains of it.
+    Lines that are not truth are skipped: `truth.read_truth` reports them.
 
     :raises OSError: where the file cannot be read.
     """

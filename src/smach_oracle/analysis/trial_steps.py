@@ -1,7 +1,8 @@
-"""Compare trials that ought to be the same, but for times and names.
+"""Compare trials that should be the same, except for times and names.
 
-States, outcomes and decisions are compared, of trials of the same experiment, variant and seed.
-Exit code: 0, the same; 1, not the same, or some bags were skipped; 2, nothing to compare.
+The trials have the same experiment, variant and seed. Their states, outcomes and decisions are
+compared. Exit code: 0, they are the same; 1, they are not, or some bags were skipped; 2, there is
+nothing to compare.
 """
 import argparse
 import sys

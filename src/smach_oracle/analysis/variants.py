@@ -120,7 +120,7 @@ def _named(settings: Dict[str, Any], keys: Sequence[str]) -> List[str]:
 
 def time_series(
         trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
-    """Trials for a figure each: one replicate of one oracle, with trials without oracle beside it.
+    """The trials of each figure: one replicate of one oracle, and trials without an oracle.
 
     Returns with each the words that distinguish it from the others: experiment, oracle, replicate,
     as far as there are several.

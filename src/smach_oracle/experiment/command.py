@@ -88,7 +88,7 @@ def make_parser() -> argparse.ArgumentParser:
                         help='of the first trial; the next has the next (default: 1)')
     parser.add_argument(
         '--replicates', type=int,
-        help='complete repetitions on further seeds, each learning anew (default: 1)')
+        help='complete repetitions on further seeds, each learns from the beginning (default: 1)')
     parser.add_argument('--jobs', type=int, default=2,
                         help='replicates of variants at a time (default: %(default)s)')
     parser.add_argument(
@@ -116,8 +116,8 @@ def make_parser() -> argparse.ArgumentParser:
         help='of a world that goes on from trial to trial (default: each trial has a fresh one)')
     parser.add_argument(
         '--hung-after', type=float, default=300.0, metavar='S',
-        help='s in which nothing happens in a trial, or a fifth of what it may take at most, '
-        'before it is run anew (default: 300)')
+        help='after so many s without an event a trial is run again, and likewise after five times '
+        'as many in all (default: 300)')
     freezing = parser.add_mutually_exclusive_group()
     freezing.add_argument('--freeze', metavar='NOTE',
                           help='run nothing: make the evaluation seeds of doc/protocol.md, and log '

@@ -1,7 +1,7 @@
 """The evaluation seeds, which nobody can choose: made of the protocol and of the code as committed.
 
-The protocol names the folders. A freeze appends a line to a log that is committed, too: every
-freeze is told, abandoned ones as well.
+The protocol names the folders. A freeze appends a line to a log that is committed, too: it has
+every freeze, abandoned ones as well.
 """
 import csv
 import hashlib

@@ -87,7 +87,7 @@ class ExperimentJob:
         self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
         self._next, self._lost = progress.next_trial, progress.lost
         if progress.dropped:
-            self.messages.append('{}: trial {} was interrupted and is run anew'.format(
+            self.messages.append('{}: trial {} was interrupted and is run again'.format(
                 self.name, self._next + 1))
 
     def start(self) -> None:
@@ -156,7 +156,7 @@ class ExperimentJob:
                     self._untold.append(recorded)
                     self._ended_at = self._sign_at = time.monotonic()
         told = [trial for trial in self._untold if self._records.is_complete(trial)]
-        if told:  # the world tells of a trial when the next one begins
+        if told:  # the world reports a trial when the next one begins
             self._untold = [trial for trial in self._untold if trial not in told]
             self._results.add([self._records.with_truth(trial) for trial in told], {},
                               self._records.truth)

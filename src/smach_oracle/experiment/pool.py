@@ -15,7 +15,7 @@ from .stop_signals import StopSignals
 
 POLL_S = 0.5
 BROKEN_AT_ONCE = 3  # jobs, before a trial has ended: then something is wrong with more than a job
-# a protocol's folder may lie in a repository: its rows shall be committed, its bags not
+# a protocol's folder may lie in a repository: commit its rows, and not its bags
 IGNORED = '*\n!*/\n!.gitignore\n!results.csv\n!experiment.json\n'
 
 

@@ -96,7 +96,7 @@ class ReplicateRecords:
             if recorded is None or not self._is_complete(recorded, seed, truths):
                 break
             if recorded.learned is None:
-                raise ExperimentError('{}: it does not tell what was learned'.format(
+                raise ExperimentError('{}: the bag does not contain the learned rates'.format(
                     paths[len(done)]))
             done.append(recorded)
         dropped = paths[len(done):]

@@ -93,7 +93,7 @@ class JobResults:
         return _data_in(told[-1], told[-1].left, 'how the world was left') if told else None
 
     def forget_from(self, number: int) -> None:
-        """Write anew what is told of this trial and of those behind it: they are run anew."""
+        """Drop the rows of this trial and of those behind it, which are run again."""
         self._rows = {seed: row for seed, row in self._rows.items()
                       if seed < self._first_seed + number}
 
@@ -130,6 +130,6 @@ def _data_in(row: TrialRow, text: str, what: str) -> Optional[Mapping[str, Any]]
     try:
         data = json.loads(text)
     except ValueError as err:
-        raise ExperimentError('results of {}, seed {}: it does not tell {}'.format(
+        raise ExperimentError('results of {}, seed {}: the row lacks {}'.format(
             row.variant, row.seed, what)) from err
     return data if isinstance(data, dict) else None

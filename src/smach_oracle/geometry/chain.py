@@ -53,7 +53,7 @@ class JointChain:
                   fixed: Optional[Mapping[str, float]] = None) -> 'JointChain':
         """The chain between two links of a robot description (XML text).
 
-        :param fixed: joints on the way that shall not move, with where they are (rad or m).
+        :param fixed: joints on the way that must not move, with their positions (rad or m).
         :raises ValueError: where the text is no URDF, a link or a fixed joint is not there, `tip`
             does not hang below `root`, or no joint between them moves.
         """

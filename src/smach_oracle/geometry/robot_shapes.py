@@ -91,12 +91,12 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
         if not (np.isfinite(joint.origin).all() and np.isfinite(joint.axis).all()
                 and np.abs(joint.origin).max() < FURTHEST):
             raise ValueError(
-                'robot description: joint {!r} has a place or an axis that is none'.format(
+                'robot description: joint {!r} has an invalid place or axis'.format(
                     joint.name[:100]))
         if joint.mimic is not None and not _is_finite(joint.mimic):
             raise ValueError(
-                'robot description: joint {!r} mimics another by a number that is none, or not '
-                'below {:g}'.format(joint.name[:100], FURTHEST))
+                'robot description: joint {!r} mimics another by a number that is not finite, '
+                'or not below {:g}'.format(joint.name[:100], FURTHEST))
         below.setdefault(joint.parent, []).append(joint)
     roots = [name for name in names if name not in by_child]
     if len(roots) != 1:

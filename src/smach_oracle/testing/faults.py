@@ -101,7 +101,7 @@ def overrun(state: str, seconds: float, *, visit: Visits = None, probability: fl
     :raises FaultError: for a visit below 1, a probability outside 0 to 1, or a time below 0.
     """
     if not (isinstance(seconds, (int, float)) and 0 <= seconds < math.inf):
-        raise FaultError('a fault of {}: {!r} s is no time; give seconds from 0'.format(
+        raise FaultError('a fault of {}: {!r} s is not a time; give seconds from 0'.format(
             state, seconds))
     return _checked(Fault(state, FaultKind.OVERRUN, _visits(state, visit), probability, seed,
                           seconds=float(seconds)))

@@ -110,8 +110,8 @@ class Injection:
 
     def _armed(self, fault: Fault) -> ArmedFault:
         if not isinstance(fault, Fault):
-            raise FaultError('{!r} is no fault; make one with fail, crash, hang or overrun'.format(
-                fault))
+            raise FaultError(
+                '{!r} is not a fault; make one with fail, crash, hang or overrun'.format(fault))
         place = find_place(self._places, fault.state, 'a fault')
         return ArmedFault(fault, place, self._outcome(fault, place))
 

@@ -99,7 +99,7 @@ class ObservedTrial:
                                  kind.__name__, self.ending()))
 
     def assert_recovered(self, state: str = '') -> 'ObservedTrial':
-        """Fail unless a state (any, if left out) failed, and the trial ended well all the same.
+        """Fail unless a state (any, if left out) failed, and the trial still ended well.
 
         It ended well where the oracle did not give up and the outcome of the machine is neither
         `preempted` nor named like a failure.
@@ -232,7 +232,7 @@ class ObservedTrial:
         return sum(1 for place in places if not state or _is_named(place, state))
 
     def _check_name(self, state: str) -> None:
-        """Refuse a state that is nowhere: nothing is ever true of it."""
+        """Refuse a state that does not exist: nothing is ever true of it."""
         __tracebackhide__ = True
         if self._seen.states and not any(_is_named(path, state) for path in self._seen.states):
             raise AssertionError('there is no state {!r}; there are {}'.format(

@@ -23,7 +23,7 @@ class StatePlace(NamedTuple):
     def visited_now(self) -> bool:
         """Whether an execution that begins now is a visit of this place.
 
-        It is none where a precondition runs the state, or the same object under another label.
+        It is not one where a precondition runs the state, or the same object under another label.
         """
         container = self.container
         return not isinstance(container, smach.StateMachine) or (

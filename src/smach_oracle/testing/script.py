@@ -185,7 +185,7 @@ def _as_scripted(reply: object) -> ScriptedAnswer:
         return ScriptedAnswer(reply)
     if isinstance(reply, ScriptedAnswer):
         return reply
-    raise ScriptError('{!r} is no answer; give goto, supersede, give_up, use_interface or '
+    raise ScriptError('{!r} is not an answer; give goto, supersede, give_up, use_interface or '
                       'no_answer'.format(reply))
 
 

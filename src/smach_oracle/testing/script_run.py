@@ -45,7 +45,7 @@ def run_script(path: str, args: Sequence[str] = (), *, faults: Iterable[Fault] =
     What the script itself raises comes through.
 
     :param faults: of each trial; every machine that the script executes must have their states.
-    :param expert: who is asked; with a script of answers it begins anew in each trial.
+    :param expert: who is asked; a script of answers begins again in each trial.
     :param settings: of the oracle, where the script has not wrapped the machine itself.
     :param most_trials: leave the script after so many trials; 0: let it come to its end.
     :param limit_s: seconds of wall time after which a trial is an error.

@@ -46,8 +46,8 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     """Run many trials, each with one random fault, and report which failures never recover.
 
     Trial n of a seed is always the same. Each begins with nothing learned, and with the userdata
-    that the machine has now. What states keep in themselves from one trial to the next a factory
-    makes anew, which is called for each trial.
+    that the machine has now. States may keep something in themselves from one trial to the next. A
+    function that builds the machine is called for each trial, so its states keep nothing.
 
     :param machine: a machine, or a function that builds one.
     :param kinds: of faults; HANG is of use for states with a time limit alone.

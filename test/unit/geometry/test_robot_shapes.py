@@ -68,7 +68,7 @@ def test_links_are_where_the_joints_say_and_mimics_follow():
      (with_visual('<geometry><sphere radius="1e99"/></geometry>'), 'finite'),
      (with_visual('<origin xyz="inf 0 0"/><geometry><box size="1 1 1"/></geometry>'),
       'xyz="inf 0 0"'),
-     (ARM.replace('xyz="0 0 1"/><axis', 'xyz="nan 0 1"/><axis'), 'place or an axis'),
+     (ARM.replace('xyz="0 0 1"/><axis', 'xyz="nan 0 1"/><axis'), 'invalid place or axis'),
      (ARM.replace('multiplier="-2"', 'multiplier="x"'), 'multiplier="x"'),
      (ARM.replace('multiplier="-2"', 'multiplier="inf"'), "'other' mimics another"),
      (ARM.replace('offset="0.5"', 'offset="nan"'), "'other' mimics another"),

@@ -32,7 +32,9 @@ ARROWS: Dict[str, Set[str]] = {
     'testing': {'oracle.OracleContainer', 'oracle.asking', 'oracle.background', 'oracle.errors',
                 'oracle.oracle_of', 'oracle.records', 'oracle.settings', 'oracle.unwrap', 'ros'},
     '__init__': {'oracle.OracleContainer', 'ros.container'},
-    'commands': {'packages', '__version__'},  # it starts modules of the rooms by their names
+    # it starts modules of the rooms by their names
+    'commands': {'documentation', 'packages', '__version__'},
+    'documentation': set(),
     'packages': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))

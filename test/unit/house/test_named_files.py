@@ -10,7 +10,7 @@ IN_TEXT = re.compile(r'`((?:[\w.-]+/)*[\w-]+\.%s)`' % ENDINGS)
 IN_CODE = re.compile(r'(?<![\w.$*{}<>/~:-])((?:test|src|doc|launch|scripts|cmake)/(?:[\w.-]+/)*'
                      r'[\w-]+\.%s)\b' % ENDINGS)
 # examples: files of a user's own package
-OF_USERS = dict.fromkeys(['doc/expert.md', 'test/rostest/expert_own_script.py',
+OF_USERS = dict.fromkeys(['doc/own_rostest.md', 'test/rostest/expert_own_script.py',
                           'test/unit/house/test_named_files.py'],
                          {'scripts/task.py', 'test/task_rules.yaml', 'test/task_test.py'})
 

@@ -116,7 +116,7 @@ def test_a_function_that_raises_fails_the_test():
 
 
 def test_what_is_no_answer_is_refused_at_once():
-    with pytest.raises(ScriptError, match="'DETECT' is no answer; give goto, supersede"):
+    with pytest.raises(ScriptError, match="'DETECT' is not an answer; give goto, supersede"):
         expert('DETECT')
 
 

@@ -179,7 +179,7 @@ def test_a_machine_may_be_wrapped_while_faults_are_in_it():
     (lambda: fail('HALL/PICK'), "there is no state 'HALL/PICK'"),
     (lambda: fail('PICK', outcome='abroted'), "a fault: KITCHEN/PICK has no outcome 'abroted'; "
      "name one of 'aborted', 'preempted', 'succeeded'"),
-    (lambda: 'PICK', "'PICK' is no fault; make one with fail, crash, hang or overrun")])
+    (lambda: 'PICK', "'PICK' is not a fault; make one with fail, crash, hang or overrun")])
 def test_a_fault_that_fits_no_state_names_what_is_there(fault, said):
     machine = nested_machine()
     before = everything_in(machine)
@@ -225,7 +225,7 @@ def test_an_outcome_is_to_be_named_where_several_are_failures_or_none():
     (lambda: hang('PICK', visit=[2, -1]), 'visit -1 is not there'),
     (lambda: crash('PICK', visit=[]), 'the first visit is 1'),
     (lambda: fail('PICK', probability=1.5), 'probability 1.5 is not within 0 to 1'),
-    (lambda: overrun('PICK', -1), '-1 s is no time')])
+    (lambda: overrun('PICK', -1), '-1 s is not a time')])
 def test_what_no_fault_can_be_is_refused_at_once(make, said):
     with pytest.raises(FaultError) as refused:
         make()

@@ -11,7 +11,7 @@ class ParameterError(ValueError):
 
 
 def parameters_of(description: str) -> None:
-    """Answer --help; refuse what is no ROS remapping."""
+    """Answer --help, and refuse any argument that is not a ROS remapping."""
     argparse.ArgumentParser(description=description).parse_args(rospy.myargv()[1:])
 
 

@@ -25,7 +25,7 @@ def pose_message(pose: Pose) -> PoseMessage:
 def pose_of(message: PoseMessage) -> Pose:
     """The pose in the plane.
 
-    :raises ValueError: where it is not finite, or its turn is none about the vertical.
+    :raises ValueError: where it is not finite, or does not turn about the vertical.
     """
     turn = message.orientation
     values = (message.position.x, message.position.y, turn.x, turn.y, turn.z, turn.w)

@@ -18,7 +18,7 @@ SLOWS_BY = 1.2  # m/s per m that are left
 
 
 class WheelCommand(NamedTuple):
-    """What the wheels shall do."""
+    """A command to the wheels."""
 
     v: float = 0.0  # m/s
     w: float = 0.0  # rad/s

@@ -105,5 +105,5 @@ class WheeledBase:
 
 
 def noisy_ranges(exact: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """What a laser scanner tells of distances (m): 1 cm off (sigma)."""
+    """Distances (m) as a laser scanner measures them, 1 cm off (sigma)."""
     return exact + rng.normal(0.0, 0.01, exact.shape)

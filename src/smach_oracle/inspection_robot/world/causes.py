@@ -120,7 +120,7 @@ def _there_and_back(where: Tuple[float, float], begins_s: float, stands_s: float
 
 
 def _strolling(rng: np.random.Generator) -> Errand:
-    """Somebody walks to and fro in a room, across the robot's way, and stands beside it."""
+    """Somebody walks to and fro in a room, across the robot's way, and stands next to it."""
     rooms: List[Tuple[Tuple[float, float], ...]] = [((0.6, 3.7), (2.9, 3.4)),
                                                     ((4.1, 1.6), (5.9, 3.8)),
                                                     ((7.1, 5.9), (9.4, 1.6))]

@@ -15,7 +15,7 @@ from ..web.sections import PageSections
 BEAT_S = 1.0
 SILENT_AFTER_S = 6.0  # the page has the same limit (liveness.js)
 OLDEST_SEEN_S = 15.0  # what a page may have seen last when it sends an answer
-# what ends the robot's waiting by a word of a person; to stop or let go is never refused
+# commands that end the robot's waiting; stopping and letting go are never refused
 ANSWERING = ('answer', 'hand_over')
 GetHeard = Callable[[], Optional[float]]
 

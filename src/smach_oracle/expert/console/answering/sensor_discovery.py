@@ -37,7 +37,7 @@ class SensorDiscovery:
         self._perception_actions: Set[str] = set()
 
     def is_perception(self, action: str) -> bool:
-        """Whether a SharedAutonomy action has a perception interface's service beside it."""
+        """Whether a SharedAutonomy action belongs to a perception interface."""
         return action in self._perception_actions
 
     def start(self) -> None:

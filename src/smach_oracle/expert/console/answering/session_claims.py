@@ -13,8 +13,8 @@ from ..commands.commands import PageCommand
 from ..web.audit import Person
 
 MOST_REMEMBERED = 1000
-TOLD_WITHIN_S = 3.0  # after a claim its server's list tells of it
-CLAIM_FIRST = 'Claim the question first: nobody answers what another one may be working on.'
+TOLD_WITHIN_S = 3.0  # after a claim its server's list has it
+CLAIM_FIRST = 'Claim the question first, so that no two people work on it.'
 
 
 class HeldClaim(NamedTuple):

@@ -20,7 +20,7 @@ _id = whole(1, 2 ** 53 - 1, 'a whole number from 1')
 
 
 class CommandError(OracleError):
-    """Something that is no command; the text says what is allowed.
+    """A message that is not a command. The text gives what is allowed.
 
     `number` is its id, 0 where it has none.
     """

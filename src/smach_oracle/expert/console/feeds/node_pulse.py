@@ -42,7 +42,7 @@ class NodeLink:
                 self._uri = self._look_up()
             _proxy(self._uri).getPid(rospy.get_name())
         except NO_ANSWER:
-            self._uri = ''  # it may have been started anew, with another address
+            self._uri = ''  # it may have been started again, with another address
             raise
 
     def _look_up(self) -> str:

@@ -13,7 +13,7 @@ from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_w
 from ...wording import event_words
 
 LONGEST_TEXT = 8000
-LATEST_S = 1e11  # s since the epoch: a later time is none
+LATEST_S = 1e11  # s since the epoch: a later time is not valid
 _KINDS = {int(kind): kind for kind in EventKind}
 
 

@@ -1,7 +1,7 @@
 """Whether two robots of the console are one machine that is published twice. Pure.
 
-A script may run an introspection server of its own beside that of its oracle. Both tell of the same
-containers, under roots of their own names.
+A script may run its own introspection server in addition to that of its oracle. Both publish the
+same containers, under roots of their own names.
 """
 from typing import FrozenSet, Iterable, Mapping, NamedTuple, Set
 

@@ -1,7 +1,7 @@
 """Camera images as files for the browser: JPEG for colour, PNG with false colours for depth.
 
-Messages only, no node. What a robot sends is decoded here and encoded anew: nothing of it reaches a
-browser as it came.
+Messages only, no node. The images of a robot are decoded here and encoded again: none of their
+bytes reaches a browser.
 """
 import os
 import struct
@@ -34,7 +34,7 @@ class BrowserFile(NamedTuple):
 
     content_type: str
     body: bytes
-    facts: Dict[str, Any]  # plain data beside it
+    facts: Dict[str, Any]  # plain data about it
 
 
 def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserFile:

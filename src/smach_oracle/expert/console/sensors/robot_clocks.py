@@ -28,7 +28,7 @@ class RobotClocks:
         self._readings: Dict[str, ClockReading] = {}
 
     def take(self, robot: str, stamp_s: float, came_s: Optional[float] = None) -> None:
-        """Take a stamp in; 0 is none. `came_s`: when it came, where that is not now."""
+        """Take in a stamp, unless it is 0. `came_s`: when it came, if that is not now."""
         reading = ClockReading(stamp_s, time.monotonic() if came_s is None else came_s)
         with self._lock:
             known = self._readings.get(robot)

@@ -1,7 +1,7 @@
-"""The folders of bags: what in them is a bag that may be read, and how it is opened.
+"""The folders of bags: which files in them may be read, and how one is opened.
 
-Only plain files inside the folders are: to open a pipe may wait for ever, and a link may lead to
-any file of this machine.
+Only plain files inside the folders may be read. Opening a pipe may wait forever, and a link may
+lead to any file of this machine.
 """
 import os
 import stat

@@ -163,7 +163,7 @@ export class ManipulationPanel {
     this.update();
   }
 
-  /** Whoever drives: always possible, for everybody, and sent at once. */
+  /** Stops every driver: always possible, for everybody, and sent at once. */
   async stopHand() {
     this.input.releaseAll();
     setText(this.problem, '');

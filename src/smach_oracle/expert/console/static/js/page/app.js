@@ -204,7 +204,7 @@ export class App {
   }
 
   /**
-   * Begin anew: nothing of what the person saw or typed stays on the page.
+   * Begin again: nothing of what the person saw or typed stays on the page.
    * @param {string} why
    */
   leave(why) {

@@ -24,7 +24,7 @@ export function remember(name, value) {
 }
 
 /**
- * Keep what the page shall say after it has begun anew.
+ * Keep what the page must say after it has begun again.
  * @param {string} text
  */
 export function leaveNote(text) {

@@ -24,7 +24,7 @@ export function arrange(element, ...children) {
 }
 
 /**
- * As if the element's children were replaced by these, which were made anew; but those that are
+ * As if the element's children were replaced by these, which were made again; but those that are
  * there become like them, each like the one of its kind and `key`. They keep their listeners, which
  * therefore go by the key alone.
  * @param {Element} element

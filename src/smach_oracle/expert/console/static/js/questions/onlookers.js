@@ -6,7 +6,7 @@ import { h, setText } from '../page/dom.js';
 /** @typedef {import('../server').Onlooker} Onlooker */
 /** @typedef {import('../server').Question} Question */
 
-const PAUSE_MS = 1000; // whoever turns the pages fast uses up no limit on commands
+const PAUSE_MS = 1000; // turning the pages fast uses up no limit on commands
 let wanted = ''; // the question that this page shows
 let timer = 0;
 

@@ -64,7 +64,7 @@ export class TrialReplay {
   /** Index of the last event. */
   get last() { return this.trial.events.length - 1; }
 
-  /** @param {ReplayedTrial} trial another one begins anew */
+  /** @param {ReplayedTrial} trial another one begins at its start */
   set(trial) {
     const another = trial.id !== this.trial.id;
     this.trial = trial;
