@@ -34,6 +34,7 @@ with sm:
 print('OUTCOME', sm.execute(), flush=True)
 '''
 DOWN = '.down-machine[data-machine=TASK]'
+TOKENS = {role: role + '-token-of-sufficient-length' for role in ('viewer', 'operator')}
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')

@@ -5,6 +5,9 @@ export interface DownMachine {
   key: string; // of the store and the trial
   store: string; // its file
   machine: string;
+  trial: number; // in the store
+  moment: number; // the latest one of the trial
+  states: string[]; // where it can go on
   since: number; // when it was stored last
   stood: string[]; // where, in sentences
   questions: string[]; // that were open
