@@ -6,7 +6,8 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.rows import StoredTrial
+from smach_oracle.store.names import EDIT
+from smach_oracle.store.rows import StoredMoment, StoredTrial
 from smach_oracle.store.stopped_trial import StoppedTrial, in_words, trial_to_change
 from smach_oracle.store.store_file import StoreFile
 
@@ -125,7 +126,7 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
     return {
         'key': '{}#{}'.format(store.path, trial.number), 'store': store.path,
         'machine': trial.machine, 'trial': trial.number, 'moment': stopped.latest,
-        'since': store.moments(trial.number)[-1].at,
+        'since': _stored_last(store.moments(trial.number)),
         'states': stopped.states()[:MOST_STATES],
         'stood': [in_words(standing) for standing in stopped.places()],
         'questions': ['{} about {}'.format(question, path)
@@ -135,6 +136,11 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
         'command': 'rosrun smach_oracle oracle_state {} show --trial {}'.format(
             shlex.quote(store.path), trial.number),
         'problem': ''}
+
+
+def _stored_last(moments: Sequence[StoredMoment]) -> float:
+    """When its program stored something last, s since the epoch: not who changed that."""
+    return next((each.at for each in reversed(moments) if each.kind != EDIT), moments[-1].at)
 
 
 def _problem(path: str, err: Exception) -> Dict[str, Any]:

@@ -74,7 +74,7 @@ def test_it_goes_on_at_another_state_and_the_log_says_who_it_was(down):
     reply = down.do('goto_stored', label='PLACE')
     assert (reply.ok, reply.message) == (True, 'TASK will go on at PLACE.')
     assert down.row['stood'] == ['TASK/PLACE was next'], 'the page has it at once'
-    assert down.row['moment'] == 2
+    assert (down.row['moment'], down.row['since']) == (2, 7.0), 'it is not down since then'
     assert down.log() == [('ann (console, session s1)', 'trial 1: go to PLACE')]
     assert down.records == [('ann', 'goto_stored', True, 'TASK will go on at PLACE.')]
 

@@ -8,7 +8,7 @@ export interface DownMachine {
   trial: number; // in the store
   moment: number; // the latest one of the trial
   states: string[]; // where it can go on
-  since: number; // when it was stored last
+  since: number; // when its program stored something last
   stood: string[]; // where, in sentences
   questions: string[]; // that were open
   userdata: [container: string, key: string, json: string][];
