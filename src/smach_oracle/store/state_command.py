@@ -9,7 +9,7 @@ from typing import List, Optional
 from .errors import StoreError
 from .holding import MachineLock
 from .rows import StoredTrial
-from .stopped_trial import StoppedTrial, in_words
+from .stopped_trial import DAMAGE, StoppedTrial, chosen_trial, in_words, trial_to_change
 from .store_file import StoreFile
 
 WRONG = 2  # exit code
@@ -23,8 +23,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     except StoreError as err:
         sys.stderr.write('oracle_state: {}\n'.format(err))
         return WRONG
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as err:
-        # what is stored is not what this program has written
+    except DAMAGE as err:
         sys.stderr.write('oracle_state: {}: is damaged: {!r}\n'.format(given.path, err))
         return WRONG
     return 0
@@ -88,7 +87,7 @@ def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
 
 def _show(given: argparse.Namespace) -> None:
     store = StoreFile(given.path, read_only=True)
-    trial = _trial(store, given)
+    trial = chosen_trial(store, given.trial)
     stopped = StoppedTrial(store, trial, given.at)
     _say('trial {} of {}, begun {}: {}'.format(trial.number, trial.machine, _when(trial.begun),
                                               _how_it_is(store, trial)))
@@ -106,7 +105,7 @@ def _show(given: argparse.Namespace) -> None:
 
 def _moments(given: argparse.Namespace) -> None:
     store = StoreFile(given.path, read_only=True)
-    for moment in store.moments(_trial(store, given).number):
+    for moment in store.moments(chosen_trial(store, given.trial).number):
         _say('{:>7}  {}  {:<18} {}{}'.format(
             moment.number, _when(moment.at), moment.kind.lower(),
             '/'.join(filter(None, (moment.path, moment.label))),
@@ -122,41 +121,25 @@ def _edit(given: argparse.Namespace) -> None:
     key, equals, text = given.assignment.partition('=')
     if not equals or not key.strip():
         raise StoreError('{!r}: KEY=JSON is wanted, such as count=3'.format(given.assignment))
-    stopped, key = _stopped(given), key.strip()
-    path = given.container or stopped.trial.machine
-    keys = stopped.keys(path)
-    stopped.edit(key, text, path, _user_name())
+    key = key.strip()
+    with trial_to_change(given.path, given.trial) as stopped:
+        path = given.container or stopped.trial.machine
+        keys = stopped.keys(path)
+        stopped.edit(key, text, path, _user_name())
     _say('{} is changed'.format(key) if key in keys else
          '{} is new: {} had {}'.format(key, path, ', '.join(keys) or 'no key'))
 
 
 def _go_to(given: argparse.Namespace) -> None:
-    _stopped(given).go_to(given.label, _user_name())
+    with trial_to_change(given.path, given.trial) as stopped:
+        stopped.go_to(given.label, _user_name())
     _say('it will go on at {}'.format(given.label))
 
 
 def _drop(given: argparse.Namespace) -> None:
-    stopped = _stopped(given)
-    stopped.drop(_user_name())
+    with trial_to_change(given.path, given.trial) as stopped:
+        stopped.drop(_user_name())
     _say('trial {} is dropped'.format(stopped.trial.number))
-
-
-def _stopped(given: argparse.Namespace) -> StoppedTrial:
-    StoreFile(given.path, read_only=True).close()  # a store is not made by looking for it
-    store = StoreFile(given.path)
-    return StoppedTrial(store, _trial(store, given))
-
-
-def _trial(store: StoreFile, given: argparse.Namespace) -> StoredTrial:
-    trials = store.trials()
-    if given.trial is None:
-        trials = [trial for trial in trials if trial.ended is None] or trials
-    else:
-        trials = [trial for trial in trials if trial.number == given.trial]
-    if not trials:
-        raise StoreError('{}: there is no {}'.format(
-            given.path, 'trial' if given.trial is None else 'trial {}'.format(given.trial)))
-    return trials[-1]
 
 
 def _user_name() -> str:

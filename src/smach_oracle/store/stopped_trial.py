@@ -1,4 +1,5 @@
 """A stored trial, looked at and changed by hand."""
+import contextlib
 import json
 import time
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
@@ -26,6 +27,8 @@ from .store_file import StoreFile
 
 DROPPED = 'dropped'  # in place of the outcome of a trial that somebody has dropped
 LONGEST = 200  # letters of a value that are shown
+# what is raised where the content of a store is not what this program has written
+DAMAGE = (ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 
 class Standing(NamedTuple):
@@ -44,7 +47,9 @@ class StoppedTrial:
         """`until`: the moment that is looked at; by default the last one."""
         self._store, self.trial = store, trial
         self._facts: Dict[Tuple[str, str], StoredValue] = {}
+        self.latest = 0  # number of the moment that is looked at
         for fact in store.facts(trial.number, until):
+            self.latest = fact.moment
             if fact.name:
                 self._facts[fact.path, fact.name] = fact.value
 
@@ -95,6 +100,15 @@ class StoppedTrial:
                 if count:
                     yield '{}/{}'.format(path, name[len(STATE):]), int(count)
 
+    def containers(self) -> List[str]:
+        """Return the paths of all containers, the top machine's name first in each."""
+        top = self.trial.machine
+        return [top + ('/' + path if path else '') for path in containers_of(self._structure())]
+
+    def states(self) -> List[str]:
+        """Return the paths of all states, below the top machine: where it can go on."""
+        return states_of(self._structure())
+
     def _named(self, name: str) -> Iterator[Tuple[str, Any]]:
         for (path, each), value in self._facts.items():
             if each == name and value.is_there:
@@ -116,14 +130,15 @@ class StoppedTrial:
         :param json_text: plain JSON; what it means for the script is the user's business.
         :param path: of the container.
         :raises StoreError: for what is no JSON, a container that is not stored, a trial that has
-            ended or whose machine a process holds, and where it cannot be written.
+            ended, has gone on since it was looked at, or whose machine a process holds, and where
+            it cannot be written.
         """
-        if path not in self._containers():
+        if path not in self.containers():
             raise StoreError('there is no container {!r}; there are {}'.format(
-                path, ', '.join(sorted(self._containers()))))
+                path, ', '.join(sorted(self.containers()))))
         try:
             encoded = Codecs().encode(json.loads(json_text))
-        except (ValueError, NotStorable) as err:
+        except (ValueError, RecursionError, NotStorable) as err:
             raise StoreError('{}: {!r} is no JSON ({}); a text needs quotes'.format(
                 key, json_text, err)) from err
         facts = [Fact(path, KEY + key, encoded)]
@@ -137,7 +152,7 @@ class StoppedTrial:
         :param label: of the top machine, or the path of a state below it.
         :raises StoreError: as `edit`, and where there is no such state.
         """
-        top, states = self.trial.machine, self._states()
+        top, states = self.trial.machine, self.states()
         if label not in states:
             raise StoreError('there is no state {!r}; there are {}'.format(
                 label, ', '.join(sorted(states))))
@@ -176,19 +191,65 @@ class StoppedTrial:
                 self.trial.number, self.trial.outcome))
         lock = MachineLock(self._store.path, self.trial.machine)
         lock.take()
+        try:
+            self._check_as_seen()
+        except BaseException:
+            lock.release()
+            raise
         return lock
 
-    def _containers(self) -> List[str]:
-        top = self.trial.machine
-        return [top + ('/' + path if path else '') for path in containers_of(self._structure())]
-
-    def _states(self) -> List[str]:
-        return states_of(self._structure())
+    def _check_as_seen(self) -> None:
+        """Nobody but who holds the machine changes it, so this is true until it is let go."""
+        number = self.trial.number
+        now = [each for each in self._store.trials(self.trial.machine) if each.number == number]
+        latest = max((each.number for each in self._store.moments(number)), default=0)
+        if not now or now[0].ended is not None or latest != self.latest:
+            raise StoreError('trial {} has gone on, was changed or has ended since it was looked '
+                             'at: look at it again'.format(number))
 
     def _structure(self) -> str:
         latest = self._facts.get(('', STRUCTURE))
         return self._store.description(
             self.trial.structure if latest is None else json.loads(latest.text or '""'))
+
+
+@contextlib.contextmanager
+def trial_to_change(path: str, number: Optional[int] = None,
+                    seen: Optional[int] = None) -> Iterator[StoppedTrial]:
+    """Yield a trial of the store at `path`, for one change.
+
+    :param number: of the trial; by default the latest one that has not ended.
+    :param seen: the latest moment that who changes it has seen; by default what is there now.
+    :raises StoreError: where there is no such store or trial, or the store is damaged; and what
+        the body raises.
+    """
+    StoreFile(path, read_only=True).close()  # a store is not made by looking for it
+    store = StoreFile(path)
+    try:
+        stopped = StoppedTrial(store, chosen_trial(store, number))
+        if seen is not None:
+            stopped.latest = seen
+        yield stopped
+    except DAMAGE as err:
+        raise StoreError('{}: is damaged: {!r}'.format(path, err)) from err
+    finally:
+        store.close()
+
+
+def chosen_trial(store: StoreFile, number: Optional[int]) -> StoredTrial:
+    """Return a trial by its number; None: the latest one that has not ended, else the latest.
+
+    :raises StoreError: where there is no such trial.
+    """
+    trials = store.trials()
+    if number is None:
+        trials = [trial for trial in trials if trial.ended is None] or trials
+    else:
+        trials = [trial for trial in trials if trial.number == number]
+    if not trials:
+        raise StoreError('{}: there is no {}'.format(
+            store.path, 'trial' if number is None else 'trial {}'.format(number)))
+    return trials[-1]
 
 
 def in_words(standing: Standing) -> str:

@@ -6,10 +6,14 @@ from types import SimpleNamespace
 
 import pytest
 import tornado.web
+from borders.fake_ros import fake_ros
 from borders.files import machine, stored
+from borders.robot_goals import a_mug_many_times, servers
 from crafted_bags import crafted_bag, event
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from prompt_toolkit.document import Document
 from prompt_toolkit.validation import ValidationError
+from std_msgs.msg import Bool
 
 import smach
 from smach_oracle.analysis.trials import load_trials
@@ -24,6 +28,10 @@ from smach_oracle.interfaces.manipulation.settings import _state
 from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.errors import CheckpointError, SettingsError
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.settings.health import checked_health
+from smach_oracle.pr2.planning.collision_map import MOST_BOXES
+from smach_oracle.ros.health.field_rules import why_unwell_by_message
+from smach_oracle.ros.health.health_topics import HealthTopics
 from smach_oracle.ros.loaded_settings import read_yaml
 from smach_oracle.store import state_command
 from smach_oracle.store.store_file import StoreFile
@@ -130,3 +138,45 @@ def test_a_key_that_is_no_utf_8_is_kept_out_and_the_rest_is_stored(tmp_path, mon
     assert trial.outcome == 'done'
     names = {fact.name for fact in with_trial.facts(trial.number)}
     assert 'key:cups' in names and 'out:photo\\udce9' in names
+
+
+@pytest.mark.parametrize('given', [DEEP, '{"a": ' + DEEP])
+def test_json_that_is_nested_too_deep_is_not_put_into_a_store(store, capsys, given):
+    path, _ = store
+    assert state_command.main([path, 'edit', 'cups=' + given]) == 2
+    assert 'is no JSON' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('field', ['data.\u00b2', 'data.' + '9' * 5000])
+def test_a_field_that_is_almost_a_place_in_a_list_is_none(field):
+    condition, = checked_health({'topic': '/t', 'field': field})
+    assert why_unwell_by_message(condition, Bool(True)) == '/t has no field ' + field
+
+
+@pytest.mark.parametrize('wanted, ends', [({'at_least': 0}, '... is no number'),
+                                          ({'equals': 'on'}, '...')])
+def test_of_a_field_that_is_a_whole_image_only_the_beginning_is_told(wanted, ends):
+    condition, = checked_health(dict(wanted, topic='/t'))
+    why = why_unwell_by_message(condition, SimpleNamespace(data=bytes(100000)))
+    assert why.endswith(ends)
+    assert len(why) < 300
+
+
+def test_diagnostics_of_another_type_are_passed_over(monkeypatch):
+    monkeypatch.setattr(HealthTopics, '_subscribe', lambda self: None)
+    with fake_ros():
+        topics = HealthTopics()
+        latest = topics.status('Power')
+        topics._take_diagnostics(Bool(True))
+        assert latest.age_s() is None
+        topics._take_diagnostics(DiagnosticArray(status=[DiagnosticStatus(name='Power')]))
+        assert latest.heard().level == 0
+
+
+def test_a_collision_map_has_no_end_of_objects():
+    server = servers()['build_collision_map']
+    for count, end in ((MOST_BOXES, 'taken'), (MOST_BOXES + 1, 'refused')):
+        with fake_ros():
+            server.execute(a_mug_many_times(count))
+        assert server.end[0] == end
+    assert server.end[1] == '601 objects; allowed: at most 600'

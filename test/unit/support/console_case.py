@@ -117,9 +117,9 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         self.teleoperation = FakeTeleoperation()
         self.access = AccessControl(settings, tokens.cookie_secret if tokens else 'secret',
                                     self.audit)
-        self.machine_hand = FakeMachineHand()
+        self.machine_hand, self.down_machine_hand = FakeMachineHand(), FakeQuestionCommands()
         self.pages = OpenPages(self.sections, self.log, self.question_commands, self.teleoperation,
-                               self.machine_hand)
+                               self.machine_hand, self.down_machine_hand)
         self.sensors = SensorStreams()
         self.files = ImageStore()
         self.catalogue = BagCatalogue(self.folders(), self.sections)

@@ -17,6 +17,8 @@ from .answering.teleoperation import Teleoperation
 from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse, stops
 from .commands.driving import DRIVING_COMMANDS, STOPPING_COMMANDS
 from .commands.holding import HOLDING_COMMANDS, MACHINE_STOPS
+from .commands.stored import STORED_COMMANDS
+from .robots.down_machine_hand import DownMachineHand
 from .robots.machine_hand import MachineHand
 from .trials.trial_log import TrialLog
 from .web import sessions
@@ -45,12 +47,14 @@ class OpenPages:
     """What the sockets of all pages share."""
 
     def __init__(self, sections: PageSections, log: TrialLog, question_commands: QuestionCommands,
-                 teleoperation: Teleoperation, machine_hand: MachineHand) -> None:
+                 teleoperation: Teleoperation, machine_hand: MachineHand,
+                 down_machine_hand: DownMachineHand) -> None:
         self.sections = sections
         self.log = log
         self.question_commands = question_commands
         self.teleoperation = teleoperation
         self.machine_hand = machine_hand
+        self.down_machine_hand = down_machine_hand
         self.onlookers = Onlookers(sections)
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
@@ -63,6 +67,8 @@ class OpenPages:
         """Who carries out a command, in a thread."""
         if command.name in HOLDING_COMMANDS:
             return self.machine_hand.carry_out
+        if command.name in STORED_COMMANDS:
+            return self.down_machine_hand.carry_out
         return (self.teleoperation.carry_out if command.name in DRIVING_COMMANDS
                 else self.question_commands.carry_out)
 

@@ -29,6 +29,7 @@ from .feeds.node_pulse import NodePulse
 from .feeds.repeating import repeat
 from .graphs.layout_worker import LayoutWorker
 from .page_socket import OpenPages, PageSocket
+from .robots.down_machine_hand import DownMachineHand
 from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
 from .robots.machine_hand import MachineHand
@@ -123,7 +124,8 @@ class Console:
         self._machine_hand = MachineHand(self._robots.holdable, self._audit,
                                          self._last_heard.robot_refusal)
         self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation,
-                                self._machine_hand)
+                                self._machine_hand,
+                                DownMachineHand(self._down, self._audit))
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         access = AccessControl(settings._replace(port=port), secret, self._audit)
         app = make_app(access, self._pages, self._discovery.sensors,

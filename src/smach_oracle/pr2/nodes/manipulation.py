@@ -35,6 +35,7 @@ from ..planning.arm import (
     stands_open,
 )
 from ..planning.collision_map import (
+    MOST_BOXES,
     PADDING,
     CollisionMap,
     CollisionMapStore,
@@ -107,12 +108,15 @@ class Manipulation:
                             report: ReportStatus) -> BuildCollisionMapResult:
         """Boxes of the table and the objects, under an id.
 
-        :raises SkillError: for a pose or size that is not allowed, or where there are more objects
-            than sizes, or fewer.
+        :raises SkillError: for a pose or size that is not allowed, where there are more objects
+            than sizes, or fewer, and for more than MOST_BOXES of them.
         """
         robot = self.context.robot
         if len(goal.objects) != len(goal.sizes):
             raise SkillError('{} objects but {} sizes'.format(len(goal.objects), len(goal.sizes)))
+        if len(goal.objects) > MOST_BOXES:
+            raise SkillError('{} objects; allowed: at most {}'.format(len(goal.objects),
+                                                                     MOST_BOXES))
         objects = [box_in_base(pose, size, robot, 'objects[{}]'.format(k))
                    for k, (pose, size) in enumerate(zip(goal.objects, goal.sizes))]
         centre = pose_in_base(goal.table, robot, 'table')

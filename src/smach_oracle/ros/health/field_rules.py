@@ -6,6 +6,7 @@ from smach_oracle.oracle.settings.health import HealthCondition
 
 # diagnostic_msgs/DiagnosticStatus
 LEVELS = ('ok', 'warn', 'error', 'stale')
+LONGEST = 200  # letters of a value that are told
 
 
 class _NoField(Exception):
@@ -28,7 +29,7 @@ def why_unwell_by_message(condition: HealthCondition, message: Any) -> str:
     if condition.equals is not None:
         return '' if value == condition.equals else _in_words(value)
     if not is_number(value):
-        return '{!r} is no number'.format(value)
+        return '{} is no number'.format(_cut(repr(value)))
     if condition.at_least <= value <= condition.at_most:
         return ''
     return ('{:g}, at least {:g}'.format(value, condition.at_least)
@@ -44,8 +45,8 @@ def _field(message: Any, path: str) -> Any:
     found = message
     for name in path.split('.'):
         try:
-            found = found[int(name)] if name.isdigit() else getattr(found, name)
-        except (AttributeError, IndexError, TypeError) as err:
+            found = found[int(name)] if name.isdecimal() else getattr(found, name)
+        except (AttributeError, IndexError, TypeError, ValueError) as err:
             raise _NoField(path) from err
     return found
 
@@ -53,7 +54,12 @@ def _field(message: Any, path: str) -> Any:
 def _in_words(value: object) -> str:
     if isinstance(value, bool):
         return 'on' if value else 'off'
-    return str(value) or 'empty'
+    return _cut(str(value)) or 'empty'
+
+
+def _cut(text: str) -> str:
+    """The text, or its beginning: a field may be a whole image."""
+    return text if len(text) <= LONGEST else text[:LONGEST] + '...'
 
 
 def why_unwell_by_status(condition: HealthCondition, status: Status) -> str:

@@ -83,10 +83,17 @@ class HealthTopics:
         return latest
 
     def _take_diagnostics(self, message: Any) -> None:
-        for status in decoded(message).status:
-            latest = self._statuses.get(status.name.strip('/'))
+        try:
+            found = [(status.name.strip('/'), Status(level_of(status.level), str(status.message)))
+                     for status in decoded(message).status]
+        except (UnreadableMessage, AttributeError, TypeError, ValueError) as err:
+            # of another type than theirs, or damaged
+            rospy.logwarn_throttle(60.0, 'healthy: diagnostics that cannot be read: {}'.format(err))
+            return
+        for name, status in found:
+            latest = self._statuses.get(name)
             if latest is not None:
-                latest.put(Status(level_of(status.level), status.message))
+                latest.put(status)
 
     def _subscribe(self) -> None:
         """Subscribe to what has a type; look again where one has none."""

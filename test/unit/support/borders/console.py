@@ -35,7 +35,9 @@ _ARGUMENTS: Dict[str, Any] = {
         'foreground': st.booleans(), 'width': st.floats(1, 9), 'points': _points},
         ['foreground', 'width', 'points']), max_size=2),
     'outcome': words('succeeded'), 'robot': words('/robot'), 'path': words('', 'task'),
-    'pattern': words('A'), 'remove': st.booleans(), 'arm': words('', 'left')}
+    'pattern': words('A'), 'remove': st.booleans(), 'arm': words('', 'left'),
+    'down': words('robot.db#1'), 'moment': st.integers(0, 9), 'label': words('A', 'KITCHEN/LOOK'),
+    'key': words('cups'), 'json': st.one_of(json_texts, texts)}
 
 
 def _command(name: str) -> Any:
@@ -83,7 +85,8 @@ class Socket(page_socket.PageSocket):
         self.request = SimpleNamespace(remote_ip='127.0.0.1')
         carried = _Carried()
         with mock.patch.object(page_socket, 'ThreadPoolExecutor', mock.Mock()):
-            pages = page_socket.OpenPages(PageSections(), TrialLog(), carried, carried, _Hand())
+            pages = page_socket.OpenPages(PageSections(), TrialLog(), carried, carried, _Hand(),
+                                          carried)
         pages.workers = None  # of the loop
         self._prepare(pages)
         self.said: List[Any] = []

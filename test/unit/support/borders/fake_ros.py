@@ -93,8 +93,12 @@ class FakeHandle:
 
 
 class _Publisher:
-    def __init__(self, *_: object, **__: object) -> None:
+    def __init__(self, name: str, *_: object, **__: object) -> None:
         self.impl = mock.Mock(connections=[])
+        self.resolved_name = name
+
+    def get_num_connections(self) -> int:
+        return 1
 
     def publish(self, message: genpy.Message) -> None:
         as_bytes(message)
@@ -122,11 +126,12 @@ def fake_ros() -> Iterator[Offered]:
         return made
 
     quiet = {name: (lambda *said: None) for name in (
-        'logdebug', 'loginfo', 'logwarn', 'logerr', 'on_shutdown')}
+        'logdebug', 'loginfo', 'logwarn', 'logerr', 'logwarn_throttle', 'logerr_throttle',
+        'on_shutdown')}
     with mock.patch.multiple(
             rospy, Service=service, Subscriber=subscriber, Publisher=_Publisher,
             resolve_name=lambda name: name, get_name=lambda: '/node',
-            is_shutdown=lambda: False, **quiet), \
+            is_shutdown=lambda: False, get_rostime=lambda: rospy.Time(7), **quiet), \
             mock.patch.object(rospy.Time, 'now', lambda: rospy.Time(7)), \
             mock.patch.object(actionlib, 'ActionServer', action):
         yield offered

@@ -13,6 +13,7 @@ from .driving import DRIVING_COMMANDS
 from .driving import stops as stops_hand
 from .holding import HOLDING_COMMANDS, MACHINE_STOPS
 from .marking import MARKING_COMMANDS
+from .stored import STORED_COMMANDS
 
 MOST_BYTES = 65536
 KINDS = ('goto', 'supersede', 'give_up', 'interface')
@@ -119,4 +120,5 @@ COMMANDS: Dict[str, CommandSpec] = {
     **MARKING_COMMANDS,
     **DRIVING_COMMANDS,
     **HOLDING_COMMANDS,
+    **STORED_COMMANDS,
 }

@@ -1,18 +1,24 @@
 """Machines that are down: their program has stopped, and their trial in a store has not ended."""
 import os
 import shlex
-from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
+import threading
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.rows import StoredTrial
-from smach_oracle.store.stopped_trial import StoppedTrial, in_words
+from smach_oracle.store.names import EDIT
+from smach_oracle.store.rows import StoredMoment, StoredTrial
+from smach_oracle.store.stopped_trial import StoppedTrial, in_words, trial_to_change
 from smach_oracle.store.store_file import StoreFile
 
 from ..web.sections import PageSections
 
 MOST_MACHINES = 50  # of a store, those that were stopped last
 MOST_KEYS = 200  # of the userdata of one
+MOST_STATES = 1000  # of one, where it can go on
+BUSY_S = 2.0  # how long a change waits for others, and for a look
+NOT_DOWN = 'There is no machine {} here that is down.'
+BUSY = 'The stores are being read or changed, and have been for {:g} s: try again.'
 _Stamp = Tuple[object, ...]
 
 
@@ -24,7 +30,7 @@ class _Looked(NamedTuple):
 
 
 class DownMachines:
-    """Looks at stores again and again; changes nothing in them.
+    """Looks at stores again and again, and changes what is in them; any thread.
 
     A machine that a living process holds is not down.
     """
@@ -33,11 +39,47 @@ class DownMachines:
         """`stores`: paths of stores; one that is not there yet may come."""
         self._stores, self._sections = tuple(stores), sections
         self._looked: Dict[str, _Looked] = {}
+        # a look must not take a change of our own for a program that holds the machine
+        self._lock = threading.Lock()
 
     def look(self) -> None:
         """Bring the section up to date."""
         if self._stores:
-            self._sections.put('down', [row for path in self._stores for row in self._rows(path)])
+            with self._lock:
+                self._look()
+
+    def change(self, key: str, seen: int, work: Callable[[StoppedTrial], str]) -> str:
+        """Have a machine changed that was down at the last look; return what `work` does.
+
+        :param key: of its row.
+        :param seen: the moment that its row had.
+        :raises StoreError: where there is none, it has gone on since, or a program holds it; where
+            the stores do not answer in time; and what `work` raises.
+        """
+        if not self._lock.acquire(timeout=BUSY_S):
+            raise StoreError(BUSY.format(BUSY_S))
+        try:
+            row = self._row_of(key)
+            if row is None:
+                raise StoreError(NOT_DOWN.format(key))
+            with trial_to_change(row['store'], row['trial'], seen) as stopped:
+                done = work(stopped)
+            self._look()
+            return done
+        finally:
+            self._lock.release()
+
+    def _row_of(self, key: str) -> Optional[Dict[str, Any]]:
+        """Return the row of a machine of our stores; it may be held by now."""
+        for path in self._stores:
+            looked = self._looked.get(path)
+            for row in looked.rows if looked is not None else ():
+                if row['key'] == key and row['machine']:
+                    return row
+        return None
+
+    def _look(self) -> None:
+        self._sections.put('down', [row for path in self._stores for row in self._rows(path)])
 
     def _rows(self, path: str) -> List[Dict[str, Any]]:
         stamp = _stamp(path)
@@ -83,7 +125,9 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
     userdata = list(stopped.userdata())
     return {
         'key': '{}#{}'.format(store.path, trial.number), 'store': store.path,
-        'machine': trial.machine, 'since': store.moments(trial.number)[-1].at,
+        'machine': trial.machine, 'trial': trial.number, 'moment': stopped.latest,
+        'since': _stored_last(store.moments(trial.number)),
+        'states': stopped.states()[:MOST_STATES],
         'stood': [in_words(standing) for standing in stopped.places()],
         'questions': ['{} about {}'.format(question, path)
                       for path, question in stopped.questions()],
@@ -94,6 +138,12 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
         'problem': ''}
 
 
+def _stored_last(moments: Sequence[StoredMoment]) -> float:
+    """When its program stored something last, s since the epoch: not who changed that."""
+    return next((each.at for each in reversed(moments) if each.kind != EDIT), moments[-1].at)
+
+
 def _problem(path: str, err: Exception) -> Dict[str, Any]:
-    return {'key': path, 'store': path, 'machine': '', 'since': 0.0, 'stood': [], 'questions': [],
-            'userdata': [], 'more_userdata': 0, 'command': '', 'problem': str(err)}
+    return {'key': path, 'store': path, 'machine': '', 'trial': 0, 'moment': 0, 'since': 0.0,
+            'states': [], 'stood': [], 'questions': [], 'userdata': [], 'more_userdata': 0,
+            'command': '', 'problem': str(err)}

@@ -105,6 +105,15 @@ def test_what_is_left_out_is_empty():
     text(do='hand_over', question='q', outcome='done', outputs=[{'key': 'a'}]),
     text(do='give_up_interface'),
     text(do='give_up_interface', question='q', outputs=[]),
+    text(do='drop_stored', down='robot.db#1'),
+    text(do='drop_stored', moment=3),
+    text(do='drop_stored', down='robot.db#1', moment=-1),
+    text(do='drop_stored', down='robot.db#1', moment='3'),
+    text(do='drop_stored', down='robot.db#1', moment=3, store='/etc/passwd'),
+    text(do='goto_stored', down='robot.db#1', moment=3, label=''),
+    text(do='goto_stored', down='robot.db#1', moment=3, label=['A']),
+    text(do='edit_stored', down='robot.db#1', moment=3, container='TASK', key='', json='1'),
+    text(do='edit_stored', down='robot.db#1', moment=3, container='TASK', key='cups', json=1),
     text(do='hello', xsrf='x', expert='\u202egro.live'),
     text(do='hello', xsrf='', expert='ann'),
     text(do='hello', xsrf='x', expert='a' * 61)
@@ -141,5 +150,6 @@ def test_no_command_names_a_topic_a_service_or_a_type():
     assert fields == {
         'xsrf', 'expert', 'trial', 'at', 'question', 'kind', 'name', 'outputs', 'why', 'stamp',
         'region', 'strokes', 'frame', 'outcome', 'held', 'linear', 'angular', 'gripper', 'sent',
-        'arm', 'container', 'seen', 'robot', 'path', 'pattern', 'remove'
+        'arm', 'container', 'seen', 'robot', 'path', 'pattern', 'remove', 'down', 'moment', 'label',
+        'key', 'json'
     }

@@ -10,6 +10,9 @@ interface OfQuestion { question: string } // its key
 /** A machine of a robot, by the path of a container of it; '': all of the robot's. */
 interface OfMachine { robot: string; path: string }
 
+/** A machine that is down, by the key and the moment of its row. */
+interface OfDown { down: string; moment: number }
+
 /** A value for the userdata. */
 export interface Output { key: string; value: unknown; type: string }
 
@@ -58,6 +61,9 @@ export interface Commands {
   step_machine: OfMachine & { seen?: number };
   confirm_state: OfMachine & { seen?: number };
   set_breakpoint: OfMachine & { pattern: string; remove: boolean };
+  goto_stored: OfDown & { label: string };
+  edit_stored: OfDown & { container: string; key: string; json: string };
+  drop_stored: OfDown;
   drive: OfQuestion & DriveWish & { frame: DriveFrame; arm: string; sent: number }; // ms
 }
 

@@ -5,7 +5,10 @@ export interface DownMachine {
   key: string; // of the store and the trial
   store: string; // its file
   machine: string;
-  since: number; // when it was stored last
+  trial: number; // in the store
+  moment: number; // the latest one of the trial
+  states: string[]; // where it can go on
+  since: number; // when its program stored something last
   stood: string[]; // where, in sentences
   questions: string[]; // that were open
   userdata: [container: string, key: string, json: string][];

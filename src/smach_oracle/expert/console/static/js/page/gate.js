@@ -14,7 +14,8 @@ const GOING_ON = new Set(['resume_machine', 'step_machine', 'confirm_state']);
 // what a robot, its record or other people have under a name
 /** @type {Set<Name>} */
 const NAMED = new Set(['claim', 'take_over', 'answer', 'mark', 'use_frame', 'hand_over',
-  'give_up_interface', 'take_wheel', 'set_breakpoint', ...GOING_ON]);
+  'give_up_interface', 'take_wheel', 'set_breakpoint', 'goto_stored', 'edit_stored', 'drop_stored',
+  ...GOING_ON]);
 const NO_NAME = 'Not done: your name is needed for it.';
 
 export class Gate {

@@ -1,15 +1,12 @@
 // @ts-check
-// Machines that are down: where they stood, and how they go on. Nothing is changed from here.
+// Machines that are down: where they stood, how they go on, and what may be changed before that.
 import { h } from '../page/dom.js';
-import { clock, duration } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { duration } from '../page/format.js';
+import { arrange } from '../page/redraw.js';
+import { DownMachineView } from './down_machine.js';
 
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../down').DownMachine} DownMachine */
-
-const GOES_ON = 'Goes on when its program is started again. By default it asks a person first.';
-const TO_CHANGE = 'To look, and to change it before that (edit, goto, drop), on the computer of '
-  + 'its store:';
 
 export class DownList {
   /** @param {App} app */
@@ -17,7 +14,10 @@ export class DownList {
     this.app = app;
     this.root = h('section', { class: 'card down-machines', 'aria-label': 'Machines that are down',
       hidden: true });
+    this.title = h('h2', {}, 'Down');
     this.shown = '';
+    /** @type {Map<string, DownMachineView>} */
+    this.views = new Map(); // by the key of their rows
   }
 
   /** Show them as they are now. */
@@ -25,34 +25,25 @@ export class DownList {
     const rows = this.app.store.get('down') || [];
     this.root.hidden = !rows.length;
     const now = this.app.store.now();
-    const ages = rows.map(({ since }) => (since ? duration(now - since) : ''));
-    const key = JSON.stringify([rows, ages]);
-    if (key === this.shown) return;
-    this.shown = key;
-    redraw(this.root, [h('h2', { key: 'title' }, 'Down'),
-      rows.map((row, index) => (row.problem ? problem(row) : machine(row, ages[index])))]);
+    for (const row of rows) {
+      if (!row.problem) this.viewOf(row).show(row, row.since ? duration(now - row.since) : '');
+    }
+    const shown = JSON.stringify(rows.map(({ key, problem }) => [key, problem]));
+    if (shown === this.shown) return;
+    this.shown = shown;
+    for (const key of [...this.views.keys()]) {
+      if (!rows.some((row) => row.key === key && !row.problem)) this.views.delete(key);
+    }
+    arrange(this.root, this.title, rows.map((row) => (
+      row.problem ? h('p', { class: 'down-problem' }, row.problem) : this.viewOf(row).root)));
   }
-}
 
-/** @param {DownMachine} row */
-function problem({ key, problem: why }) {
-  return h('p', { key, class: 'down-problem' }, why);
-}
-
-/**
- * @param {DownMachine} row
- * @param {string} age
- */
-function machine(row, age) {
-  const { key, store, machine: name, since, stood, questions, userdata, command } = row;
-  return h('details', { key, class: 'down-machine', 'data-machine': name },
-    h('summary', {}, h('strong', {}, name), ' down since ' + clock(since) + ' (' + age + '), '
-      + (stood.length ? stood[stood.length - 1] : 'had not begun')),
-    h('p', {}, GOES_ON),
-    h('ul', {}, stood.map((each) => h('li', {}, each)),
-      questions.map((each) => h('li', {}, 'question ' + each + ' was open'))),
-    h('table', {}, h('tbody', {}, userdata.map(([path, item, text]) => h('tr', {},
-      h('td', {}, path), h('td', {}, item), h('td', {}, text))))),
-    row.more_userdata ? h('p', { class: 'dim' }, 'and ' + row.more_userdata + ' more') : null,
-    h('p', { class: 'dim' }, store + '. ' + TO_CHANGE), h('pre', {}, command));
+  /** @param {DownMachine} row */
+  viewOf(row) {
+    const known = this.views.get(row.key);
+    if (known) return known;
+    const view = new DownMachineView(this.app, row);
+    this.views.set(row.key, view);
+    return view;
+  }
 }
