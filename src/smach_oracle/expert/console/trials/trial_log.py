@@ -2,6 +2,7 @@
 
 Thread-safe, bounded.
 """
+import json
 import threading
 from collections import OrderedDict
 from typing import Any, Dict, List, NamedTuple, Tuple
@@ -29,7 +30,7 @@ class _LoggedTrial:
         self.robot = robot
         self.robot_gone = False
         self.counts = TrialCounter()
-        self.events: List[Dict[str, Any]] = []
+        self.events: List[str] = []  # each as JSON, which takes half the memory of a dict
         self.detailed = True  # whether the events are kept
 
     @property
@@ -70,7 +71,7 @@ class TrialLog:
                 self._forget()
             trial.counts.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
-                trial.events.append(event_view(event))
+                trial.events.append(json.dumps(event_view(event)))
             self._recoveries.add(
                 robot, event, ended and (not event.outcome or event.outcome in _FAILING
                                          or event.outcome.lower() == 'preempted'))
@@ -99,7 +100,8 @@ class TrialLog:
         """The events of a trial from a position on; none where it is not known."""
         with self._lock:
             trial = self._trials.get(trial_id)
-            return EventSlice(start, trial.events[start:] if trial else [])
+            kept = trial.events[start:] if trial else []
+        return EventSlice(start, [json.loads(event) for event in kept])
 
     def recovery_counts(self, place: Tuple[str, str, str], target: str) -> RecoveryCounts:
         """How often going to `target` helped after a failure.
