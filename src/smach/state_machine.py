@@ -172,9 +172,7 @@ class StateMachine(Container):
             self._is_running = False
 
     def _start(self, parent_ud: Any) -> None:
-        """Put the machine to its initial state, take over the input keys and call the start
-        callbacks.
-        """
+        """Go to the initial state, take over the input keys and call the start callbacks."""
         if self._preempted_state is not None:
             # it ignored a request of the last run, or was asked after an error had ended that;
             # a request that stands is passed on to the initial state
@@ -183,9 +181,12 @@ class StateMachine(Container):
         self._preempted_state = None
         self._set_current_state(self._initial_state_label)
         self._copy_input_keys(parent_ud, self.userdata)
+        self._tell_start()
+        self.call_start_cbs()
+
+    def _tell_start(self) -> None:
         smach.loginfo("State machine starting in initial state '%s' with userdata: \n\t%s"
                       % (self._current_label, list(self.userdata.keys())))
-        self.call_start_cbs()
 
     def _set_current_state(self, state_label: Optional[str]) -> None:
         """Make this state the one that is executed next; None after the last."""

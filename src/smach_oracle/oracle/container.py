@@ -264,13 +264,24 @@ class OracleContainer(smach.StateMachine):
         node = self._oracle
         if node.engine.stepped:
             node.begin_execution()
+        how = ''
         if node.entry and node.entry in self._states:
             self._set_current_state(node.entry)
+            how = 'starting'
         node.entry = ''
         if node.resuming is not None:
             entry, node.resuming = node.resuming, None
             entry.enter(node)
+            how = 'going on'
+        if how:
+            smach.loginfo("State machine {} in state '{}' with userdata: \n\t{}".format(
+                how, self._current_label, list(self.userdata.keys())))
         super().call_start_cbs()
+
+    def _tell_start(self) -> None:
+        """Log where it starts; upstream's engine does not ask."""
+        if self._oracle.resuming is None and self._oracle.entry not in self._states:
+            super()._tell_start()
 
     def _update_once(self) -> Optional[str]:
         """Execute the current state and make the transition, and go on with the next state.

@@ -146,7 +146,12 @@ class Attachments:
                 self._introspection.pop(path).stop()
 
     def preempt(self) -> None:
-        """Ask every machine that runs to stop; its question, if any, is taken back with it."""
+        """Ask every machine that runs to stop, as the process goes down.
+
+        Its question, if any, is taken back with it. It is open again where the trial is stored.
+        """
+        for machine in self._running():
+            oracle_of(machine).note_shutdown()
         for machine in self._running():
             machine.request_preempt()
 

@@ -11,4 +11,6 @@ GOAL = 'goal:'  # and of one of the whole tree that has a goal's server
 # phases: of the state at which a container stands, or of itself
 BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
 MOVED = 'moved'  # the state at which it stands is in another container now
-EDIT = 'EDIT'  # kind of a moment that somebody has made by hand
+# kinds of moments that are no events: made by hand, and the last one of a part of a trial that is
+# kept, as nobody has said how it goes on
+EDIT, KEPT = 'EDIT', 'KEPT'

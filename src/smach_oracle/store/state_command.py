@@ -78,8 +78,12 @@ def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
         return 'ended: ' + trial.outcome
     if MachineLock(store.path, trial.machine).is_held_elsewhere():
         return 'runs'
-    standing = StoppedTrial(store, trial).places()
-    return 'stopped: ' + in_words(standing[-1]) if standing else 'stopped before it began'
+    stopped = StoppedTrial(store, trial)
+    standing = stopped.places()
+    if not standing:
+        return 'stopped before it began'
+    how = 'kept, as nobody answered' if stopped.is_kept() else 'stopped'
+    return '{}: {}'.format(how, in_words(standing[-1]))
 
 
 def _show(given: argparse.Namespace) -> None:
@@ -118,9 +122,12 @@ def _edit(given: argparse.Namespace) -> None:
     key, equals, text = given.assignment.partition('=')
     if not equals or not key.strip():
         raise StoreError('{!r}: KEY=JSON is wanted, such as count=3'.format(given.assignment))
-    stopped = _stopped(given)
-    stopped.edit(key.strip(), text, given.container or stopped.trial.machine, _user_name())
-    _say('{} is changed'.format(key.strip()))
+    stopped, key = _stopped(given), key.strip()
+    path = given.container or stopped.trial.machine
+    keys = stopped.keys(path)
+    stopped.edit(key, text, path, _user_name())
+    _say('{} is changed'.format(key) if key in keys else
+         '{} is new: {} had {}'.format(key, path, ', '.join(keys) or 'no key'))
 
 
 def _go_to(given: argparse.Namespace) -> None:

@@ -6,7 +6,20 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 from .codecs import Codecs, NotStorable
 from .errors import StoreError
 from .holding import MachineLock
-from .names import ASKED, AT, BEFORE, EDIT, ENDED, FAILED, KEPT_OUT, KEY, MOVED, STATE, STRUCTURE
+from .names import (
+    ASKED,
+    AT,
+    BEFORE,
+    EDIT,
+    ENDED,
+    FAILED,
+    KEPT,
+    KEPT_OUT,
+    KEY,
+    MOVED,
+    STATE,
+    STRUCTURE,
+)
 from .renaming import containers_of, states_of
 from .rows import Fact, NewMoment, StoredTrial, StoredValue
 from .store_file import StoreFile
@@ -56,6 +69,17 @@ class StoppedTrial:
             elif name.startswith(KEPT_OUT) and value.is_there:
                 kind, why = json.loads(value.text or '["", ""]')
                 yield path, name[len(KEPT_OUT):], '({}, not stored: {})'.format(kind, why)
+
+    def keys(self, path: str) -> List[str]:
+        """Return the userdata keys of a container, also of values that could not be stored."""
+        return sorted({name[len(word):] for (of, name), value in self._facts.items()
+                       for word in (KEY, KEPT_OUT)
+                       if of == path and name.startswith(word) and value.is_there})
+
+    def is_kept(self) -> bool:
+        """Whether its program ended as nobody had said how it goes on."""
+        moments = self._store.moments(self.trial.number)
+        return bool(moments) and moments[-1].kind == KEPT
 
     def questions(self) -> Iterator[Tuple[str, str]]:
         """Yield path of the state and id of each question that was open."""

@@ -8,6 +8,7 @@ import traceback
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.records.events import EventKind
 
 
 class Points:
@@ -37,6 +38,8 @@ class Diary:
 
     def count(self, what):
         """How often each state has done it."""
+        if not os.path.exists(self._path):  # killed before any state has run
+            return collections.Counter()
         with open(self._path) as stream:
             lines = [line.split(None, 1) for line in stream]
         return collections.Counter(name.strip() for found, name in lines if found == what)
@@ -88,21 +91,28 @@ class KilledMachine:
         self.diary = Diary(str(folder / 'diary'))
         self._build = build
         self._settings = dict({'checkpoint': self.store, 'checkpoint_synchronous': 'OFF',
-                               'on_resume': 'recover'}, **settings)
+                               'on_resume': 'recover',
+                               # what was not stored in time would be repeated, on a busy computer
+                               'checkpoint_wait_s': 60}, **settings)
 
     def run(self, kill_at=0, expert=None, **settings):
         """Execute it in a process of its own, killed at a point, 0: at none."""
         def work():
-            points = Points(kill_at)
+            points, log = Points(kill_at), []
+            for level in ('info', 'warn'):
+                setattr(smach, 'log' + level, log.append)
             machine = OracleContainer.wrap(self._build(self.diary, points), name='TOP',
                                            settings=dict(self._settings, **settings),
                                            expert=expert)
-            kinds = []
-            machine._oracle.events.observers.append(points)
-            machine._oracle.events.observers.append(
-                lambda event: kinds.append((event.kind.name, event.seq, event.state)))
+            kinds, events = [], machine._oracle.events.observers
+            ended_by = []
+            events.append(points)
+            events.append(lambda event: kinds.append((event.kind.name, event.seq, event.state)))
+            events.append(lambda event: ended_by.append(event.data['ended_by'])
+                          if event.kind is EventKind.TRIAL_END else None)
             outcome = machine.execute()
             return {'outcome': outcome, 'points': points.passed, 'events': kinds,
+                    'log': log, 'ended_by': ended_by[-1],
                     'done': machine.userdata.done, 'rates': [
                         [row.path, row.state, row.successes, row.failures]
                         for row in machine.rates()]}

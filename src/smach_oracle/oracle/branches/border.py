@@ -34,6 +34,7 @@ class _Resumed(NamedTuple):
     gone: Tuple[str, ...]
     item: int
     tell: Callable[[Mapping[str, Any]], None]
+    trial_id: str
 
 
 class Border:
@@ -85,17 +86,20 @@ class Border:
         `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1;
         0: the first. `tell`: takes the userdata as they are then.
         """
-        self._resumed = _Resumed(dict(keys), tuple(gone), item, tell)
+        self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
 
     def take_over_userdata(self) -> None:
         """Have the userdata that `resume` was given, at the first execution after it."""
         resumed, self._resumed = self._resumed, None
-        if resumed is not None:
+        if resumed is not None and resumed.trial_id == self._trial_now():
             data = self.container.userdata._data
             for key in resumed.gone:
                 data.pop(key, None)
             data.update(resumed.keys)
             resumed.tell(data)
+
+    def _trial_now(self) -> str:
+        return self.top.tree.trial_id if self.top is not None else ''
 
     def _runs_in_tree(self) -> bool:
         top = self.top
@@ -230,7 +234,9 @@ class IteratorBorder(Border):
         self._is_asked_to_go_on = False
         if has_rest and self._ended_with is None and not self.goes_on:
             items.tell_of_repeats()
-        items.begins_with = 1 if self._resumed is None else self._resumed.item
+        resumed = self._resumed
+        items.begins_with = (1 if resumed is None or resumed.trial_id != trial_id
+                             else resumed.item)
         if self.goes_on:
             self._pass_on(dict(self.states()))
         else:
@@ -267,9 +273,6 @@ class IteratorBorder(Border):
             inner = border_of(state)
             if isinstance(inner, IteratorBorder) and self._items is not None:
                 inner.ask_to_go_on(not self._items.is_finished)
-
-    def _trial_now(self) -> str:
-        return self.top.tree.trial_id if self.top is not None else ''
 
     def _tell(self, text: str) -> None:
         label = self.container._state_label

@@ -4,6 +4,7 @@ from typing import Mapping, Optional
 import smach
 
 from ..machine.tree_node import WrappedMachine
+from ..recovery.failure import outcome_of_early_end
 
 COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
 
@@ -47,9 +48,9 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     """
     node = machine._oracle
     if not node.look_around():
-        smach.logwarn('{}: a branch does not begin, as the state around it was abandoned'.format(
-            node.path))
-        return None
+        smach.logwarn('{}: a branch does not begin, as {}'.format(
+            node.path, node.why_left_behind()))
+        return outcome_of_early_end(node, None)
     if node.ended_before is not None:
         outcome, node.ended_before = node.ended_before, None
         return outcome
@@ -57,7 +58,7 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     node.preempt_told = node.gave_up = False
     node.departure = None
     try:
-        return _step_to_end(machine, pending_preempt)
+        return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
     except smach.InvalidUserCodeError as err:
         raised = err
     finally:

@@ -13,12 +13,12 @@ from ..branches.border import Border
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..places.place import Place
-from ..records.events import Event, EventKind
+from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
 from .container_facts import ContainerFacts, fact_of
 from .stored_tree import StoredTree
-from .userdata_facts import KeptOut, UserdataFacts, keys_of
+from .userdata_facts import KeptOut, UserdataFacts, WeakIds, keys_of
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
@@ -64,7 +64,10 @@ class Checkpointer:
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
-        self._told: Set[Tuple[str, str]] = set()
+        # paths and keys of what is named; of a trial that goes on its first part has done so
+        self._told = set() if before is None else {
+            (path, key) for path, told in before.containers.items() for key in told.missing}
+        self._named = WeakIds()  # values that are named
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
 
     def __call__(self, event: Event) -> None:
@@ -111,13 +114,13 @@ class Checkpointer:
         self._goals.add(goal_id)
         self._commit_by_hand('GOAL', (fact_of('', GOAL + goal_id, server),))
 
-    def last_words(self) -> None:
-        """Store what has not been stored of the trial, which has ended."""
+    def last_words(self, kind: str) -> None:
+        """Store what has not been stored of the trial, which has ended, as a moment of a kind."""
         facts = [fact for line in self._pending.values() for fact in line]
         facts += (fact for node in self._nodes.values()
                   for fact in self._facts_of(node).all_states())
         self._pending = {}
-        self._commit_by_hand('TRIAL_END', (*facts, *self._ended_goals()))
+        self._commit_by_hand(kind, (*facts, *self._ended_goals()))
 
     def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
         """Commit a moment that belongs to no event."""
@@ -180,12 +183,12 @@ class Checkpointer:
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
                 event.target in node.machine._states and not node.is_oracle(event.target)):
             yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
-        elif kind is EventKind.FAILURE:
+        elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
             yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
                                          event.text])
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
-        elif kind in _CLOSES:
+        elif kind in _CLOSES and self._top.tree.early_end.why is None:
             yield Fact(node.key, ASKED, None)
         elif kind is EventKind.CONTAINER_END and node.branch is None and event.outcome:
             yield fact_of(node.key, AT, [event.outcome, ENDED])
@@ -283,7 +286,7 @@ class Checkpointer:
             yield from self._keys(path, border.container.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
-        if (path, out.key) in self._told:
+        if (path, out.key) in self._told or not self._named.add(out.value):
             return
         self._told.add((path, out.key))
         smach.logwarn('{}: userdata key {!r} ({}) of {} cannot be stored: {}. It will be missing '

@@ -14,6 +14,7 @@ from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..places.place import Place, place_named, places_of
 from ..places.way import way_to
+from ..records.asked_once import NOT_BEGUN, AskedOnce
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
@@ -24,7 +25,6 @@ from .stored_tree import StoredTree
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
 GONE = 'the program was stopped at {}, which is not there any more'
-NOT_BEGUN = 'the program was stopped before it began'
 
 
 class Resumption(NamedTuple):
@@ -181,16 +181,19 @@ class _Setting:
     def __init__(self, resumption: Resumption, nodes: List[TreeNode]) -> None:
         self._resumption, self._nodes = resumption, nodes
 
-    def activate(self, node: TreeNode) -> None:
-        """Set a container that was under way, and what is in its state."""
+    def activate(self, node: TreeNode) -> bool:
+        """Set a container that was under way, and what is in its state.
+
+        :returns: whether a person is asked in it before anything moves, where that is wanted.
+        """
         stored = self._resumption.tree.container(node.key)
         moved = stored if stored.moved_to else self._left_below(node, stored)
         if moved is not None:
             self._go_on_elsewhere(node, moved)
-            return
+            return True
         if stored.label not in node.machine._states:
             self._ask_at_beginning(node, stored, stored.label)
-            return
+            return True
         if node.branch is None:
             node.resuming = EntryPoint(stored, self._way_down(node, stored))
         record = node.record(stored.label)
@@ -203,6 +206,7 @@ class _Setting:
             self._go_on_in(node, stored, record)
         elif self._resumption.asks:
             self._ask_before(node, stored.label)
+        return True
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
         """Set what is in a state that was under way, or say that it is in doubt."""
@@ -214,8 +218,20 @@ class _Setting:
             if self._has_begun(path):
                 told = self._resumption.tree.container(path)
                 border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
-        for each in inside:
-            self._set(each)
+        asked = [self._set(each) for each in inside]
+        if self._resumption.asks and not any(asked):
+            self._ask_behind(node, label=stored.label, inside=inside)
+
+    def _ask_behind(self, node: TreeNode, label: str, inside: List[TreeNode]) -> None:
+        """Have a person asked before what follows a state in which all had ended.
+
+        That is the next item of an Iterator, or a state of the container or of one above it.
+        """
+        around = [*_up_from(node), node.top()]
+        asked = AskedOnce(_why(self._resumption), [node.record(label)] + [
+            each.parent.record(each.below[0]) for each in around if each.parent is not None])
+        for each in around + inside:
+            each.asked_next = asked
 
     def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[Place]:
         """Return the rest of a jump: below, nothing has begun yet. Empty for no jump."""
@@ -232,18 +248,19 @@ class _Setting:
         return bool(tree.container(path).item) or any(
             told.phase for key, told in tree.containers.items() if key.startswith(path + '/'))
 
-    def _set(self, node: TreeNode) -> None:
-        """Set a container in a state that was under way."""
+    def _set(self, node: TreeNode) -> bool:
+        """Set a container in a state that was under way; see `activate`."""
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():
                 node.ended_before = stored.label
-            else:
-                self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
+                return False
+            self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
-            self.activate(node)
+            return self.activate(node)
         else:
             self._ask_before(node, node.machine._initial_state_label or '')
+        return True
 
     def _left_below(self, node: TreeNode, stored: StoredContainer) -> Optional[StoredContainer]:
         """Return the container in a state under way whose own states are elsewhere now."""
@@ -286,13 +303,14 @@ class _Setting:
         if node.branch is None:
             node.resuming = EntryPoint(stored)
         node.record(label).resume(Unfinished(
-            FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption)))
+            FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption), keeps=True))
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
         if self._resumption.asks and label in node.machine._states:
             node.record(label).resume(
-                Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption)))
+                Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption),
+                           keeps=True))
 
     def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
         is_open = node.record(stored.label).open_question
@@ -304,8 +322,10 @@ class _Setting:
             if outcome and outcome not in node.machine._transitions.get(stored.label, ()):
                 kind, text = FailureKind.INTERRUPTED, GONE.format('outcome ' + outcome)
                 outcome = ''
-            return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label))
-        return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label))
+            return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label),
+                              self._resumption.asks)
+        return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label),
+                          self._resumption.asks)
 
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
         """Return the containers directly in a state; None where it can only go on as a whole."""

@@ -8,7 +8,7 @@ from typing import Callable, List, Optional, Set, Tuple, TypeVar
 import smach
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED, GOAL, RENAMED, STRUCTURE
+from smach_oracle.store.names import ENDED, GOAL, KEPT, RENAMED, STRUCTURE
 from smach_oracle.store.rows import Fact, StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
@@ -17,6 +17,7 @@ from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, SettingsError
 from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
+from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.on_resume import ASK, RESTART
@@ -30,7 +31,7 @@ from .stored_tree import StoredTree, read_tree
 from .structure import structure_of
 
 # what may be resumed: the program was stopped, and the task was not done
-_CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
+_CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 _Read = TypeVar('_Read')
 RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
@@ -167,7 +168,7 @@ class TrialStore:
         if self._observer in self._top.events.observers:
             self._top.events.observers.remove(self._observer)
         GOALS.observers.remove(self._observer.goal_begins)
-        self._observer.last_words()
+        self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
         self._writer.close(None if why in _CAN_GO_ON else Ending(at, outcome))
         self._let_go()
 

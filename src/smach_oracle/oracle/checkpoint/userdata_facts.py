@@ -1,5 +1,7 @@
 """Which keys of a container's userdata are to be stored again."""
+import contextlib
 import marshal
+import weakref
 from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union, cast
 
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
@@ -18,6 +20,23 @@ class KeptOut(NamedTuple):
     key: str
     kind: str  # its type
     why: str
+    value: object
+
+
+class WeakIds:
+    """Which objects were seen. One that cannot be referred to weakly is new each time."""
+
+    def __init__(self) -> None:
+        self._seen: Dict[int, 'weakref.ref[Any]'] = {}
+
+    def add(self, value: object) -> bool:
+        """Note an object; return whether it is new."""
+        seen = self._seen.get(id(value))
+        if seen is not None and seen() is value:
+            return False
+        with contextlib.suppress(TypeError):
+            self._seen[id(value)] = weakref.ref(value)
+        return True
 
 
 class _Known(NamedTuple):
@@ -86,7 +105,7 @@ class UserdataFacts:
         if before is not None and not isinstance(before.stored, str):
             yield Fact(self._path, KEY + str(key), None)
         yield Fact(self._path, KEPT_OUT + _told(key), self._codecs.encode([kind, why]))
-        self._tell(KeptOut(_told(key), kind, why))
+        self._tell(KeptOut(_told(key), kind, why, value))
 
 
 def _told(key: object) -> str:

@@ -10,7 +10,6 @@ import smach
 
 from ..branches.border import IteratorBorder, border_of
 from ..machine.nesting import machines_below
-from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..places.handing_over import links_to
 from ..places.levels import levels_above
@@ -19,7 +18,6 @@ from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
 from ..recovery.verdict import Verdict
-from ..settings.failing_outcomes import PREEMPTED, FailingNames
 
 
 class Departure:
@@ -167,18 +165,6 @@ def take_departure(node: TreeNode) -> Optional[Departure]:
         return None
     stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
     return None if stopped or node.is_left_behind() else departure
-
-
-def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[str]) -> str:
-    """Return an outcome with which a container ends that is left: nobody goes by it.
-
-    :param wanted: how its failure would have ended it.
-    """
-    outcomes = sorted(machine.get_registered_outcomes(), key=str)
-    for outcome in (PREEMPTED, wanted):
-        if outcome in outcomes:
-            return str(outcome)
-    return next((outcome for outcome in outcomes if outcome in failing), outcomes[0])
 
 
 def is_settled(node: TreeNode, failure: Failure) -> bool:

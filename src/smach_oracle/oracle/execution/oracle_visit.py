@@ -13,17 +13,23 @@ from ..places.way import Way
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
-from ..recovery.failure import ContainerEnding, Failure, natural_ending, route_of
+from ..recovery.failure import (
+    ContainerEnding,
+    Failure,
+    leaving_outcome,
+    natural_ending,
+    route_of,
+)
 from ..recovery.judging import in_words
 from ..recovery.recovery import Recovery
 from ..recovery.taken_out_recovery import TakenOutRecovery
 from ..recovery.verdict import Verdict, VerdictKind
-from .departure import depart, leaving_outcome
+from .departure import depart
 from .entering import prepare_entry
 from .going_on import ask_to_go_on
 from .oracle_state import OracleState
 from .starting_over import restore_start
-from .transitions import go_to, message_of, terminate
+from .transitions import go_to, message_of, stop_left_behind, terminate
 
 
 class OracleVisit:
@@ -113,6 +119,8 @@ class OracleVisit:
         try:
             meta.execute(self._machine.userdata)
             verdict = meta.take_verdict()
+            if self._node.tree.early_end.why is not None:
+                return Verdict(VerdictKind.PREEMPTED)
             if verdict.arrives_at is None or depart(self._node, self._record.label, verdict):
                 return verdict
             return self._void()
@@ -130,6 +138,9 @@ class OracleVisit:
         return leaving_outcome(self._machine, self._node.in_force.failing, natural.outcome)
 
     def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
+        if self._node.tree.early_end.why is not None:
+            stop_left_behind(self._node)
+            return None
         if verdict.arrives_at not in (None, self._node):
             return self._depart(meta)
         if verdict.way is not None:

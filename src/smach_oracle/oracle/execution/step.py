@@ -21,6 +21,7 @@ from ..recovery.failure import (
     Failure,
     Route,
     author_recovers,
+    leaving_outcome,
     natural_ending,
     visit_result,
 )
@@ -29,12 +30,12 @@ from ..recovery.still_running import TakenOut, WatchedVisit
 from ..settings.failing_outcomes import PREEMPTED
 from .arriving_visit import ArrivingVisit
 from .boundary import Stop, pass_boundary
-from .departure import Departure, is_settled, leaving_outcome, take_departure
+from .departure import Departure, is_settled, take_departure
 from .oracle_visit import OracleVisit
 from .passed_over import tell_passed_over
 from .resumed_visit import ResumedVisit
 from .starting_over import keep_start
-from .transitions import go_to, message_of, terminate
+from .transitions import go_to, message_of, stop_left_behind, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
 NO_FACTS: Mapping[str, Any] = {}
@@ -61,12 +62,6 @@ def before_step(node: TreeNode) -> Optional[Stop]:
     if was_preempted:
         _heed_preempt(node)
     return pass_boundary(node, was_preempted) if node.engine.attentive else None
-
-
-def stop_left_behind(node: TreeNode) -> None:
-    """End the execution without an outcome; nobody waits for one."""
-    smach.logwarn('{}: stops, as the state around it was abandoned'.format(node.path))
-    node.machine._is_running = False
 
 
 def _heed_preempt(node: TreeNode) -> None:
@@ -116,6 +111,10 @@ class Step:
         node, record = self._node, self._record
         if record.unfinished is not None:
             return record.take_unfinished()
+        if node.asked_next is not None:
+            asked = node.asked_next.take(record)
+            if asked is not None:
+                return asked
         entered_by_oracle, way_down = record.entered_by_oracle, record.way_down
         if entered_by_oracle or way_down:
             record.forget_entry()
@@ -177,6 +176,7 @@ class Step:
         :raises InvalidTransitionError: likewise.
         """
         node, record = self._node, self._record
+        node.tree.early_end.note_end_of_state(smach.is_shutdown)
         if node.is_left_behind():
             stop_left_behind(node)
             return None
@@ -244,13 +244,16 @@ class Step:
         It teaches nothing. A failure from before is counted and told already.
         """
         node, record = self._node, self._record
+        if node.tree.early_end.end_at_shutdown(bool(smach.is_shutdown())):
+            stop_left_behind(node)
+            return None
         if self._machine.preempt_requested() or smach.is_shutdown():
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         if failure.kind is FailureKind.INTERRUPTED:
             node.emit(EventKind.FAILURE, state=failure.state, failure_kind=int(failure.kind),
                       failure_class=int(record.failure_class), rate=record.rate,
                       text=failure.text)
-        return ResumedVisit(node, record, failure, before.asks).run(self._context(), False)
+        return ResumedVisit(node, record, failure, before).run(self._context(), False)
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
         """Go on after a failure while the robot was not well; `why`: see `why_unwell_after`."""
@@ -293,6 +296,9 @@ class Step:
             return self._end_unrecovered(self._natural_ending(failure), failure)
         if is_settled(node, failure):
             return self._end_settled(failure)
+        asked = None if node.asked_next is None else node.asked_next.take(record)
+        if asked is not None:
+            return ResumedVisit(node, record, failure, asked).run(context, continuous)
         visit = (OftenUnwellVisit(node, record, failure, why_unwell) if why_unwell
                  else OracleVisit(node, record, failure))
         return visit.run(context, continuous)

@@ -18,6 +18,13 @@ def message_of(source: str, outcome: str, target: str) -> str:
     return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
 
 
+def stop_left_behind(node: TreeNode) -> None:
+    """End the execution without an outcome; nobody waits for one."""
+    log = smach.logwarn if node.tree.early_end.why is None else smach.loginfo
+    log('{}: stops, as {}'.format(node.path, node.why_left_behind()))
+    node.machine._is_running = False
+
+
 def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
     """End the container; a preempt that its last state has serviced is serviced."""
     machine = node.machine

@@ -13,9 +13,11 @@ from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.workers import recall_preempts
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
+from ..recovery.failure import outcome_of_early_end
 from .sending import tell_dropped
 from .starting_over import may_start_over
 from .wrapping import adopt, bring_up_to_date
@@ -24,12 +26,14 @@ from .wrapping import adopt, bring_up_to_date
 def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
     """Execute a container; where no container above it runs, this is a trial."""
     node = machine._oracle
+    if not node.has_running_ancestor():
+        node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
     if not node.look_around():
-        smach.logwarn('{}: does not begin, as the state around it was abandoned'.format(node.path))
-        return None
+        smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
+        return outcome_of_early_end(node, None)
     if node.has_running_ancestor():
         outcome, node.ended_before = node.ended_before, None
-        return _run(node, execute) if outcome is None else outcome
+        return outcome_of_early_end(node, _run(node, execute)) if outcome is None else outcome
     adopt(machine)
     for each in nodes_of(machine):
         bring_up_to_date(each)
@@ -37,6 +41,7 @@ def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]])
         node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
     store = open_store(node)
     resumed = None if store is None else store.to_resume()
+    node.tree.early_end.begin_trial(is_stored=store is not None)
     node.tree.begin_trial(machine.new_trial_id() if resumed is None else resumed.trial.trial_id)
     for each in nodes_of(machine):
         # one that still runs was abandoned in an earlier trial, and is left there
@@ -70,6 +75,10 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
     finally:
         node.tree.control.end_trial()
         why = _trial_end(node, outcome, error)
+        if why is TrialEnd.KEPT:
+            node.machine.service_preempt()
+            for state in node.machine._states.values():
+                recall_preempts(state)
         node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
                   data={ENDED_BY: why.value, **_learned(node)})
         save_rates(node)
@@ -101,6 +110,8 @@ def _learned(node: TreeNode) -> Dict[str, Any]:
 def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
     if isinstance(error, (KeyboardInterrupt, SystemExit)):
         return TrialEnd.STOPPED
+    if node.tree.early_end.why is not None:
+        return node.tree.early_end.why
     if error is not None:
         return TrialEnd.ERROR
     if outcome is not None:

@@ -136,6 +136,13 @@ class Oracle:
         """Whether failures are recovered from, not only observed."""
         return self._node.tree.recover
 
+    def note_shutdown(self) -> None:
+        """Note that the process goes down, before the machine is preempted for that.
+
+        A stored trial with an open question then stops where it stands, and can go on later.
+        """
+        self._node.tree.early_end.note_shutdown()
+
     def rates(self) -> List[StateRateRow]:
         """Return the learned rate of every state, of this container and all below it."""
         return rate_rows(self._node.machine)

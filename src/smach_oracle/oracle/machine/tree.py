@@ -11,6 +11,7 @@ import smach
 
 from ..asking.question import Expert
 from ..control.control import Control
+from ..records.early_end import EarlyEnd
 from ..records.events import EventSource
 from ..records.restarts import Restarts
 from ..settings.health import HealthFunction
@@ -50,6 +51,7 @@ class Tree:
         self.workers = Workers()
         self.budget = TrialBudget()
         self.restarts = Restarts()
+        self.early_end = EarlyEnd()
         self.waiting: Waiting = MonotonicWaiting()
         self.trials = 0  # begun
         # whether a state is guarded (`on_retry`), so that visits are numbered
@@ -106,6 +108,7 @@ class Tree:
         del state['_lock'], state['rates_lock'], state['departures_lock']
         state['expert'] = None
         state['waiting'] = MonotonicWaiting()
+        state['early_end'] = EarlyEnd()
         state['describe_failure'] = no_description
         return state
 

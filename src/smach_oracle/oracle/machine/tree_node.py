@@ -5,6 +5,7 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 
 import smach
 
+from ..records.asked_once import AskedOnce
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..settings.patterns import Nested, is_nested_at
@@ -126,6 +127,8 @@ class TreeNode:
         self.resuming: Optional[EntryPort] = None  # at the next execution
         # outcome of the next execution, which was over before the program was stopped
         self.ended_before: Optional[str] = None
+        # before its next state, where nothing is to move unasked
+        self.asked_next: Optional[AskedOnce] = None
         self.gave_up = False  # the latest execution ended so
         # the states that are executed as preconditions now
         self.as_preconditions: Tuple[smach.State, ...] = ()
@@ -181,8 +184,22 @@ class TreeNode:
         return False
 
     def is_left_behind(self) -> bool:
-        """Whether this container executes inside a state that was abandoned."""
-        return any(run.abandoned for run in self.runs_around)
+        """Whether this container is to stop without an outcome, as nobody waits for one.
+
+        It executes inside a state that was abandoned, or its trial has ended early.
+        """
+        return self.tree.early_end.why is not None or any(
+            run.abandoned for run in self.runs_around)
+
+    def why_left_behind(self) -> str:
+        """Say why, where it is left behind."""
+        return ('its trial ends early, and can go on later' if self.tree.early_end.why is not None
+                else 'the state around it was abandoned')
+
+    def runs_beside_others(self) -> bool:
+        """Whether a Concurrence or an Iterator is around it."""
+        return self.parent is not None and (
+            self.branch is not None or len(self.below) > 1 or self.parent.runs_beside_others())
 
     def look_around(self) -> bool:
         """Find out inside which executions this one is about to begin; whether it still may."""
@@ -299,6 +316,7 @@ class TreeNode:
     def begin_trial(self, trial_id: str) -> None:
         """Forget what belongs to a trial; the rates stay."""
         self.trial_id = trial_id
+        self.resuming = self.ended_before = self.asked_next = None  # of one that ended early
         self.records.begin_trial()
 
     def begin_execution(self) -> None:

@@ -47,6 +47,7 @@ class TrialEnd(str, Enum):
     STOPPED = 'stopped'  # Ctrl-C or SystemExit
     SHUTDOWN = 'shutdown'  # while states ran; the machine has no outcome
     INCONSISTENT = 'inconsistent'  # no state was entered
+    KEPT = 'kept'  # nobody has said how a stored trial goes on: it is asked again
 
 
 def decided_by(event: Event) -> Decider:

@@ -16,6 +16,7 @@ class Unfinished(NamedTuple):
     text: str
     asks: str  # why a person is asked at once, '' where nobody is
     snapshot: Optional[Mapping[str, Any]] = None  # userdata with which it began
+    keeps: bool = False  # where nobody answers, the trial is kept
 
 
 class FastEdge:
@@ -227,7 +228,8 @@ class StateRecord:
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
-        self.forget_entry()  # of a trial that ended before the visit began
+        self.unfinished, self.open_question = None, ''  # of a trial that ended before the visit
+        self.forget_entry()
         self._visits_before = self._visits + self._by_edges()
 
     @property

@@ -10,9 +10,10 @@ import smach
 
 from ..asking.question import names
 from ..machine.protocols import Machine
+from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
-from ..settings.failing_outcomes import FailingNames, is_preempted
+from ..settings.failing_outcomes import PREEMPTED, FailingNames, is_preempted
 
 
 class Route(NamedTuple):
@@ -123,6 +124,29 @@ def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
             return ContainerEnding(outcome=outcome)
     return ContainerEnding(
         error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
+
+
+def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[str]) -> str:
+    """Return an outcome with which a container ends that is left: nobody goes by it.
+
+    :param wanted: how its failure would have ended it.
+    """
+    outcomes = sorted(machine.get_registered_outcomes(), key=str)
+    for outcome in (PREEMPTED, wanted):
+        if outcome in outcomes:
+            return str(outcome)
+    return next((outcome for outcome in outcomes if outcome in failing), outcomes[0])
+
+
+def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str]:
+    """Return an outcome for a Concurrence or an Iterator where its trial has ended early.
+
+    It wants one, and nobody goes by it.
+    """
+    if (outcome is not None or node.tree.early_end.why is None
+            or not (node.branch is not None or len(node.below) > 1)):
+        return outcome
+    return leaving_outcome(node.machine, node.in_force.failing, None)
 
 
 def raised_error(label: str, state: smach.State, err: Exception) -> Exception:

@@ -31,7 +31,7 @@ from .levels import (
 )
 from .obeying import verdict_of
 from .question_making import Account, make_question, targets_of
-from .stop import RecoveryStop
+from .stop import RecoveryStop, preempt_beside
 from .verdict import Verdict, VerdictKind
 
 
@@ -209,9 +209,12 @@ class Recovery:
 
     def _ask_expert(self, expert: Expert) -> Verdict:
         deadline_s, self._ends_budget = self._budget.within(self._node.settings.deadline_s)
-        with standing_still(self._node.runs_around):
+        early_end = self._node.tree.early_end
+        with standing_still(self._node.runs_around), early_end.asking():
             reply = Inquiry(self, expert, deadline_s).run()
         if self.stopped():
+            if early_end.end_at_shutdown(bool(smach.is_shutdown())):
+                preempt_beside(self._node)
             if reply.question_id:
                 self.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
                           text=self._stop.why())
@@ -231,7 +234,9 @@ class Recovery:
 
     def say_that_it_waits(self, question: Question) -> None:
         """In the log: a machine that stands still for minutes looks as if it hung."""
-        fallback = ' '.join(self._node.settings.on_no_answer).strip()
+        self._say_that_it_waits(question, ' '.join(self._node.settings.on_no_answer).strip())
+
+    def _say_that_it_waits(self, question: Question, fallback: str) -> None:
         limit = 'it waits on'
         if question.deadline_s:
             limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback)
@@ -287,8 +292,11 @@ class Recovery:
     def _preempted(self) -> Verdict:
         """End the container as preempted.
 
-        Where it has no such outcome, it ends as the failure would have ended it.
+        Where it has no such outcome, it ends as the failure would have ended it. Where the trial
+        ends early, it has no outcome at all.
         """
+        if self._node.tree.early_end.why is not None:
+            return Verdict(VerdictKind.PREEMPTED)
         ending = self._natural_ending()
         if PREEMPTED in self._machine.get_registered_outcomes():
             ending = ContainerEnding(outcome=PREEMPTED)

@@ -115,6 +115,8 @@ class WatchedVisit:
             return
         reply = self._inquire(expert)
         if self.stopped():
+            if not self._ended.is_set():
+                self._node.tree.early_end.end_at_shutdown(bool(smach.is_shutdown()))
             self._close(why_stopped(self._node, self._machine.preempt_requested()))
         elif reply.answer is None:
             why_over = self._budget.why_over()
@@ -137,7 +139,7 @@ class WatchedVisit:
         # the state runs on, and so do the time limits around it; whoever looks whether a state
         # around still runs has its answer in this question
         watched = [run for run in self._node.runs_around if isinstance(run, WatchedRun)]
-        with standing_still(watched):
+        with standing_still(watched), self._node.tree.early_end.asking():
             return Inquiry(self, expert, self._budget.within(0.0)[0]).run()
 
     def _ask_later(self) -> None:

@@ -10,9 +10,21 @@ from ..records.state_record import StateRecord
 
 def why_stopped(node: TreeNode, preempted: bool) -> str:
     """Return why what goes on in a container is stopped, where that is so."""
+    early = node.tree.early_end.why
+    if early is not None:
+        return early.value
     if preempted:
         return 'preempted'
     return 'left behind' if node.is_left_behind() else 'shutdown'
+
+
+def preempt_beside(node: TreeNode) -> None:
+    """Preempt the whole machine where others may run next to a container.
+
+    To be called in its thread, its lock not held.
+    """
+    if node.runs_beside_others():
+        node.top().machine.request_preempt()
 
 
 class RecoveryStop:

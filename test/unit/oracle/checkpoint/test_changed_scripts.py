@@ -209,7 +209,7 @@ def test_without_a_map_a_person_decides_also_where_its_state_is_gone(folder):
         before.run(kill_at=point)
         begun = before.diary.count('begins')
         told = after.run()
-        assert told.get('outcome') == 'aborted', (point, told)  # nobody was there to ask
+        assert told.get('ended_by') == 'kept', (point, told)  # nobody was there to ask
         assert before.diary.count('begins') == begun, point
         anew(folder)
 
@@ -219,7 +219,7 @@ def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
     before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=names)
     killed_while_it_runs(folder, before, 'LOOK')
     begun = before.diary.count('begins')
-    assert after.run()['outcome'] == 'aborted'
+    assert after.run()['ended_by'] == 'kept'
     assert before.diary.count('begins') == begun
 
 
@@ -246,10 +246,31 @@ def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
         assert change in text
 
 
-def test_in_the_same_script_the_map_is_of_no_effect(folder):
-    before, after = both_scripts(folder, BEFORE, BEFORE, resume_map={'A': 'Z'})
+@pytest.mark.parametrize('names, unknown', [
+    ({'A': 'Z', 'KITCHEN/LOOK': 'KITCHEN/PICK'}, []),
+    ({'A': 'Zz', 'KITCHEN/LOK': 'KITCHEN/PICK'}, ['KITCHEN/LOK', 'Zz']),
+])
+def test_in_the_same_script_a_map_is_of_no_effect_and_unknown_names_are_named(
+        folder, names, unknown):
+    before, after = both_scripts(folder, BEFORE, BEFORE, resume_map=names)
     before.run(kill_at=14)
-    assert after.run()['outcome'] == 'succeeded'
+    told = after.run()
+    assert told['outcome'] == 'succeeded'
+    log = told['log']
+    named = [text for text in log if 'resume_map' in text]
+    assert [re.search("names '(.*)', which is not a state of the machine, and was not one "
+                      'before; there are A, BOTH', text).group(1) for text in named] == unknown
+    goes_on = next(index for index, text in enumerate(log) if ' goes on; its program' in text)
+    assert all(log.index(text) < goes_on for text in named)
+
+
+def test_a_map_that_is_not_needed_any_more_is_not_warned_of(folder):
+    before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+    before.run(kill_at=14)
+    after.run(kill_at=6)
+    told = after.run()
+    assert told['outcome'] == 'succeeded'
+    assert not [text for text in told['log'] if 'resume_map' in text]
 
 
 def test_oracle_state_tells_the_new_names(folder):

@@ -35,8 +35,7 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
     kind = '(_io.TextIOWrapper)'
     assert named == ["TOP: userdata key 'mine' {} of the script".format(kind),
                      "TOP: userdata key 'other' {} of TOP/A".format(kind),
-                     "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind),
-                     "TOP: userdata key 'file' {} of TOP/IN".format(kind)]
+                     "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind)]
 
 
 class Looks(smach.State):
@@ -94,3 +93,34 @@ def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
         'checkpoint': str(tmp_path / 'robot.db')}).execute()
     named = [text for level, text in log if level == 'warn' and 'begins again' in text]
     assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
+
+
+def test_a_value_that_goes_up_through_containers_is_named_once(tmp_path, log):
+    inner = smach.StateMachine(['succeeded'], [], ['file'])
+    with inner:
+        smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'succeeded'})
+    machine = smach.StateMachine(['succeeded'], [], ['given'])
+    with machine:
+        smach.StateMachine.add('IN', inner, remapping={'file': 'given'})
+    OracleContainer.wrap(machine, name='TOP', settings={
+        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    named, = [text for level, text in log if 'cannot be stored' in text]
+    assert named.startswith("TOP/IN: userdata key 'file' (_io.TextIOWrapper) of TOP/IN/OPEN")
+
+
+def test_a_key_that_is_said_to_be_missing_is_not_named_again(tmp_path):
+    def build(diary, points):
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        machine.userdata.mine = open('/dev/null')
+        with machine:
+            smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'B'})
+            smach.StateMachine.add('B', Noted('B', diary, points), ENDS)
+        return machine
+
+    killed = KilledMachine(tmp_path, build)
+    killed.run(kill_at=4)
+    told = killed.run()
+    assert told['outcome'] == 'succeeded'
+    of_mine, = [text for text in told['log'] if "key 'mine'" in text]
+    assert 'has the value that the script gives it' in of_mine

@@ -187,3 +187,11 @@ def test_looking_for_a_store_makes_none(tmp_path, capsys):
     where = tmp_path / 'none.db'
     assert 'there is no such store' in refused(capsys, where, 'drop')
     assert not where.exists()
+
+
+def test_a_key_that_is_new_is_said_to_be(killed, capsys):
+    assert told(capsys, killed.store, 'edit', 'done=["A"]') == 'done is changed\n'
+    assert told(capsys, killed.store, 'edit', 'file=1') == 'file is changed\n'
+    assert told(capsys, killed.store, 'edit', 'don=["A"]') == (
+        'don is new: TOP had done, file\n')
+    assert told(capsys, killed.store, 'edit', 'don=["B"]') == 'don is changed\n'

@@ -1,0 +1,26 @@
+"""A question that comes before the next state of some containers. Pure; no smach."""
+from typing import List, Optional, Sequence
+
+from .events import FailureKind
+from .state_record import StateRecord, Unfinished
+
+NOT_BEGUN = 'the program was stopped before it began'
+
+
+class AskedOnce:
+    """Has a person asked once, before the first state that any of some containers comes to."""
+
+    def __init__(self, why: str, passes: Sequence[StateRecord]) -> None:
+        """`passes`: states that are entered before, once each, on the way to where it stood."""
+        self._why = why
+        self._passes: List[StateRecord] = list(passes)
+
+    def take(self, record: StateRecord) -> Optional[Unfinished]:
+        """Return what stands in place of the coming visit of a state; None for nothing."""
+        if not self._why:
+            return None
+        if record in self._passes:
+            self._passes.remove(record)
+            return None
+        why, self._why = self._why, ''
+        return Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, why, keeps=True)

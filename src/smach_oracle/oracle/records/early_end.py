@@ -1,0 +1,70 @@
+"""Whether a trial ends before its machine has come to an end, and goes on later from its store.
+
+Pure; no smach.
+"""
+import contextlib
+import threading
+from typing import Callable, Iterator, Optional
+
+from .facts import TrialEnd
+
+
+class EarlyEnd:
+    """The early end of one trial. Every container then stops where it stands, without an outcome.
+
+    Any thread may call it.
+    """
+
+    def __init__(self) -> None:
+        self.why: Optional[TrialEnd] = None  # None: it has not come
+        self._is_stored = False
+        self._is_going_down = False  # the process
+        self._asking = 0  # questions that are open
+        self._lock = threading.Lock()
+
+    def begin_trial(self, is_stored: bool) -> None:
+        """Begin a trial; `is_stored`: it has a store from which it can go on."""
+        with self._lock:
+            self.why, self._is_stored = None, is_stored
+
+    @contextlib.contextmanager
+    def asking(self) -> Iterator[None]:
+        """Within it a question is open: a shutdown has the trial go on later."""
+        with self._lock:
+            self._asking += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._asking -= 1
+
+    def note_end_of_state(self, is_shutdown: Callable[[], bool]) -> None:
+        """Note that a state has ended: next to an open question a shutdown may have ended it."""
+        if self._asking:
+            self.end_at_shutdown(is_shutdown())
+
+    def keep(self) -> None:
+        """End the trial early, as nobody has answered whether it may go on."""
+        with self._lock:
+            self.why = self.why or TrialEnd.KEPT
+
+    def note_shutdown(self) -> None:
+        """Note that the process goes down, before its machines are preempted for that."""
+        with self._lock:
+            self._is_going_down = True
+            if self._asking:
+                self._end_at_shutdown()
+
+    def end_at_shutdown(self, is_shutdown: bool) -> bool:
+        """End a stored trial early where the process goes down; return whether it has so ended.
+
+        `is_shutdown`: what SMACH says of it.
+        """
+        with self._lock:
+            if is_shutdown or self._is_going_down:
+                self._end_at_shutdown()
+            return self.why is not None
+
+    def _end_at_shutdown(self) -> None:
+        if self._is_stored and self.why is None:
+            self.why = TrialEnd.SHUTDOWN

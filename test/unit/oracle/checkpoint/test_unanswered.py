@@ -1,0 +1,275 @@
+"""Nobody says how a stored trial goes on: it is kept, and asked about again."""
+import contextlib
+import io
+import json
+import os
+import signal
+
+import pytest
+from killed_machines import KilledMachine, Noted
+from killed_trees import ALL, ENDS, flat, make, points_of, tree
+from waiting import wait_for
+
+import smach
+from smach_oracle.oracle import Expert, OracleContainer
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.store.state_command import main
+from smach_oracle.store.store_file import StoreFile
+
+FIRST_STATE = 3  # behind TRIAL_START and CONTAINER_START
+
+
+class Answers(Expert):
+    """A fake expert that writes down what it is asked; `give(question, number)` answers."""
+
+    def __init__(self, path, give):
+        self._path, self._give, self._number = path, give, 0
+
+    def ask(self, question, cancelled, progress):
+        self._number += 1
+        with self._path.open('a') as stream:
+            stream.write(json.dumps([question.question_id, question.container_path,
+                                     question.failed_state, question.reason,
+                                     question.fallback]) + '\n')
+        return self._give(question, self._number)
+
+    def run_interface(self, offer, question, cancelled, progress):
+        return None
+
+
+def questions(path):
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def nobody(question, number):
+    return None
+
+
+def same_state(question, number):
+    return Answer(AnswerKind.GOTO, state=question.failed_state, by='Ann')
+
+
+def raises(question, number):
+    raise RuntimeError('no line')
+
+
+def last_moment(killed):
+    store = StoreFile(killed.store, read_only=True)
+    trial = store.trials()[-1]
+    return trial, store.moments(trial.number)[-1]
+
+
+def oracle_state(*arguments):
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert main([str(each) for each in arguments]) == 0
+    return out.getvalue()
+
+
+def points_in(tmp_path):
+    """Those at which the first state is about to begin, or has, and the machine has not ended."""
+    return range(FIRST_STATE, points_of(tmp_path, tree))
+
+
+def test_killed_anywhere_the_trial_is_kept_until_somebody_decides(tmp_path):
+    for point in points_in(tmp_path):
+        killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
+        assert killed.run(kill_at=point) is None
+        (tmp_path / 'killed' / 'diary').touch()
+        begun = killed.diary.count('begins')
+        for _ in range(2):
+            told = killed.run()
+            assert told.get('outcome') is None and told['ended_by'] == 'kept', (point, told)
+            assert killed.diary.count('begins') == begun, point
+            trial, moment = last_moment(killed)
+            assert (trial.ended, moment.kind) == (None, 'KEPT'), point
+        told = killed.run(on_resume='recover')
+        assert told['outcome'] == 'succeeded', (point, told)
+        assert set(ALL) == set(killed.diary.count('ends')), point
+        begun = killed.diary.count('begins')
+        again = {name for name in begun if begun[name] > 1}
+        assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, again)
+
+
+def test_killed_anywhere_nothing_moves_before_the_answer(tmp_path):
+    asked = tmp_path / 'asked'
+    for point in points_in(tmp_path):
+        killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
+        killed.run(kill_at=point)
+        (tmp_path / 'killed' / 'diary').touch()
+        begun, seen = killed.diary.count('begins'), []
+
+        def give(question, number, killed=killed, begun=begun, seen=seen):
+            if number == 1:
+                assert killed.diary.count('begins') == begun
+            return same_state(question, number)
+
+        asked.write_text('')
+        told = killed.run(expert=Answers(asked, give))
+        assert told['outcome'] == 'succeeded', (point, told)
+        assert set(ALL) == set(killed.diary.count('ends')), point
+        states = [state for _, _, state, _, _ in questions(asked)]
+        # two branches are asked about where both were under way
+        assert len(states) == 1 or set(states) <= {'LEFT', 'M1', 'M2'}, (point, states)
+        assert len(states) == len(set(states)), (point, states)
+        begun = killed.diary.count('begins')
+        again = {name for name in begun if begun[name] > 1}
+        assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, again)
+
+
+@pytest.mark.parametrize('give', [None, nobody, raises])
+@pytest.mark.parametrize('on_no_answer', ['stop', {'goto': 'A'}, {'give_up': 'aborted'}])
+def test_whatever_is_to_happen_without_an_answer_nothing_moves(tmp_path, give, on_no_answer):
+    killed = KilledMachine(tmp_path, flat, on_resume='ask', on_no_answer=on_no_answer)
+    killed.run(kill_at=8)
+    begun = killed.diary.count('begins')
+    expert = None if give is None else Answers(tmp_path / 'asked', give)
+    told = killed.run(expert=expert)
+    assert (told['outcome'], told['ended_by']) == (None, 'kept')
+    assert killed.diary.count('begins') == begun
+    said, = [text for text in told['log'] if 'nobody has said' in text]
+    for part in ('The next start asks again', '`oracle_run --resume`',
+                 '`oracle_state {} drop`'.format(killed.store)):
+        assert part in said
+    if give is not None:
+        (_, _, _, reason, fallback), = questions(tmp_path / 'asked')
+        assert 'the program was stopped' in reason
+        assert fallback == 'stop, and keep the trial for the next start'
+
+
+def test_it_is_asked_again_and_goes_on_with_the_answer(tmp_path):
+    asked = tmp_path / 'asked'
+    killed = KilledMachine(tmp_path, flat, on_resume='ask')
+    killed.run(kill_at=8)
+    for give, ended_by in ((nobody, 'kept'), (nobody, 'kept'), (same_state, 'outcome')):
+        assert killed.run(expert=Answers(asked, give))['ended_by'] == ended_by
+    ids = [each[0] for each in questions(asked)]
+    assert len(set(ids)) == 3
+    assert killed.run()['events'][0][0] == 'TRIAL_START'
+
+
+def test_killed_as_it_is_kept_it_asks_again(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat, on_resume='ask')
+    killed.run(kill_at=8)
+    begun = killed.diary.count('begins')
+    points = killed.run()['points']
+    for point in range(1, points + 1):
+        assert killed.run(kill_at=point) is None
+        assert killed.diary.count('begins') == begun
+        assert last_moment(killed)[0].ended is None
+    assert killed.run(on_resume='recover')['outcome'] == 'succeeded'
+
+
+class Meets(smach.State):
+    """Ends once the other one runs as well; the first time the program is killed then."""
+
+    def __init__(self, name, diary, folder):
+        smach.State.__init__(self, ['succeeded', 'preempted'])
+        self._name, self._diary, self._killed = name, diary, folder / 'was_killed'
+        self._before = diary.count('begins')
+
+    def execute(self, userdata):
+        self._diary.write('begins', self._name)
+        wait_for(lambda: self._have_met() or self.preempt_requested())
+        if self.preempt_requested():
+            self.service_preempt()
+            return 'preempted'
+        if not self._killed.exists():
+            self._killed.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        self._diary.write('ends', self._name)
+        return 'succeeded'
+
+    def _have_met(self):
+        begun = self._diary.count('begins')
+        return all(begun[name] > self._before[name] for name in ('LEFT', 'RIGHT'))
+
+
+def meeting(folder):
+    def build(diary, points):
+        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', outcome_map={
+            'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
+        with both:
+            both.add('LEFT', Meets('LEFT', diary, folder))
+            both.add('RIGHT', Meets('RIGHT', diary, folder))
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            machine.add('BOTH', both, {'succeeded': 'C', 'aborted': 'C'})
+            machine.add('C', Noted('C', diary, points), ENDS)
+        return machine
+    return build
+
+
+def test_in_a_concurrence_the_branch_that_was_answered_stops_as_well(tmp_path):
+    killed = KilledMachine(tmp_path, meeting(tmp_path), on_resume='ask')
+    assert killed.run() is None
+
+    def give(question, number):
+        if question.failed_state == 'LEFT':
+            return same_state(question, number)
+        assert wait_for(lambda: killed.diary.count('begins')['LEFT'] == 2)
+        return None
+
+    told = killed.run(expert=Answers(tmp_path / 'asked', give))
+    assert (told['outcome'], told['ended_by']) == (None, 'kept')
+    assert killed.diary.count('begins') == {'LEFT': 2, 'RIGHT': 1}
+    told = killed.run(on_resume='recover')
+    assert told['outcome'] == 'succeeded'
+    assert killed.diary.count('begins') == {'LEFT': 3, 'RIGHT': 2, 'C': 1}
+
+
+def test_a_trial_that_is_kept_can_be_dropped_and_the_next_one_is_not_held_up(tmp_path):
+    killed = KilledMachine(tmp_path, tree, on_resume='ask')
+    killed.run(kill_at=46)
+    assert killed.run()['ended_by'] == 'kept'
+    assert 'kept, as nobody answered: TOP/' in oracle_state(killed.store)
+    oracle_state(killed.store, 'drop')
+    assert killed.run()['outcome'] == 'succeeded'
+
+
+def test_in_one_process_a_kept_trial_goes_on_and_a_dropped_one_leaves_nothing(tmp_path):
+    for drops in (False, True):
+        killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
+        for point in (30, 34, 46):
+            killed.run(kill_at=point)
+        machine = OracleContainer.wrap(tree(killed.diary, lambda: None), name='TOP', settings={
+            'checkpoint': killed.store, 'on_resume': 'ask', 'checkpoint_synchronous': 'OFF'})
+        assert machine.execute() is None
+        assert not machine.preempt_requested()
+        if drops:
+            oracle_state(killed.store, 'drop')
+            (tmp_path / 'killed' / 'diary').write_text('')
+        else:
+            machine.expert = Answers(tmp_path / 'asked', same_state)
+        assert machine.execute() == 'succeeded'
+        assert set(ALL) == set(killed.diary.count('ends'))
+
+
+def test_a_failure_of_a_concurrence_whose_branches_had_ended_is_asked_about(tmp_path):
+    def both(diary, points):
+        inner = smach.Concurrence(['succeeded', 'aborted'], 'aborted', ['done'], ['done'],
+                                  outcome_map={'succeeded': {'LEFT': 'aborted'}})
+        with inner:
+            inner.add('LEFT', Noted('LEFT', diary, points))
+            inner.add('RIGHT', Noted('RIGHT', diary, points))
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            machine.add('BOTH', inner, ENDS)
+        return machine
+
+    asked, tried = tmp_path / 'asked', 0
+    for point in range(5, points_of(tmp_path, both)):
+        killed = KilledMachine(make(tmp_path / 'killed'), both, on_resume='ask')
+        killed.run(kill_at=point)
+        begun = killed.diary.count('begins')
+        trial, moment = last_moment(killed)
+        if sum(killed.diary.count('ends').values()) != 2 or moment.kind != 'TRANSITION':
+            continue
+        tried += 1
+        asked.write_text('')
+        told = killed.run(expert=Answers(asked, nobody))
+        assert told['ended_by'] == 'kept', (point, told)
+        assert killed.diary.count('begins') == begun
+        assert questions(asked), point
+    assert tried
