@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A script under oracle_run is killed with SIGKILL, and run again: it goes on where it stood."""
 import os
+import signal
 
 import rospy
 import rostest
@@ -55,6 +56,40 @@ class KilledTest(SurvivingCase):
             query_id=entry.query.query_id,
             decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Bob')))
         self.assertFalse(later.ok)
+
+    def test_a_signal_while_a_question_is_open_leaves_the_trial_to_go_on(self):
+        expert = FrontEnd(self, EXPERTS)
+        asks = ('--config', self.settings)
+        task = self.run_task(*asks, told='aborted')
+        ids = [expert.question(40.0, 'TELL').query.query_id]
+        for number in (signal.SIGINT, signal.SIGTERM):
+            task.signal(number)
+            task.wait(40.0)
+            self.assertNotIn('OUTCOME aborted', task.output())
+            self.assertTrue(wait_for(lambda: expert.question(0.1) is None))
+            task = self.run_task(*asks, told='aborted')  # asks first, as nobody said `--resume`
+            self.assertTrue(task.says('goes on', 40.0), task.output())
+            ids.append(expert.question(40.0, 'TELL').query.query_id)
+        self.assertEqual(len(set(ids)), 1)
+        reply = expert.answer(AnswerQueryRequest(
+            query_id=ids[0],
+            decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Ann')))
+        self.assertTrue(reply.ok, reply.message)
+        self.assertTrue(task.says('OUTCOME aborted', 40.0), task.output())
+
+    def test_a_trial_for_which_nobody_answers_is_kept(self):
+        task = self.run_task(goal=Behaviour.HANG)
+        self.assertTrue(task.says('LOOKS', 40.0), task.output())
+        self.kill(task)
+        hurried = script(self, 'deadline_s: 1\n', 'hurried.yaml')
+        for _ in range(2):
+            again = self.run_task('--config', hurried)
+            again.wait(60.0)
+            self.assertIn('the trial is kept', again.output())
+            self.assertIn('OUTCOME None', again.output())
+            self.assertNotIn('SEEN', again.output())
+        resumed = self.run_task('--resume')
+        self.assertTrue(resumed.says('OUTCOME succeeded', 60.0), resumed.output())
 
     def test_with_nothing_stored_it_begins_anew_and_says_so(self):
         task = self.run_task('--resume')

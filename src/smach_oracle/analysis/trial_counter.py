@@ -20,7 +20,7 @@ class TrialEnding(Enum):
     SUCCESS = 'success'
     FAILURE = 'failure'
     PREEMPTED = 'preempted'  # by request, or by a shutdown or Ctrl-C
-    UNFINISHED = 'unfinished'  # no end was recorded, or it still runs
+    UNFINISHED = 'unfinished'  # no end was recorded, it still runs, or is kept to go on later
 
 
 class TrialCounter:
@@ -77,7 +77,7 @@ class TrialCounter:
     def ending(self) -> TrialEnding:
         """How it ended."""
         end = self._end
-        if end is None:
+        if end is None or ended_by(end, self._state_seen) is TrialEnd.KEPT:
             return TrialEnding.UNFINISHED
         if end.outcome.lower() == PREEMPTED or (not end.outcome and self._was_stopped(end)):
             return TrialEnding.PREEMPTED
