@@ -6,7 +6,7 @@ import signal
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
-from oracle_support import EventLog, FrontEnd, oracle_run
+from oracle_support import EventLog, FrontEnd, oracle_run, script
 from smach_ros_action_node import Behaviour
 from survive_support import EXPERTS, SUCCEED, SurvivingCase, Traffic
 from waiting import wait_for

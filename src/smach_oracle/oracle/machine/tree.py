@@ -105,15 +105,15 @@ class Tree:
         That is the expert, its connection, a clock that was handed in, and locks.
         """
         state = dict(self.__dict__)
-        del state['_lock'], state['rates_lock'], state['departures_lock']
+        del state['_lock'], state['rates_lock'], state['departures_lock'], state['early_end']
         state['expert'] = None
         state['waiting'] = MonotonicWaiting()
-        state['early_end'] = EarlyEnd()
         state['describe_failure'] = no_description
         return state
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self.early_end = EarlyEnd()
         self._lock = threading.Lock()
         self.rates_lock = threading.Lock()
         self.departures_lock = threading.Lock()
