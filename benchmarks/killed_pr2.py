@@ -176,7 +176,8 @@ class RobotUnderKills:
         self._reset(seed)  # the world judges a trial where the next one begins
         with open(self._truth) as stream:
             truth = json.loads(stream.readlines()[-1])
-        assert truth['seed'] == seed, truth
+        if truth['seed'] != seed:
+            raise RuntimeError('the world told of seed {seed} last'.format(**truth))
         return Ended(outcome, truth['success'], questions, (ended_s or 0.0) - (began_s or 0.0),
                      killed_in, truth['why'])
 
