@@ -5,9 +5,9 @@
 
 The examples are shared among the borders that the unit tests try with 200 each
 (test/unit/support/borders): settings, parameters, messages, the console's socket, bags, rates,
-stores, answers, a machine that runs, the robot's health, its skills, its interfaces, its world. What comes past a border, or hangs for a minute, is shown with the smallest example
-that Hypothesis finds. With --check there are fewer examples, and the exit status is 1
-where there is any.
+stores, answers, a machine that runs, the robot's health, its skills, its interfaces, its world.
+What comes past a border, or hangs for a minute, is shown with the smallest example that Hypothesis
+finds. With --check there are fewer examples, and the exit status is 1 where there is any.
 """
 import argparse
 import logging
