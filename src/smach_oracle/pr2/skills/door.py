@@ -272,7 +272,7 @@ def _take_hand_off(context: SkillContext) -> None:
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
-    """Reach behind the door's edge and push it from inside."""
+    """Reach behind the door's edge and push it from inside; returns how far it is open, rad."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
@@ -282,6 +282,8 @@ def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
         swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6),
                        ('door',), lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
+            if view.angle >= LEAST_OPEN:
+                return view.angle  # wide enough, as it stands
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
