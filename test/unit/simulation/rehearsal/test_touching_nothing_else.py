@@ -37,3 +37,21 @@ def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expe
     assert done.success, (done.failed, done.reason, done.why)
     assert len(world.movable()) > 1 and world.touched == expected
     world.close()
+
+
+@pytest.mark.parametrize('seed', [97, 321])
+def test_a_grasp_is_one_from_which_the_arm_can_lift(seed):
+    """The first grasp that is in reach is too high up for that here."""
+    world = World(binning=2)
+    done = rehearse(tabletop_scene.draw(seed), world)
+    assert done.success, (done.failed, done.reason, done.why)
+    assert not world.harm.found(world)
+    world.close()
+
+
+def test_what_was_moved_meanwhile_is_not_knocked_over():
+    world = World(binning=2)
+    done = rehearse(tabletop_scene.draw(307), world)
+    assert done.failed == 'PICK' and 'no longer where it was seen' in done.reason
+    assert not world.harm.found(world)
+    world.close()
