@@ -75,7 +75,8 @@ LAYERS: Dict[str, List[Layer]] = {
         'renaming', 'rows', {'codecs', 'errors', 'names'}
     ],
     'pr2': [
-        'nodes', {'skills', 'ros_robot'}, {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
+        'nodes', {'skills', 'ros_robot', 'checks'},
+        {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
         'perception', {'model', 'robot', 'kitchen'}, 'work_costs'
     ],
     'testing': [

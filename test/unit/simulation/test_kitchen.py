@@ -217,6 +217,12 @@ def test_one_look_at_the_fridge_sets_right_where_the_robot_believes_to_stand(deg
     assert np.hypot(*off[:2, 3]) < 0.006 and abs(off[1, 0]) < 0.006
 
 
+@pytest.mark.parametrize('ahead', [0.16, -0.16])
+def test_a_localisation_that_is_wrong_by_more_than_the_map_may_be_is_set_right(ahead):
+    off = off_after_a_look(0, from_rpy((ahead, 0.03, 0.0), yaw=0.02))
+    assert np.hypot(*off[:2, 3]) < 0.006 and abs(off[1, 0]) < 0.006
+
+
 @pytest.mark.parametrize('degrees', [21, 28, 35])
 def test_a_door_that_hides_the_rest_of_the_fridge_does_not_lead_the_localisation_astray(degrees):
     off = off_after_a_look(degrees, from_rpy((0.03, -0.02, 0.0), yaw=-0.02))

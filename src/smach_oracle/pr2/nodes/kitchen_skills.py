@@ -23,7 +23,7 @@ from ..skills.hand_over import hand_over
 from ..skills.localise import localise_at_fridge
 from ..skills.pick import FIRM, HeldObject
 from .frames import box_in_base, pose_in_base, pose_message
-from .manipulation import USUAL, Manipulation, elsewhere_of
+from .manipulation import USUAL, Manipulation, check_is_there, elsewhere_of
 from .skill_server import ReportStatus
 
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
@@ -65,7 +65,9 @@ class KitchenSkills(Manipulation):
         report('choosing a grasp in the refrigerator')
         self.held.pop(arm, None)
         limbs = limbs_of(self._links, encoder_readings(self.context.robot))
-        others = things_on_shelf(self.context.robot.see(), self.kitchen, fridge, limbs)
+        image = self.context.robot.see()
+        check_is_there(image, target)
+        others = things_on_shelf(image, self.kitchen, fridge, limbs)
         with self.firmer_after_slip(goal.attempt) as effort:
             self.held[arm] = pick_from_fridge(self.context, self.kitchen, fridge, arm, target,
                                               others, effort, elsewhere_of(goal.attempt))

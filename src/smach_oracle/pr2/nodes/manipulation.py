@@ -5,6 +5,7 @@ from typing import Dict, Iterator, Mapping, Optional, Tuple, Type
 import numpy as np
 
 from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.joints import read_joints
 from smach_oracle.geometry.links import link_pose
 from smach_oracle.geometry.transforms import inverse, yaw_of
@@ -23,6 +24,7 @@ from smach_oracle.msg import (
 from smach_oracle.oracle.number_checks import is_number
 
 from ..kitchen import MapBox
+from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
 from ..perception.own_limbs import limbs_of
 from ..perception.tabletop import find_tabletop, things_on_table
@@ -67,6 +69,15 @@ def elsewhere_of(attempt: int) -> int:
     :param attempt: of a goal.
     """
     return max(0, attempt - 1)
+
+
+def check_is_there(image: CameraImage, target: UprightBox) -> None:
+    """Refuse to reach for a thing that somebody has taken away: the hand would knock others over.
+
+    :raises SkillError: where the image shows that the target is gone.
+    """
+    if sees_past(image, target):
+        raise SkillError('the object is no longer where it was seen: the camera sees past it')
 
 
 class Manipulation:
@@ -130,6 +141,8 @@ class Manipulation:
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen(target)
         boxes = around(made, target)
         self._put_back(arm, boxes)
+        report('looking whether the object is still there')
+        check_is_there(self.context.robot.see(), target)
         report('choosing a grasp')
         with self._withdrawing(arm, boxes):
             with self.firmer_after_slip(goal.attempt) as effort:

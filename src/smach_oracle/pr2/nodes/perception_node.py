@@ -31,7 +31,7 @@ from ..perception.clusters import Capsule, NotSeen
 from ..perception.colours import name_of as name_of_colour
 from ..perception.drink import find_drink
 from ..perception.own_limbs import limbs_of
-from ..perception.tabletop import Look, find_tabletop
+from ..perception.tabletop import Look, Tabletop, find_tabletop, things_on_table
 from ..robot import BASE_FRAME, Robot
 from ..ros_robot import NO_PASS_TIME, NO_SNAPSHOT, RosRobot
 from ..work_costs import Work
@@ -43,6 +43,7 @@ HIGHEST_LEAST = 0.3  # m: what is asked for as `min_height`
 VIEWS = ((0.0, 0.0, 0.0), (0.0, -0.22, 0.0), (0.0, 0.22, 0.0), (0.0, 0.0, 0.22))
 MODEL_WAIT_S = 60.0
 DETECTION = Work(detections=1)
+NEARER = 0.02  # m by which one thing must stand nearer than another to count as nearer
 
 
 class Perception:
@@ -69,8 +70,11 @@ class Perception:
         image = self._robot.see()
         limbs = self._limbs()
         self._robot.spend('perception', DETECTION)
+        like = _look(goal)
         with told_where_to_look(image):
-            found = find_tabletop(image, lowest, limbs, _look(goal))
+            found = find_tabletop(image, lowest, limbs, like)
+            if like is None:
+                self._look_beside(image, found)
         report('{} objects'.format(len(found.objects)))
         objects = [box_messages(box, _stamp(image)) for box in found.objects]
         return DetectTabletopResult(table=box_messages(found.table, _stamp(image))[0],
@@ -95,6 +99,24 @@ class Perception:
         pose, size = box_messages(
             find_drink(image, self._kitchen, fridge, lowest, limbs, goal.colour), _stamp(image))
         return DetectDrinkResult(drink=pose, size=size)
+
+    def _look_beside(self, image: CameraImage, found: Tabletop) -> None:
+        """Glance at parts of the table that the image cuts off, then look where it showed.
+
+        :raises NotSeen: where something stands there that is nearer than the first object.
+        """
+        first = found.objects[0].centre
+        for point in found.beyond:
+            self._robot.look_at(point)
+            glance, limbs = self._robot.see(), self._limbs()
+            self._robot.spend('perception', DETECTION)
+            for box in things_on_table(glance, limbs):
+                if np.hypot(*box.centre[:2]) < np.hypot(*first[:2]) - NEARER:
+                    raise NotSeen('something nearer stands beside what the image showed',
+                                  box.centre)
+        if found.beyond:
+            ahead = np.linalg.norm(first - image.base_from_camera[:3, 3])
+            self._robot.look_at(apply(image.base_from_camera, np.array([0.0, 0.0, ahead])))
 
     def _limbs(self) -> List[Capsule]:
         return limbs_of(self._links, self._robot.joints())

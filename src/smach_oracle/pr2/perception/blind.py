@@ -16,6 +16,7 @@ NARROWEST = 5
 LEAST_PATCH = 150  # of these: a can behind it has some 400
 BESIDE = 4  # pixels from a thing within which a patch hides part of it
 LEAST_BESIDE = 12  # of these
+WHITE = 240  # each of a pixel's three values, of 255, where the light is too bright
 
 
 def blind_patches(image: CameraImage) -> np.ndarray:
@@ -30,6 +31,13 @@ def blind_patches(image: CameraImage) -> np.ndarray:
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
     return np.asarray((sizes >= LEAST_PATCH)[labels])
+
+
+def dazzled(image: CameraImage) -> bool:
+    """Whether light falls into the camera: a patch is white, and has no depth."""
+    stride = image.stride(COLUMNS)
+    white = image.colour[::stride, ::stride].min(axis=-1) > WHITE
+    return int((white & blind_patches(image)).sum()) >= LEAST_PATCH
 
 
 def blind_distance(image: CameraImage, blind: np.ndarray, plane: Plane,

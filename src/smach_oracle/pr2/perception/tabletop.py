@@ -29,6 +29,8 @@ TABLE_HEIGHTS = (0.4, 1.2)  # m above the floor
 LEAST_TABLE = 1200  # points
 TALLEST = 0.8  # m above the table up to which points are looked at
 OFF_TABLE = 0.012  # m that a point of the table may seem to lie above or below it
+EDGE, LEAST_EDGE = 2, 6  # columns of an image at its edge, and points of a table in them
+AHEAD, BESIDE = 0.08, 0.12  # m from the nearest of these to what shows what is beyond
 # how a reason ends where a patch of the image has no depth, before the table
 BLIND = ': depth is missing in a patch of the image, before the table'
 SAME_SIZE = 0.025  # m by which one thing's extents may differ in two images
@@ -48,6 +50,9 @@ class Tabletop(NamedTuple):
     # the one that was asked for, then nearest first; the first one is fit for the gripper
     objects: List[UprightBox]
     colours: List[np.ndarray]  # (3,) each, of the objects, 0 to 255
+    # (3,) each, m: where to look for more of the table, which the image cuts off nearer than the
+    # first object stands
+    beyond: Sequence[np.ndarray] = ()
 
 
 def find_tabletop(image: CameraImage, min_height: float = 0.02,
@@ -89,7 +94,8 @@ def find_tabletop(image: CameraImage, min_height: float = 0.02,
     order = [target] + [each for each in clusters if not _overlap(each, target)]
     objects = [each for each in order if max(each.box.wide, each.box.size[2]) <= LARGEST]
     return Tabletop(_top(patch, plane), [each.box for each in objects],
-                    [_colour(cloud, each) for each in objects])
+                    [_colour(cloud, each) for each in objects],
+                    _beyond(cloud, plane, _distance(target)))
 
 
 def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
@@ -106,6 +112,20 @@ def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[U
     patch = largest_patch(at_table[np.abs(plane.height(at_table)) < OFF_TABLE])
     return [each.box for each in clusters_on(cloud, plane, patch, 0.02, TALLEST)
             if max(each.box.wide, each.box.size[2]) <= LARGEST]
+
+
+def _beyond(cloud: OrganizedCloud, plane: Plane, distance: float) -> List[np.ndarray]:
+    """Where to look, (3,) each, for what may stand nearer than `distance` m beside the image."""
+    found = []
+    for edge in (cloud.points[:, :EDGE], cloud.points[:, -EDGE:]):
+        points = edge[np.isfinite(edge[..., 2])]
+        points = points[np.abs(plane.height(points)) < OFF_TABLE]
+        away = np.hypot(*points[:, :2].T)
+        if len(points) >= LEAST_EDGE and away.min() < distance:
+            nearest = points[away.argmin()]
+            aside = float(np.copysign(BESIDE, nearest[1]))
+            found.append(nearest + [AHEAD, aside, 0.0])
+    return found
 
 
 def _top(patch: np.ndarray, plane: Plane) -> UprightBox:

@@ -40,14 +40,14 @@ OPENING = (-0.98, 0.02, 0.0)
 CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, ready to drive in
 CLOSING = (-0.92, -0.30, 0.0)
 
-AJAR = np.radians(20.0)  # from here on a door is pushed, not pulled
+AJAR = np.radians(42.0)  # from here on there is room for a hand behind it: it is pushed
 PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside
 WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 # m ahead at least, m to its side at most: a hand there is in the other arm's way
 BEFORE_CHEST = (0.30, 0.20)
-OFF = 0.10  # m that the base takes the hand back from the bar
+OFF = 0.10  # m that the base takes the hand back from the bar: there may be somebody behind it
 AWAY_FOR_GOOD = 0.40  # m, after a failure
 DRAWN = np.radians(92.0)  # as far as the base takes the handle from there
 DRAWS = 4  # drives in which it does
@@ -58,7 +58,7 @@ DOOR_LOOK = np.array([-0.15, 0.05, GRASP_HEIGHT])  # m, in the fridge's frame
 OPEN_LOOK = np.array([-0.30, 0.25, GRASP_HEIGHT])  # m: at the face of an open door
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
 BEFORE = 0.10  # m that the hand comes straight
-PUSHES = 2  # until the door is shut
+PULLS, PUSHES = 2, 2  # until the door is open, or shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
@@ -86,14 +86,15 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
 
 def _open(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     view = _look_from_before(context, kitchen)
-    if view.angle < AJAR:
-        angle = _pull(context, kitchen, arm, view)
-        _take_hand_off(context)
-        _stow_beside(context, kitchen, angle)
-        view = _look_from_before(context, kitchen)
+    angle = view.angle
+    for _ in range(PULLS):
         if view.angle < AJAR:
-            raise SkillError('the door fell shut again, to {:.0f} degrees, when the hand let go '
-                             'of its handle at {:.0f}'.format(*np.degrees([view.angle, angle])))
+            angle = _pull(context, kitchen, arm, view)
+            _take_hand_off(context, kitchen, angle)
+            view = _look_from_before(context, kitchen)
+    if view.angle < AJAR:
+        raise SkillError('the door fell shut again, to {:.0f} degrees, when the hand let go '
+                         'of its handle at {:.0f}'.format(*np.degrees([view.angle, angle])))
     if view.angle < WIDE - STEP:
         angle = _push_open(context, kitchen, arm, view)
         _stow_beside(context, kitchen, angle)
@@ -263,16 +264,17 @@ def _draw_along(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray, ang
     return angle
 
 
-def _take_hand_off(context: SkillContext) -> None:
-    """Drive the open hand straight back from the bar; no farther, for there may be somebody."""
+def _take_hand_off(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
+    """Drive the open hand straight back from the bar, and stow the arms; the door is at `angle`."""
     try:
         _step_back(context, OFF)
+        _stow_beside(context, kitchen, angle)
     except SkillError:
-        pass  # the hand rubs against the door: it is off the bar, or the camera will tell
+        _step_back(context, OFF)  # the door is elsewhere: the camera will tell
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
-    """Reach behind the door's edge and push it from inside."""
+    """Reach behind the door's edge and push it from inside; returns how far it is open, rad."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
@@ -282,6 +284,8 @@ def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
         swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6),
                        ('door',), lambda q: _is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
+            if view.angle >= LEAST_OPEN:
+                return view.angle  # wide enough, as it stands
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
         _place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])

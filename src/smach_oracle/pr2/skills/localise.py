@@ -3,16 +3,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smach_oracle.geometry.transforms import apply, inverse, yaw_of
+from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
 
 from ..kitchen import Kitchen, base_from_fridge, odom_from_pose
 from ..perception.door_view import DoorNotSeen
 from ..perception.fridge_pose import find_fridge
-from ..planning.arm import SkillContext, SkillError
+from ..planning.arm import SkillContext, SkillError, summary
 from ..robot import RobotError
 from .door import DOOR_LOOK, stand_before
 
 LOOKS = 2  # from different head poses
+# m along its depth, at which the refrigerator is looked for in an image: a map fits within some
+# 0.1 m, and a localisation may be wrong by more
+SHIFTS = (0.0, 0.12, -0.12)
 ASIDE = np.array([0.10, -0.20, 0.10])  # m, in the fridge's frame: where the second look goes
 FARTHEST, MOST_TURNED = 0.35, 0.12  # m, rad: a correction beyond that is taken for a mistake
 
@@ -53,8 +56,11 @@ def _seen(context: SkillContext, kitchen: Kitchen, expected: np.ndarray) -> np.n
     reasons = []
     for look in range(LOOKS):
         context.robot.look_at(apply(expected, DOOR_LOOK + look * ASIDE))
-        try:
-            return find_fridge(context.robot.see(), kitchen, expected).base_from_fridge
-        except DoorNotSeen as err:
-            reasons.append(str(err))
-    raise SkillError('where the refrigerator stands cannot be seen: {}'.format('; '.join(reasons)))
+        image = context.robot.see()
+        for shift in SHIFTS:
+            moved = expected @ from_rpy((shift, 0.0, 0.0))
+            try:
+                return find_fridge(image, kitchen, moved).base_from_fridge
+            except DoorNotSeen as err:
+                reasons.append(str(err))
+    raise SkillError('where the refrigerator stands cannot be seen: {}'.format(summary(reasons)))

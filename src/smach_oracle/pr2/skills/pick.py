@@ -1,5 +1,5 @@
 """Pick an object: choose a grasp, go there, close, feel, lift, feel again."""
-from typing import List, Mapping, NamedTuple, Optional
+from typing import List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ..robot import GRIPPER_OPEN
 
 APPROACH = 0.10  # m, straight, towards the object
 LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
+LEAST_LIFTS = (0.03,)  # m; encoders err: what was planned may be a little too high in the end
 # N, the strongest grip there is: of what has slipped, and of what a person put into the hand
 FIRM = 100.0
 MISSES = 2  # grasps that may close on nothing before the skill fails
@@ -132,6 +133,9 @@ def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Gras
         if approach is None:
             reasons.append('no straight way to the object')
             continue
+        if _way_up(hand, approach[-1], grasp, LIFTS) is None:
+            reasons.append('no straight way up with the object')
+            continue
         try:
             return _GraspPath(hand.path(start), approach)
         except PlanningError as err:
@@ -144,9 +148,7 @@ def _lift(hand: Arm, target: UprightBox, effort: float) -> HeldObject:
     grasp = hand.pose()
     held = HeldObject(grasp, inverse(grasp) @ target.matrix, target.size / 2, effort)
     hand.space.remove(TARGET)
-    with hand.space.touchable(hand.space.names()):
-        lines = (hand.line(hand.now(), lifted(grasp, height)) for height in LIFTS)
-        path = next((line for line in lines if line is not None), None)
+    path = _way_up(hand, hand.now(), grasp, LIFTS + LEAST_LIFTS)
     if path is None:
         hand.open(GRIPPER_OPEN)
         raise SkillError('the arm cannot lift the object from where it grasped it')
@@ -154,3 +156,15 @@ def _lift(hand: Arm, target: UprightBox, effort: float) -> HeldObject:
     if hand.close(effort) == 0:
         raise ObjectSlipped('the object slipped out of the gripper when it was lifted')
     return held
+
+
+def _way_up(hand: Arm, start: np.ndarray, grasp: np.ndarray,
+            heights: Sequence[float]) -> Optional[np.ndarray]:
+    """A straight path (m, 7) upwards, by the first of these heights (m) that the arm can do.
+
+    :param start: (7,), of a hand at its grasp (4x4).
+    :returns: None where it can do none.
+    """
+    with hand.space.touchable(hand.space.names()):
+        lines = (hand.line(start, lifted(grasp, height)) for height in heights)
+        return next((line for line in lines if line is not None), None)

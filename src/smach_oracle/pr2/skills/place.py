@@ -30,7 +30,7 @@ DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
 # rad, of the object about the vertical, against how it stood
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
-SLACK = 0.10  # m that the height asked for may differ from the one at which the object stands
+SLACK = 0.16  # m that the height asked for may differ from the one at which the object stands
 
 NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies

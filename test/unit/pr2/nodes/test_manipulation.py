@@ -165,12 +165,34 @@ def test_an_arm_that_is_held_is_noticed(bench, monkeypatch):
 def test_nothing_in_the_hand_is_felt(bench):
     made = bench.map()
     goal = picking('right', pose(0.62, -0.35, 0.78), CAN_SIZE, made.map_id)
+    bench.robot.look_at((2.0, 1.5, 1.2))  # where the place is not in view
     with pytest.raises(SkillError, match='closed on nothing, 2 times'):
         bench.skills.pick(goal, say)
     assert is_aside(bench.robot.joints(), 'right')
     with pytest.raises(SkillError, match='the right hand holds nothing'):
         bench.skills.place(
             placing('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
+
+
+def test_what_somebody_has_taken_away_is_not_reached_for(bench):
+    made = bench.map()
+    bench.robot.look_at((0.65, 0.0, 0.75))
+    before = bench.robot.joints()
+    with pytest.raises(SkillError, match='no longer where it was seen'):
+        bench.skills.pick(
+            picking('right', pose(0.62, -0.20, 0.78), CAN_SIZE, made.map_id), say)
+    after = bench.robot.joints()
+    assert all(abs(after[name] - before[name]) < 0.01 for name in ARM_JOINTS['right'])
+
+
+def test_a_place_may_be_given_some_centimetres_higher_than_the_object_will_stand(bench):
+    made = bench.map()
+    grasp = bench.pick(made.map_id)
+    bench.robot.look_at((0.6, -0.2, 0.8))
+    with pytest.raises(SkillError, match='nothing to stand on at x 0.60.*z 1.05'):
+        bench.skills.place(placing('right', pose(0.6, -0.35, 1.05), grasp, made.map_id), say)
+    bench.skills.place(placing('right', pose(0.6, -0.35, 0.91), grasp, made.map_id), say)
+    assert abs(bench.world.body_pose('can')[2, 3] - 0.78) < 0.01
 
 
 def test_what_slipped_is_gripped_firmer_until_the_arms_go_aside_again():

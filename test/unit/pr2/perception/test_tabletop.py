@@ -57,6 +57,14 @@ def test_objects_come_nearest_first_and_the_table_is_where_it_is():
                        atol=0.05), 'as far as it is in view'
 
 
+def test_where_the_image_cuts_off_a_nearer_part_of_the_table_it_says_where_to_look():
+    wide = TABLE._replace(size=(0.7, 2.4, 0.04))
+    assert not find_tabletop(image_of([wide, can(0.55, 0.0), can(0.95, 0.1)])).beyond
+    left, right = find_tabletop(image_of([wide, can(0.95, 0.1)])).beyond
+    assert left[1] > 0.45 and right[1] < -0.45
+    assert all(0.4 < point[0] < 0.8 and abs(point[2] - 0.72) < 0.02 for point in (left, right))
+
+
 def test_the_box_turns_with_the_object():
     brick = Body('brick', 'box', (0.075, 0.04, 0.1), (0.75, 0.0, 0.77), yaw=0.7,
                  colour=(0.8, 0.2, 0.2))

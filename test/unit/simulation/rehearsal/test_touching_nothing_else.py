@@ -1,6 +1,7 @@
 """Whole tasks watched by physics: of all that stands around, the robot touches what it takes, and
 nothing else.
 """
+import numpy as np
 import pytest
 
 from smach_oracle.simulation.physics.world import World
@@ -36,4 +37,48 @@ def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expe
     done = rehearse(draw(seed, benign=True), world, task)
     assert done.success, (done.failed, done.reason, done.why)
     assert len(world.movable()) > 1 and world.touched == expected
+    world.close()
+
+
+@pytest.mark.parametrize('seed', [97, 321])
+def test_a_grasp_is_one_from_which_the_arm_can_lift(seed):
+    """The first grasp that is in reach is too high up for that here."""
+    world = World(binning=2)
+    done = rehearse(tabletop_scene.draw(seed), world)
+    assert done.success, (done.failed, done.reason, done.why)
+    assert not world.harm.found(world)
+    world.close()
+
+
+def test_what_was_moved_meanwhile_is_not_knocked_over():
+    world = World(binning=2)
+    done = rehearse(tabletop_scene.draw(307), world)
+    assert done.failed == 'PICK' and 'no longer where it was seen' in done.reason
+    assert not world.harm.found(world)
+    world.close()
+
+
+@pytest.mark.parametrize('seed', [69, 354])
+def test_what_stands_beside_the_image_is_not_overlooked_for_what_is_farther_away(seed):
+    """The nearest thing stands far to the left there."""
+    world = World(binning=2)
+    done = rehearse(tabletop_scene.draw(seed), world)
+    assert done.failed == 'DETECT_TABLETOP' and 'something nearer' in done.reason
+    world.close()
+
+
+def test_a_glance_aside_that_shows_nothing_nearer_costs_the_trial_nothing():
+    """The nearest thing stands about as far away as the table's nearest part beside the image."""
+    world = World(binning=2)
+    world.reset(tabletop_scene.draw(29, benign=True))
+    trial, seen = PickAndPlaceRehearsal(world), []
+    look_at = trial.robot.look_at
+    trial.robot.look_at = lambda point: (seen.append(point), look_at(point))
+    for _, work in trial.states[:2]:
+        work()
+    eye = world.link_pose('wide_stereo_optical_frame')
+    trial.states[2][1]()
+    assert len(seen) in (3, 4), 'at the table, to a side or both, and back'
+    back = world.link_pose('wide_stereo_optical_frame')
+    assert np.abs(back - eye).max() < 0.02
     world.close()

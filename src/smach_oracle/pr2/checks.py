@@ -1,0 +1,67 @@
+"""What must hold before a PR2 looks for something: functions for the oracle's settings.
+
+Each takes a machine's userdata, which it does not read. They look through the head camera, with the
+names of topics and services relative to the script's node. Where its parameter ~snapshot names no
+service, or `none`, the next image of a real camera counts.
+"""
+import functools
+from typing import Any, NamedTuple
+
+import rospy
+
+from smach_oracle.ros.parameters import name_of
+
+from .perception.blind import dazzled
+from .robot import BASE_FRAME, CAMERA_FRAME, RobotError
+from .ros_senses import RosSenses
+from .ros_time import WorldTime
+
+SNAPSHOT, PASS_TIME = 'world/snapshot', 'world/pass_time'
+NONE = 'none'
+COMES_S = 10.0  # wall s that an image may take
+LIGHT_MOVES_S = 20.0  # s of the world's time that a light is waited for
+AGAIN_S = 2.0  # from one look to the next
+
+
+class _Eyes(NamedTuple):
+    """The head camera, and the time of its world."""
+
+    senses: RosSenses
+    time: WorldTime
+    simulated: bool
+
+
+def no_light_in_the_camera(userdata: Any) -> bool:
+    """Whether the camera is not dazzled. No image is no reason to think so."""
+    eyes = _eyes()
+    try:
+        return not dazzled(eyes.senses.see(BASE_FRAME, CAMERA_FRAME))
+    except RobotError as err:
+        rospy.logwarn('pr2: whether light falls into the camera is not known: %s', err)
+        return True
+
+
+def wait_for_light(userdata: Any) -> bool:
+    """Wait until the camera is no longer dazzled, for a while.
+
+    :returns: always true: a light that stays may be no matter where the head looks from elsewhere.
+    """
+    eyes = _eyes()
+    for _ in range(int(LIGHT_MOVES_S / AGAIN_S)):
+        if rospy.is_shutdown() or no_light_in_the_camera(userdata):
+            break
+        if eyes.simulated:
+            eyes.time.spend(AGAIN_S, 'waiting')
+        else:
+            rospy.sleep(AGAIN_S)
+    return True
+
+
+@functools.lru_cache(maxsize=1)
+def _eyes() -> _Eyes:
+    """Listen to the camera from the first question on."""
+    snapshot = name_of('~snapshot', SNAPSHOT)
+    simulated = snapshot != NONE
+    pass_time = name_of('~pass_time', PASS_TIME)
+    return _Eyes(RosSenses(snapshot if simulated else '', COMES_S),
+                 WorldTime(pass_time if simulated and pass_time != NONE else ''), simulated)
