@@ -41,5 +41,5 @@ def _page_below_the_help() -> Iterator[None]:
     except SystemExit as end:
         page = page_of(os.path.basename(sys.argv[0])) if sys.argv[1:2] in HELP else None
         if page is not None and not end.code:
-            print('\nMore: {}'.format(page))
+            sys.stdout.write('\nMore: {}\n'.format(page))
         raise

@@ -23,10 +23,10 @@ def index(tmp_path_factory):
     return json.loads(text[text.index('{'):text.rindex('}') + 1])
 
 
-@pytest.mark.parametrize('word, page', [('precondition', 'preconditions'), ('checkpoint', 'survive'),
-                                        ('teleoperation', 'messages'), ('interface',
-                                                                        'own_interface'),
-                                        ('move_base', 'navigation')])
+@pytest.mark.parametrize('word, page', [
+    ('precondition', 'preconditions'), ('checkpoint', 'survive'), ('teleoperation', 'messages'),
+    ('interface', 'own_interface'), ('move_base', 'navigation')
+])
 def test_it_finds(index, word, page):
     stem = SearchEnglish({}).stem(word)
     found = [index[part].get(stem, []) for part in ('terms', 'titleterms')]
