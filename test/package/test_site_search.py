@@ -25,8 +25,8 @@ def index(tmp_path_factory):
 
 @pytest.mark.parametrize('word, page', [
     ('precondition', 'preconditions'), ('checkpoint', 'survive'), ('teleoperation', 'messages'),
-    ('interface', 'own_interface'),
-    ('move_base', 'navigation')])
+    ('interface', 'own_interface'), ('move_base', 'navigation')
+])
 def test_it_finds(index, word, page):
     stem = SearchEnglish({}).stem(word)
     found = [index[part].get(stem, []) for part in ('terms', 'titleterms')]
