@@ -1,5 +1,7 @@
 """Borders of the interfaces that people use: marks on an image, and commands to a hand."""
 import functools
+import math
+import warnings
 from types import SimpleNamespace
 from typing import Any, Callable, Tuple
 from unittest import mock
@@ -56,7 +58,9 @@ def _marking() -> Tuple[Offered, SegmentationServer]:
 def _mark(service: str) -> Callable[[Any], str]:
     def take(request: Any) -> str:
         offered, _ = _marking()
-        with fake_ros(), mock.patch.object(perception_server, 'MOST_POINTS', MOST_POINTS):
+        with fake_ros(), mock.patch.object(perception_server, 'MOST_POINTS', MOST_POINTS), \
+                warnings.catch_warnings():
+            warnings.simplefilter('error', RuntimeWarning)  # a number that is none went past
             reply = offered.call(service, request)
         return TAKEN if reply.ok else refused(reply.message)
     return take
@@ -69,14 +73,16 @@ def _around(jitter: Tuple[int, int]) -> RegionOfInterest:
 
 
 _jitters = st.tuples(st.integers(0, 4), st.integers(0, 4))
-_pixel = message(Point32, {'x': st.floats(0, 220, width=32), 'y': st.floats(0, 160, width=32)})
+_pixel = message(Point32, {
+    'x': st.one_of(*[st.floats(0, 220, width=32)] * 9, st.sampled_from((math.nan, math.inf))),
+    'y': st.floats(0, 160, width=32)})
 _stroke = message(SegmentStroke, {
     'width': st.floats(0, 9, width=32), 'points': st.lists(_pixel, max_size=3)})
 _very_long = st.just([SegmentStroke(points=[Point32()] * (MOST_POINTS + 1))])
 _marks = message(SegmentObjectRequest, {
     'stamp': st.sampled_from((rospy.Time(0), rospy.Time(7))), 'region': _jitters.map(_around),
     'polygon': st.one_of(*[st.just(Polygon())] * 4, message(Polygon, {
-        'points': st.lists(_pixel, max_size=5)}), st.just(
+        'points': st.lists(_pixel, min_size=2, max_size=4)}), st.just(
             Polygon(points=[Point32()] * (MOST_POINTS + 1)))),
     'strokes': st.one_of(st.just([]), st.just([]), st.lists(_stroke, max_size=2), _very_long)})
 
@@ -136,7 +142,8 @@ def _joints() -> JointState:
 
 def _take_wish(command: TeleopCommand) -> str:
     made, offered = _hand()
-    with fake_ros():
+    with fake_ros(), warnings.catch_warnings():
+        warnings.simplefilter('error', RuntimeWarning)
         offered.topics['joint_states'](_joints())
         made._dead_man, made._held, made._step = DeadManSwitch(60.0), None, no_motion()
         offered.topics['~command'](command)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from smach_oracle.simulation.node import main, reveal
 from smach_oracle.simulation.node.lab import Lab
+from smach_oracle.simulation.node.loop import PERIOD_S
 from smach_oracle.simulation.node.settings import WorldSettings
 from smach_oracle.simulation.scenes.lab import LabRun
 from smach_oracle.simulation.scenes.tasks import TASKS
@@ -24,6 +25,7 @@ from .border import TAKEN, Border, refused
 from .fake_ros import as_bytes, fake_ros
 from .values import message, words
 
+LONGEST_S = 36000.0  # that may pass at once, as srv/PassTime.srv has it
 SETTINGS = WorldSettings(camera_binning=2, reveal=True)
 _seeds = st.one_of(st.integers(0, 9), st.sampled_from((2 ** 31, 2 ** 32, 2 ** 53, 2 ** 64 - 1)),
                    st.integers(0, 2 ** 64 - 1))
@@ -44,7 +46,7 @@ def _world() -> Any:
         names = list(node._world.body_names)
     scene = node._world.scene
     node._world.reset = lambda drawn: setattr(node._world, '_scene', drawn)
-    node._loop.pass_by = lambda world, seconds: None
+    node._loop.pass_by = _pass_by
     shown = functools.lru_cache(maxsize=1)(lambda: reveal_view(node._world))
     return SimpleNamespace(node=node, offered=offered, stamp=image.stamp, scene=scene, names=names,
                            view=lambda *_: shown())
@@ -52,6 +54,11 @@ def _world() -> Any:
 
 reveal_view = (lambda view: lambda world: view(world, reveal.camera_pose(world),
                                               reveal.size_of(world)))(reveal.RenderedView)
+
+
+def _pass_by(world: Any, seconds: float) -> None:
+    """In place of the loop's: time does not pass, but it could."""
+    assert 0 <= round(seconds / PERIOD_S) <= LONGEST_S / PERIOD_S
 
 
 def _service(name: str, task: str = TASKS[0], with_lab: bool = False) -> Callable[[Any], str]:
