@@ -29,3 +29,9 @@ def test_the_pictures_are_there_and_name_what_they_show():
     for name in ('wrapped', 'recovery'):
         assert (ROOT / 'doc/images' / (name + '.svg')).read_text().startswith('<?xml')
     assert 'ORACLE' in (ROOT / 'doc/images/wrapped.svg').read_text()
+
+
+def test_the_recording_moves_and_is_small():
+    data = (ROOT / 'doc/images/recovery.gif').read_bytes()
+    assert data.startswith(b'GIF89a') and data.count(b'\x00\x21\xf9\x04') >= 5, 'frames'
+    assert len(data) < 1500000

@@ -32,17 +32,17 @@ class DiagnosticsPublisher:
         threading.Thread(target=self._run, name='diagnostics', daemon=True).start()
 
     def listen_to_recorder(self) -> None:
-        """Tell of the recorder of this node from now on."""
+        """Report the recorder of this node from now on."""
         if not self._listens:
             self._listens = True
             rospy.Subscriber('~record/status', RecorderStatus, self._take_recorder)
 
     def watch(self, machine: OracleContainer) -> None:
-        """Tell of a machine's states from now on."""
+        """Report the states of a machine from now on."""
         self._machines.add(machine)
 
     def forget(self, machine: OracleContainer) -> None:
-        """Tell nothing of it any more."""
+        """Report it no longer."""
         self._machines.discard(machine)
 
     def statuses(self) -> List[DiagnosticStatus]:
