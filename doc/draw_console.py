@@ -2,11 +2,12 @@
 """Take the pictures of the operator console again: a real console, real machines under a real
 oracle, the simulated PR2, a headless Chromium.
 
-    python3 doc/draw_console.py [--to FOLDER] [--of kitchen|pr2]
+    python3 doc/draw_console.py [--to FOLDER] [--of kitchen|pr2|recording]
 
-`kitchen` writes console_question.png and console_machine.png. `pr2` writes console_perception.png,
-console_hand.png, console_3d.png and console_replay.png, and takes some minutes. Each starts a ROS
-master of its own. Look at what they have drawn.
+`recording` writes recovery.gif: a failure, a question, an answer and success. `kitchen` writes
+console_question.png and console_machine.png. `pr2` writes console_perception.png, console_hand.png,
+console_3d.png and console_replay.png, and takes some minutes. Each starts a ROS master of its own.
+Look at what they have drawn.
 """
 import argparse
 import os
@@ -20,6 +21,7 @@ sys.path[:0] = [os.path.join(DOC, '..', folder) for folder in ('test/rostest', '
 
 SIZE = (1400, 900)
 MOST_BYTES = 200000  # of a picture
+MOST_BYTES_MOVING = 1500000
 QUESTION = '.question-row.pending[data-key^="/{}/"]'
 CAMERA = '/head_camera/rgb/image_raw'
 CLOUD = '/head_camera/depth_registered/points'
@@ -36,17 +38,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--to', default=os.path.join(DOC, 'images'), help='folder of the pictures')
-    parser.add_argument('--of', choices=['kitchen', 'pr2'], help='default: both')
+    parser.add_argument('--of', choices=['kitchen', 'pr2', 'recording'],
+                        help='default: all')
     options = parser.parse_args()
     if not options.of:  # a process has one ROS node only
-        for each in ('kitchen', 'pr2'):
+        for each in ('kitchen', 'pr2', 'recording'):
             subprocess.run([sys.executable, __file__, '--to', options.to, '--of', each],
                            check=True)
         return
     from answer_latency import Processes
     with Processes() as processes:
         processes.start_master()
-        {'kitchen': draw_kitchen, 'pr2': draw_pr2}[options.of](processes, options.to)
+        {'kitchen': draw_kitchen, 'pr2': draw_pr2,
+         'recording': record_answer}[options.of](processes, options.to)
 
 
 def draw_kitchen(_processes, folder):
@@ -65,6 +69,59 @@ def draw_kitchen(_processes, folder):
     finally:
         KitchenPage.tearDownClass()
         rospy.signal_shutdown('drawn')
+
+
+def record_answer(_processes, folder):
+    """The console from a failure to the machine's success, as a GIF."""
+    import rospy
+    from console_page import ConsolePage
+
+    class RecordedPage(ConsolePage):
+        """The page that is recorded."""
+
+    rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
+    rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
+    frames = []  # PNG and s that it is shown
+    try:
+        RecordedPage.begin('console_robot.py', 'PICK', '1.2', '0', '1', size=(1200, 760),
+                           name='ann')
+        browser = RecordedPage.browser
+
+        def shoot(shown_s):
+            frames.append((browser.driver.get_screenshot_as_png(), shown_s))
+        browser.click('#tab-machines')
+        browser.click('.path[title="KITCHEN/FETCH"]')
+        browser.find('[id="/alpha/KITCHEN/FETCH/PICK"].failed')
+        shoot(2.5)
+        browser.click('#tab-questions')
+        browser.click(QUESTION.format('alpha'))
+        expect(browser, 'It is yours.')
+        browser.find('.choice.goto[data-settled]')
+        shoot(4.0)
+        browser.click('.choice.goto[data-name=PLACE]')
+        shoot(1.5)
+        browser.click('#tab-machines')
+        browser.click('.path[title="KITCHEN/FETCH"]')
+        for _ in range(8):
+            shoot(0.6)
+            rospy.rostime.wallsleep(0.4)
+        shoot(3.0)
+    finally:
+        RecordedPage.tearDownClass()
+        rospy.signal_shutdown('recorded')
+    write_gif(frames, os.path.join(folder, 'recovery.gif'))
+
+
+def write_gif(frames, path):
+    """Put screenshots into one picture that moves, each shown for its s."""
+    import io
+
+    from PIL import Image
+    pictures = [Image.open(io.BytesIO(data)).convert('RGB').resize((900, 570), Image.LANCZOS)
+                .quantize(64, dither=Image.NONE) for data, _ in frames]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], loop=0, optimize=True,
+                     duration=[round(1000 * shown_s) for _, shown_s in frames])
+    assert os.path.getsize(path) < MOST_BYTES_MOVING, path
 
 
 def work_in_kitchen(browser, folder):

@@ -134,15 +134,16 @@ def test_no_file_of_ours_is_where_upstreams_belongs(installed):
 
 def test_upstream_may_come_after_the_installation_and_go_again(installed, tmp_path):
     setup = str(installed / 'installed/setup.bash')
+    later = tmp_path / 'later'
     for name in NAMES:
-        (tmp_path / name).mkdir()
-        (tmp_path / name / '__init__.py').write_text('')
-    assert 'stand_ins' in run(WHERE, tmp_path, setup)
-    come = 'export PYTHONPATH="$PYTHONPATH:{}"; source "{}"; '.format(tmp_path, setup)
+        (later / name).mkdir(parents=True)
+        (later / name / '__init__.py').write_text('')
+    assert run(WHERE, tmp_path, setup).count('stand_ins') == len(NAMES)
+    come = 'export PYTHONPATH="$PYTHONPATH:{}"; source "{}"; '.format(later, setup)
     names = 'import smach, smach_ros, smach_msgs, control_msgs; print(smach.__file__)'
     told = run(come + 'python3 -c "{}"; echo $PYTHONPATH $ROS_PACKAGE_PATH'.format(names),
                tmp_path, setup)
-    assert str(tmp_path / 'smach') in told and 'stand_ins' not in told
+    assert str(later / 'smach') in told and 'stand_ins' not in told
 
 
 def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):

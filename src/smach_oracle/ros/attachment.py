@@ -26,10 +26,12 @@ from typing import (
 
 import rospy
 
+import smach
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.settings.paths import path_of
 
+from .diagnostics.diagnostics_publisher import DiagnosticsPublisher
 from .disk.limits import NO_LIMITS, Limits
 from .expert.client import OWN_SERVER, ExpertQueryClient
 from .expert.failure_images import TOPIC as FRAMES_TOPIC
@@ -87,6 +89,7 @@ class Attachments:
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
         self._hand: Optional[HandServer] = None
+        self._diagnostics: Optional[DiagnosticsPublisher] = None
         # bound once: a machine listens again where it is given another one
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
@@ -139,6 +142,8 @@ class Attachments:
                 self._rates.forget(machine)
             if self._hand is not None:
                 self._hand.forget(machine)
+            if self._diagnostics is not None:
+                self._diagnostics.forget(machine)
             path = oracle_of(machine).path
             shown = self._shown.get(path)
             if shown is not None and shown() is machine:
@@ -169,12 +174,16 @@ class Attachments:
             return
         self._node_started = True
         keep_log_from_master()
+        log_through_rospy()
         track_goals_from_the_start()
         rospy.on_shutdown(self._on_shutdown)
         start_master_watch()
         self._events = EventPublisher()
         self._rates = RatesPublisher()
         self._hand = HandServer()
+        if private_flag('diagnostics', True):
+            self._diagnostics = DiagnosticsPublisher(
+                rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER))
 
     def _attach_to_node(self, machine: OracleContainer) -> None:
         introspect = private_flag('introspection', True)  # first, since it may raise
@@ -193,6 +202,8 @@ class Attachments:
             self._introspect(machine)
         if self._hand is not None:
             self._hand.watch(machine)
+        if self._diagnostics is not None:
+            self._diagnostics.watch(machine)
 
     def _introspect(self, machine: OracleContainer) -> None:
         """Show the machine in place of an earlier one of its name.
@@ -243,6 +254,8 @@ class Attachments:
             self._recorder = TrialRecorder(plan.folder, plan.topics, types=plan.types,
                                            keep=plan.keep)
         if self._recorder is not None:
+            if self._diagnostics is not None:
+                self._diagnostics.listen_to_recorder()
             self._recorder.attach(oracle_of(machine).events,
                                   {'~oracle/rates': _snapshot_of_rates(machine)})
 
@@ -263,6 +276,15 @@ class Attachments:
         while self._trials and time.monotonic() < until:
             time.sleep(0.02)
         self.close(CLOSE_S)
+
+
+def log_through_rospy() -> None:
+    """Hand rospy's loggers to SMACH, as `import smach_ros` does.
+
+    So the levels of the node's standard services apply. Loggers of the program's own stay.
+    """
+    if getattr(smach.loginfo, '__module__', '').split('.')[0] == 'smach':
+        smach.set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)
 
 
 def has_introspection(machine: OracleContainer) -> bool:

@@ -2,7 +2,8 @@
 import sqlite3
 import threading
 import time
-from typing import Callable, List, NamedTuple, Optional, Union
+import weakref
+from typing import Callable, List, MutableSet, NamedTuple, Optional, Union
 
 from .errors import StoreError
 from .rows import NewMoment
@@ -26,6 +27,14 @@ class Ending(NamedTuple):
     outcome: str
 
 
+_writers: 'MutableSet[StoreWriter]' = weakref.WeakSet()
+
+
+def running_writers() -> 'List[StoreWriter]':
+    """Those of this process whose trials go on."""
+    return [each for each in list(_writers) if each.is_running]
+
+
 class StoreWriter:
     """Commits the moments of one trial, in their order.
 
@@ -47,6 +56,22 @@ class StoreWriter:
         self._is_closing = False
         self._thread = threading.Thread(target=self._work, name='store', daemon=True)
         self._thread.start()
+        _writers.add(self)
+
+    @property
+    def path(self) -> str:
+        """Of the store."""
+        return str(self._store.path)
+
+    @property
+    def error(self) -> str:
+        """Why moments are missing on the disk; '' where it is just slow."""
+        return self._error
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its trial goes on, or its last moments are still being written."""
+        return self._thread.is_alive()
 
     @property
     def is_behind(self) -> bool:

@@ -13,7 +13,7 @@ ARROWS: Dict[str, Set[str]] = {
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
-            'oracle.oracle_of', 'oracle.waiting', 'store'},
+            'oracle.oracle_of', 'oracle.waiting', 'packages', 'store'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -53,7 +53,7 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
-                                                 'hand', 'waiting'},
+                                                 'hand', 'waiting', 'diagnostics'},
         {'recording', 'interfaces', 'goal_link', 'disk', 'loaded_settings', 'stored'},
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
