@@ -107,7 +107,7 @@ def make_machine() -> smach.StateMachine:
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
-    """An action state that does not wait for its server for ever."""
+    """An action state that does not wait for its server forever."""
     return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
                              **options)
 

@@ -120,7 +120,7 @@ def make_machine() -> smach.StateMachine:
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
-    """An action state that does not wait for its server for ever."""
+    """An action state that does not wait for its server forever."""
     return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
                              **options)
 
@@ -131,7 +131,7 @@ def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
 
 
 def place_pose() -> PoseStamped:
-    """Where the object shall stand (m, in the robot's base frame)."""
+    """Where the object should stand (m, in the robot's base frame)."""
     return PoseStamped(Header(frame_id=BASE),
                        Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
