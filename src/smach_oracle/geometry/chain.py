@@ -128,11 +128,33 @@ class JointChain:
         """
         return self._solve(pose, seed, generator, restarts, iterations, first=False)
 
+    def inverses(self, poses: np.ndarray, seed: np.ndarray, iterations: int = 50) -> np.ndarray:
+        """For each pose the solution next to the seed, all tried at the same time.
+
+        :param poses: (k, 4, 4), root from tip.
+        :param seed: (n,), as for inverse().
+        :returns: (k, n), with NaN where there was no solution.
+        :raises ValueError: for a pose or seed that is not finite.
+        """
+        seed = np.asarray(seed, dtype=float)
+        _check_finite(poses, seed)
+        found = np.full((len(poses), len(seed)), np.nan)
+        left, q = np.arange(len(poses)), np.repeat(self.clip(seed)[None], len(poses), axis=0)
+        for _ in range(iterations):
+            frames, tips = self._frames(q)
+            error = _error(poses[left], tips)
+            done = _is_there(error)
+            found[left[done]] = q[done]
+            if done.all():
+                break
+            left, q, frames, tips, error = (each[~done] for each in (left, q, frames, tips, error))
+            q = self.clip(q + _step(self._jacobians(frames, tips), error))
+        return self.nearest_turn(found, seed)
+
     def _solve(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator],
                restarts: int, iterations: int, first: bool) -> np.ndarray:
         seed = np.asarray(seed, dtype=float)
-        if not (np.isfinite(pose).all() and np.isfinite(seed).all()):
-            raise ValueError('inverse kinematics: the pose or the seed is not finite')
+        _check_finite(pose, seed)
         starts = self.clip(seed)[None]
         if generator is not None:
             starts = np.concatenate([starts, self.random(generator, restarts)])
@@ -147,8 +169,7 @@ class JointChain:
         for _ in range(iterations):
             frames, tips = self._frames(q)
             error = _error(pose, tips)
-            done = ((np.linalg.norm(error[:, :3], axis=1) < POSITION_TOLERANCE)
-                    & (np.linalg.norm(error[:, 3:], axis=1) < ANGLE_TOLERANCE))
+            done = _is_there(error)
             if done.any():
                 arrived.append(q[done])
                 if first or done.all():
@@ -185,9 +206,24 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ], axis=-1)
 
 
+def _check_finite(poses: np.ndarray, seed: np.ndarray) -> None:
+    if not (np.isfinite(poses).all() and np.isfinite(seed).all()):
+        raise ValueError('inverse kinematics: the pose or the seed is not finite')
+
+
+def _is_there(error: np.ndarray) -> np.ndarray:
+    """(k,) whether a tip is where it should be; `error` as _error() has it."""
+    there: np.ndarray = ((np.linalg.norm(error[:, :3], axis=1) < POSITION_TOLERANCE)
+                         & (np.linalg.norm(error[:, 3:], axis=1) < ANGLE_TOLERANCE))
+    return there
+
+
 def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """(k, 6): way and turn (rotation vector) from each tip to the pose."""
-    turn = pose[:3, :3] @ tips[:, :3, :3].transpose(0, 2, 1)
+    """(k, 6): way and turn (rotation vector) from each tip to the pose.
+
+    :param pose: 4x4, or (k, 4, 4): one for each.
+    """
+    turn = pose[..., :3, :3] @ tips[:, :3, :3].transpose(0, 2, 1)
     vector = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
                              turn[:, 1, 0] - turn[:, 0, 1]], axis=1)
     sine = np.linalg.norm(vector, axis=1)
@@ -197,7 +233,7 @@ def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
     # half a turn: its axis is not in the skew part
     for k in np.flatnonzero((sine <= 1e-9) & (angle > 1.0)):
         vector[k] = rotation_vector(turn[k])
-    return np.concatenate([pose[:3, 3] - tips[:, :3, 3], vector], axis=1)
+    return np.concatenate([pose[..., :3, 3] - tips[:, :3, 3], vector], axis=1)
 
 
 def _step(jacobians: np.ndarray, error: np.ndarray) -> np.ndarray:

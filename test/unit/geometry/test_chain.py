@@ -110,6 +110,17 @@ def test_solutions_are_all_right_and_the_nearest_comes_first(arm):
     assert all(np.linalg.norm(arm.forward(q)[:3, 3] - pose[:3, 3]) < 1e-3 for q in found)
 
 
+def test_inverses_of_many_poses_are_those_of_each_alone(arm):
+    generator = np.random.default_rng(5)
+    near = [arm.forward(arm.clip(SEED + generator.normal(0.0, 0.2, 7))) for _ in range(6)]
+    poses = np.array([*near, from_rpy((3.0, 0.0, 1.0))])
+    found = arm.inverses(poses, SEED, iterations=15)
+    alone = [arm.inverse(pose, SEED, iterations=15) for pose in poses]
+    assert alone[-1] is None and any(each is not None for each in alone)
+    for one, each in zip(found, alone):
+        assert np.isnan(one).all() if each is None else np.allclose(one, each, atol=1e-9)
+
+
 def test_continuous_joints_stay_within_half_a_turn_of_the_seed(arm):
     seed = SEED + np.array([0, 0, 0, 0, 4 * np.pi, 0, -2 * np.pi])
     solved = arm.inverse(arm.forward(SEED + 0.1), seed, np.random.default_rng(2))

@@ -70,10 +70,12 @@ def _next(chain: JointChain, tool_at: ToolAt, angle: float, turns: Sequence[floa
 
     Of the points in reach, it is the one with most room for the joints.
     """
+    if not turns:
+        return None
     options = []
-    for turn in turns:
-        reached = chain.inverse(tool_at(angle, turn), q, iterations=15)
-        if reached is not None and np.abs(reached - q).max() < MAX_JOINT_STEP:
+    found = chain.inverses(np.array([tool_at(angle, turn) for turn in turns]), q, iterations=15)
+    for turn, reached in zip(turns, found):
+        if np.abs(reached - q).max() < MAX_JOINT_STEP:  # not where there is no solution
             options.append(
                 (_room(chain, reached) - 0.5 * float(np.abs(reached - q).max()), turn, reached))
     for _, turn, reached in sorted(options, key=lambda option: -option[0]):

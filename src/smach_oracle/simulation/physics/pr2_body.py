@@ -1,7 +1,7 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
 import math
 import xml.etree.ElementTree as ElementTree
-from typing import Callable, Collection, Dict, List, Optional, Set
+from typing import Callable, Collection, Dict, List, Optional, Sequence, Set
 
 import numpy as np
 import pybullet
@@ -14,8 +14,8 @@ from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
 from ..scenes.scene import RobotStart
 from .bodies import SceneBuildError, pose_of
 
-SUBSTEPS = 4  # steps of physics in a control period
-STEP = 1.0 / 240.0  # s
+SUBSTEPS = 2  # steps of physics in a control period
+STEP = 1.0 / 120.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
 # N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the URDF's efforts
@@ -26,7 +26,7 @@ GRIP = 20.0  # N, of each finger at the start
 LEAD = 0.003
 # N m, of an arm whose motors are off; shoulder and elbow have most of it
 DRY_FRICTION = (1.0, 1.0, 0.5, 0.5, 0.2, 0.2, 0.1)
-STIFFNESS = 0.3  # share of an error that is taken back in one step of physics
+STIFFNESS = 0.51  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
 STAND = {  # how a PR2 stands unless the scene says otherwise
     'torso_lift_joint': 0.20, 'head_tilt_joint': 0.0, 'l_shoulder_pan_joint': 1.6,
@@ -145,6 +145,12 @@ class Pr2Body:
         position: float = pybullet.getJointState(self.index, number,
                                                  physicsClientId=self._client)[0]
         return position + float(self._read_more[number])
+
+    def positions(self, names: Sequence[str]) -> np.ndarray:
+        """(n,) rad or m of joints, as their encoders read them."""
+        numbers = [self.numbers[name] for name in names]
+        states = pybullet.getJointStates(self.index, numbers, physicsClientId=self._client)
+        return np.array([state[0] for state in states]) + self._read_more[numbers]
 
     def base(self) -> np.ndarray:
         """4x4, the world from base_footprint."""

@@ -175,8 +175,9 @@ class Trajectory:
                                                  slopes)(np.minimum(moments, knots[-1]))
 
     def _behind(self, world: World, done: int) -> str:
-        for name, wanted in zip(self._joints, self._setpoints[min(done, len(self._setpoints) - 1)]):
-            error = abs(world.robot.position(name) - wanted)
+        wanted = self._setpoints[min(done, len(self._setpoints) - 1)]
+        errors = np.abs(world.robot.positions(self._joints) - wanted)
+        for name, error in zip(self._joints, errors.tolist()):
             if error > self._tolerances.path.get(name, PATH_TOLERANCE):
                 return '{} is {:.2f} off its path after {:.1f} s: something is in its way'.format(
                     name, error, done * PERIOD)
@@ -189,7 +190,7 @@ class Trajectory:
             for name, position in zip(self._joints, goal):
                 world.robot.set_target(name, position, 0.0, None)
         waited = (world.periods - self._arriving_since) * PERIOD
-        errors = [abs(world.robot.position(name) - end) for name, end in zip(self._joints, goal)]
+        errors = np.abs(world.robot.positions(self._joints) - goal).tolist()
         shares = [
             error / self._tolerances.goal.get(name, GOAL_TOLERANCE)
             for name, error in zip(self._joints, errors)

@@ -24,8 +24,7 @@ from .weights import Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
 REST_PERIODS = 30  # control periods after a reset, in which things come to rest
-# of a step of physics; with 10 fingers sink millimetres into what they hold
-ITERATIONS = 20
+ITERATIONS = 40  # of the solver, in a step of physics
 
 
 class Contact(NamedTuple):

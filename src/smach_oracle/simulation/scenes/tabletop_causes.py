@@ -35,7 +35,7 @@ EYE_LOOKING = np.array([0.09, 0.02, 1.44])  # m, where it is when it looks at th
 LOOKS_AT = np.array([0.65, 0.0, 0.80])  # m, the middle of its image then
 
 # why, and why so often: doc/protocol.md
-AMOUNT = 0.36  # chance that a trial has a cause
+AMOUNT = 0.40  # chance that a trial has a cause
 KINDS_OF = {
     LASTING: {'crowded': 0.25, 'glare': 0.25, 'goal_occupied': 0.20, 'dim_light': 0.10,
               'slippery_object': 0.10, 'edge_of_reach': 0.10},

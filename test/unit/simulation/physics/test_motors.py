@@ -5,6 +5,7 @@ import pytest
 from worlds import CAN, TABLE, Hand, empty, scene
 
 from smach_oracle.pr2.robot import ARM_JOINTS, ARMS
+from smach_oracle.simulation.physics.pr2_body import SUBSTEPS
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 
@@ -22,7 +23,7 @@ def pushed(world, link, force, periods):
     """Push a link for so many control periods; how far it gave way, m."""
     before = world.link_pose(link)[:3, 3]
     for _ in range(periods):
-        for _ in range(4):
+        for _ in range(SUBSTEPS):
             where = world.link_pose(link)[:3, 3]
             pybullet.applyExternalForce(world.robot.index, world.robot.links[link], force,
                                         where.tolist(), pybullet.WORLD_FRAME,
