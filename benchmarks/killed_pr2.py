@@ -217,13 +217,15 @@ class RobotUnderKills:
         return time.monotonic()
 
     def _moments(self) -> List[StoredMoment]:
+        if not os.path.exists(self._store):
+            return []  # it was killed before that
         store = StoreFile(self._store, read_only=True)
         return [moment for trial in store.trials() for moment in store.moments(trial.number)]
 
     def _under_way(self) -> str:
-        """Return the state of the store's last moment."""
-        moments = self._moments()
-        return moments[-1].label or moments[-1].path if moments else 'nothing'
+        """Return the last state that the store names."""
+        labels = [moment.label for moment in self._moments() if moment.label]
+        return labels[-1] if labels else 'no state yet'
 
 
 if __name__ == '__main__':

@@ -53,6 +53,11 @@ class _Printed(io.TextIOWrapper):
         raise SystemExit(NO_READER)
 
 
+def _watched(stream: TextIO) -> TextIO:
+    """The stream in `_Printed`, unless a program has replaced it by one of its own."""
+    return _Printed(stream) if isinstance(stream, io.TextIOWrapper) else stream
+
+
 def run(module: str) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
@@ -66,7 +71,7 @@ def run(module: str) -> None:
         sys.stdout.write(told)
         return
     if module.startswith(PRINTING):
-        sys.stdout, sys.stderr = _Printed(sys.stdout), _Printed(sys.stderr)
+        sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
     try:
         main = import_module('smach_oracle.' + module).main
     except ImportError as err:

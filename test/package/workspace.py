@@ -32,8 +32,9 @@ def copy_sources(target: Path) -> Path:
 
 
 def fake_upstream(source_space: Path, name: str) -> None:
-    """Write a catkin package that provides the Python package `name`, empty but for saying that it
-    is upstream's.
+    """Write a catkin package that provides the Python package `name`.
+
+    It is empty, except that it says that it is upstream's.
     """
     python = source_space / name / 'src' / name
     python.mkdir(parents=True)

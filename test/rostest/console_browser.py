@@ -67,7 +67,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser = self.browser
         browser.find(QUESTION)
         self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')),
-                        'the title tells of it')
+                        'the title says so')
         browser.click(QUESTION)
         self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
         for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'missing: grasp',

@@ -44,7 +44,7 @@ QUESTION = '.question-row[data-key^="/alpha/"]'
 
 
 class Robot:
-    """What the robot tells of itself, each with its own time."""
+    """What the robot says about itself, each with its own time."""
 
     def __init__(self):
         self._buffer = tf2_ros.Buffer()

@@ -157,7 +157,7 @@ class Live(ConsolePage, unittest.TestCase):
             self.assertTrue(self.browser.says('master silent for', '#status'))
             self.assertTrue(self.refused('the ROS master'))
             self.assertTrue(self.browser.says('Your claim has run out', '.claim-bar'))
-            # the robot hears of a stop nevertheless
+            # the robot gets a stop nevertheless
             self.browser.click('.detail [data-action=pause-machine]')
             self.assertTrue(self.browser.says('KITCHEN is paused', '.detail .hand-reply'))
             self.assertTrue(self.browser.says('Paused by operator.', '.detail .standing'))

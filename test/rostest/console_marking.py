@@ -81,7 +81,7 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.drawn(canvas, 'points') > own + 5000),
                         'it, and what is around it')
         self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') > 10000),
-                        'the robot beside it')
+                        'the robot next to it')
         before, pixels = self.browser.run(PICTURE, canvas)
         self.assertGreater(pixels, 5000)
         self.browser.find(canvas).send_keys(Keys.ARROW_LEFT)
@@ -138,7 +138,7 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.click('[data-tool=background]')
         left_top, right_bottom = self.around_the_can()
         self.drag(left_top, (right_bottom[0], left_top[1]))
-        self.assertTrue(wait_for(lambda: len(self.told('mark')) == 2), 'a stroke cuts anew')
+        self.assertTrue(wait_for(lambda: len(self.told('mark')) == 2), 'a stroke cuts again')
         self.assertEqual([told.ok for told in self.told('mark')], [True, True])
         browser.click('.perception .accept')
         self.assertTrue(wait_for(lambda: rospy.has_param('/alpha/picked')))

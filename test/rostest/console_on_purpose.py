@@ -48,7 +48,7 @@ box.style.height = "60px";
 document.querySelector(".answer-form").prepend(box);
 document.querySelector(selector).click();
 box.remove();'''
-# somebody takes a question over; the list that tells of it comes later than the reply
+# somebody takes a question over; the list that shows it comes later than the reply
 TAKEN = OF_A_QUESTION % '''
   said("bob");
   await detail.claim("take_over");

@@ -109,7 +109,7 @@ class ConsolePage:
 
     @staticmethod
     def remember_name(browser, name):
-        """As if it had been given before; the page begins anew."""
+        """As if it had been given before; the page begins again."""
         browser.run('localStorage.setItem("expert", arguments[0])', name)
         browser.driver.refresh()
 

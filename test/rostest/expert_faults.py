@@ -89,7 +89,7 @@ class TestExpertFaults(unittest.TestCase):
         listed = wait_for_question(ann, 40.0)
         self.assertEqual(listed.goal.query_id, self.id())
         self.assertLess(listed.deadline_s - time.monotonic(), 59.0,
-                        'the deadline does not begin anew')
+                        'the deadline does not begin again')
         self.assertTrue(ann.answer(listed, goto('PICK')).ok)
         self.assertTrue(asked.wait())
         self.assertEqual(asked.answer.state, 'PICK')

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""The documentation's test of one's own script, in a package of its own: it passes, and fails where
-it should.
+"""The documentation's test of a user's own script, in a package of its own.
+
+It passes, and fails where it should.
 """
 import os
 import re

@@ -2,7 +2,7 @@
 """Signals at any instant of the first execute: the process ends, and its bags are whole.
 
 In library use rospy itself may hang: where the signal meets the main thread within a line of the
-log. That is told by the stack of the main thread; the bare script hangs there as well.
+log. The stack of the main thread shows that. The bare script hangs there as well.
 """
 import sys
 import unittest

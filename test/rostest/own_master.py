@@ -1,4 +1,4 @@
-"""A ROS master of one's own."""
+"""A ROS master for one test."""
 import xmlrpc.client
 
 from waiting import wait_for

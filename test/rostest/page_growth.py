@@ -28,7 +28,7 @@ const until = (selector) => new Promise((resolve) => {
       window.leapt += 700;
       press("n");
     } while (!document.querySelector(".detail"));
-    // a robot on a loaded machine may answer too late: the question is left all the same
+    // a robot on a loaded machine may answer too late: the question is left anyway
     await until(".detail .claim-bar.good, .detail [data-action=claim]");
     await until(".detail .state");
     press("Escape");

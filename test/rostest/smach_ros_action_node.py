@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An action server whose goals say how it shall behave; it serves actionlib/TestAction for the
+"""An action server whose goals say how it should behave; it serves actionlib/TestAction for the
 smach_ros tests.
 
 Run as ``smach_ros_action_node.py ACTION_NAME``. The number of the goal chooses the behaviour (see
@@ -19,7 +19,7 @@ class Behaviour:
     """Numbers a goal may carry."""
     ABORT = 1
     HANG = 2               # runs until cancelled, then reports PREEMPTED
-    IGNORE_CANCEL = 3      # runs for ever, whatever the client says
+    IGNORE_CANCEL = 3      # runs forever, whatever the client says
     SUCCEED_ON_CANCEL = 4  # runs until cancelled, then reports SUCCEEDED
     FEEDBACK = 5           # three pieces of feedback, then SUCCEEDED
     REJECT = 6

@@ -126,7 +126,7 @@ class TreesTest(unittest.TestCase):
         self.statuses, self.structures = [], []
 
     def told(self, path):
-        """What was told of a container, but for heartbeats."""
+        """What was told of a container, but heartbeats."""
         return [status.info for status in list(self.statuses)
                 if status.path == path and status.info != 'HEARTBEAT']
 

@@ -156,7 +156,7 @@ class Teleoperation(unittest.TestCase):
             bob.send(linear=(0.0, 0.0, -0.2))
             return wait_for(lambda: len(refusals()) > before, 0.2) and ROBOT.leads[-1] > 0.1
 
-        # each time she began anew, the lead would begin at nothing
+        # each time she began again, the lead would begin at nothing
         with self.ann.pressing(linear=(0.0, 0.0, 0.2)):
             self.assertTrue(wait_for(refused_while_she_pushes, 30.0))
         self.assertEqual({state.sender for state in refusals()}, {'bob'})
@@ -190,7 +190,7 @@ class Teleoperation(unittest.TestCase):
             self.assertTrue(wait_for(lambda: self.ann.states[-1].gripper_stalled))
             seen = len(self.ann.states)
             self.assertTrue(wait_for(lambda: len(self.ann.states) > seen + 60))
-        self.assertLess(len(ROBOT.grips), 5)  # a loaded machine lets go, and presses anew
+        self.assertLess(len(ROBOT.grips), 5)  # a loaded machine lets go, and presses again
 
     def close(self):
         return self.ann.send(move_gripper=True, gripper=0.0)

@@ -144,7 +144,7 @@ class Person:
         return self._seq
 
     def answer(self, seq):
-        """The first state that tells of a command."""
+        """The first state that shows a command."""
         return wait_for(lambda: next((state for state in list(self.states)
                                       if (state.sender, state.seq) == (self.operator, seq)), None))
 

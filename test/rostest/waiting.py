@@ -45,7 +45,7 @@ def stays(condition: Callable[[], Any], for_s: float) -> bool:
 class Once(threading.Thread):
     """Calls `then` in a thread of its own once the condition holds. Join it.
 
-    If the condition never holds, it calls `then` all the same, so that nothing hangs, and `join`
+    If the condition never holds, it calls `then` anyway, so that nothing hangs, and `join`
     fails.
     """
 

@@ -217,7 +217,7 @@ class RosRobot:
             stalls: bool = False) -> genpy.Message:
         """Send a goal and wait for its result.
 
-        :param stalls: a goal that was aborted has a result all the same (a gripper that holds
+        :param stalls: a goal that was aborted still has a result (a gripper that holds
             something).
         :raises RobotError: where no controller takes it, it fails, or abort() is called.
         """

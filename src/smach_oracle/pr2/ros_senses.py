@@ -24,7 +24,7 @@ from .robot import RobotError
 KEPT = {Image: 4}  # messages of a topic
 KEPT_OTHERS = 200
 LOOK_S = 0.05  # wall s that a service that is not there is waited for
-AGAIN_S = 3.0  # wall s after which what was asked for is asked for anew
+AGAIN_S = 3.0  # wall s after which what was asked for is asked for again
 T = TypeVar('T')
 
 

@@ -9,7 +9,7 @@ from .seen_scene import SeenScene, SeenThing
 CROWDED = 0.015  # m between two things that are too close to each other for a hand
 ROOM = 0.15  # m between the middles of things, where each has room
 SPOTS_X, SPOTS_Y = (0.50, 0.56, 0.62, 0.68), (0.05, 0.12, 0.19, 0.26, 0.33, 0.40)  # m, y outwards
-# m from the middle of the place that something shall stand at: other things hinder the hand there
+# m from the middle of the place where something should stand: other things hinder the hand there
 ABOUT_PLACE = 0.14
 REACH = {'right': (-0.55, 0.27), 'left': (-0.27, 0.55)}  # m, y that an arm reaches on a table
 FARTHEST = 0.82  # m from the shoulder
@@ -33,7 +33,7 @@ def in_the_way(scene: SeenScene, thing: SeenThing) -> Optional[SeenThing]:
 
 
 def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
-    """The thing nearest to a place (3,) m at which another one shall stand, or None."""
+    """The thing nearest to a place (3,) m at which another one should stand, or None."""
     beside = [(float(np.hypot(*(thing.box.centre - place)[:2])), number)
               for number, thing in enumerate(scene.things)
               if thing.movable and thing.box is not None and not thing.wanted]
@@ -44,7 +44,7 @@ def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
 def free_spot(scene: SeenScene, arm: str, kept: List[np.ndarray], thing: str) -> Optional[Spot]:
     """Where on the table an arm can put a thing, with room around; the nearest to the robot.
 
-    :param kept: (3,) m, places that shall stay free.
+    :param kept: (3,) m, places that should stay free.
     """
     side = 1.0 if arm == 'left' else -1.0
     taken = [box.centre for box in scene.boxes_but(thing)] + kept
@@ -60,7 +60,7 @@ def move_aside(attempt: Attempt, target: Target, about: np.ndarray,
                kept: List[np.ndarray]) -> str:
     """Take a thing and put it where there is room; its name.
 
-    :param kept: (3,) m, places that shall stay free.
+    :param kept: (3,) m, places that should stay free.
     :raises ManoeuvreError: where it cannot be moved, or is lost.
     :raises StuckError: where the hand does not get there.
     """

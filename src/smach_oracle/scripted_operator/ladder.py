@@ -29,9 +29,9 @@ class Sight(NamedTuple):
     seen: bool = True  # the thing that the task is about
     located: bool = True  # and where it is
     holds: bool = False  # the hand of the plan holds something
-    crowded: bool = False  # another thing stands close beside it
-    blocked: bool = False  # another thing stands where something shall be put
-    covered: bool = False  # a limb of the robot is right beside it, or before it
+    crowded: bool = False  # another thing stands close next to it
+    blocked: bool = False  # another thing stands where something should be put
+    covered: bool = False  # a limb of the robot is right next to it, or before it
     moved: bool = False  # it stands elsewhere than where the robot has detected it
     reachable: bool = True  # the hand of the plan reaches the thing
 

@@ -143,7 +143,7 @@ def _approach(driver: HandDriver, grasp: np.ndarray, top: float) -> None:
 
 def _grasps_to_try(attempt: Attempt, scene: SeenScene, thing: SeenThing,
                    pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
-    """How the hand shall take a thing: another way at each try, and misjudged a little.
+    """How the hand takes a thing: another way at each try, and misjudged a little.
 
     :returns: _WAYS of them, perhaps the same again.
     :raises ManoeuvreError: where there is no way.
@@ -231,8 +231,8 @@ class InHand(NamedTuple):
 def put_down(attempt: Attempt, place: np.ndarray, surface: Optional[float]) -> None:
     """Put what the hand holds down upright.
 
-    :param place: (3,) m, where its centre shall be, in base_footprint; it comes to stand on what is
-        below.
+    :param place: (3,) m, where its centre should be, in base_footprint. It comes to stand on
+        what is below.
     :param surface: m, how high that is; None: as far as the hand gets.
     :raises ManoeuvreError: where it does not stand there in the end.
     :raises StuckError: where the hand does not get there.
@@ -328,7 +328,7 @@ def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
         return
     beside = float(np.hypot(*(thing.box.centre - place)[:2]))
     if beside > 0.05:
-        raise ManoeuvreError('{} is {:.0f} cm beside its place'.format(name, 100 * beside))
+        raise ManoeuvreError('{} is {:.0f} cm next to its place'.format(name, 100 * beside))
     if float(thing.box.size[2]) < LIES * (attempt.watcher.tall(name) or 0.0):
         raise ManoeuvreError('{} lies at its place'.format(name))
 

@@ -150,7 +150,7 @@ def _put_away(attempt: Attempt, task: ManualTask, place: np.ndarray) -> None:
 
 
 def _clear(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
-    """Move what stands beside the thing, or where something shall be put."""
+    """Move what stands beside the thing, or where something should be put."""
     kept = [] if task.plan.means != PUT_DOWN else [
         place_of(task.plan, task.userdata, means)[0]]
     about = kept[0] if kept else task.about
@@ -194,7 +194,7 @@ _WORK: Dict[str, Callable[[ManualTask, RobotMeans, TakeWheel], None]] = {
 
 def place_of(plan: StatePlan, userdata: Mapping[str, Any],
              means: RobotMeans) -> Tuple[np.ndarray, Optional[float]]:
-    """Where something shall be put, (3,) m in base_footprint, and how high the surface there is.
+    """Where something should be put, (3,) m in base_footprint, and how high the surface there is.
 
     :raises ManoeuvreError: where nobody knows.
     """

@@ -67,7 +67,7 @@ def rectangle(region: Region, image: Tuple[int, int], generator: np.random.Gener
 
 
 def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[OperatorStroke, ...]:
-    """A line down the middle of the thing, and dots beside it that are none of it."""
+    """A line down the middle of the thing, and dots next to it that are not part of it."""
     left, top, width, height = region
     middle = left + width / 2 + generator.normal(0.0, 0.05) * width
     inside = OperatorStroke(True, [(middle, top + 0.25 * height), (middle, top + 0.75 * height)])

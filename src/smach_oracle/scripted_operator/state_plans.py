@@ -25,8 +25,8 @@ class StatePlan(NamedTuple):
     means: str  # one of MEANS
     arm: str = 'right'  # take, put_down: with which
     what: str = ''  # take: userdata key of the detected pose or poses; '' : whatever is nearest
-    place: str = ''  # put_down: userdata key of the pose where it shall stand
-    onto: str = ''  # put_down: or name of the body on whose top it shall stand
+    place: str = ''  # put_down: userdata key of the pose where it should stand
+    onto: str = ''  # put_down: or name of the body on whose top it should stand
     inside: bool = False  # take: out of a shelf, level and straight back
     hidden: str = ''  # show: state to go to where nothing of it can be seen
     lost: str = ''  # put_down: state to go to where the hand holds nothing

@@ -8,7 +8,7 @@ another head pose, and grips the drink firmer.
 import argparse
 import math
 import sys
-from typing import Any, List, Optional
+from typing import Any, List, Optional, Sequence
 
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -49,36 +49,35 @@ HOME = (0.0, 0.0, math.pi / 2)
 PALM = (0.0, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
 
 
-class DrinkMemory:
-    """What the script remembers in the course of one trial, and the goals that go by it."""
+def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
+    """Remember nothing yet, at the beginning of a trial; one that goes on has its memory.
 
-    def __init__(self) -> None:
-        self.begin()
+    The userdata has it, so it survives a crash: looks that did not show the drink, and picks.
+    """
+    if 'missed' not in userdata:
+        userdata.missed, userdata.picks = 0, 0
 
-    def begin(self) -> None:
-        """Forget the trial before."""
-        self._missed = 0  # looks that did not show the drink
-        self._picks = 0
 
-    def detect_goal(self, userdata: smach.UserData, goal: DetectDrinkGoal) -> DetectDrinkGoal:
-        """Look for the drink; from another head pose after each look that did not show it."""
-        return DetectDrinkGoal(MIN_HEIGHT, ORDERED, self._missed % 256)
+def detect_goal(userdata: smach.UserData, goal: DetectDrinkGoal) -> DetectDrinkGoal:
+    """Look for the drink; from another head pose after each look that did not show it."""
+    return DetectDrinkGoal(MIN_HEIGHT, ORDERED, userdata.missed % 256)
 
-    def detected(self, userdata: smach.UserData, status: int, result: DetectDrinkResult) -> None:
-        """Keep whether the drink was seen."""
-        self._missed += status != GoalStatus.SUCCEEDED
 
-    def pick_goal(self, userdata: smach.UserData, goal: PickGoal) -> PickGoal:
-        """Pick the drink with the right arm; the door stands open on the left."""
-        self._picks += 1
-        return PickGoal('right', userdata.drink, userdata.size, FRIDGE, min(self._picks - 1, 255))
+def detected(userdata: smach.UserData, status: int, result: DetectDrinkResult) -> None:
+    """Keep whether the drink was seen."""
+    userdata.missed += status != GoalStatus.SUCCEEDED
+
+
+def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
+    """Pick the drink with the right arm; the door stands open on the left."""
+    userdata.picks += 1
+    return PickGoal('right', userdata.drink, userdata.size, FRIDGE, min(userdata.picks - 1, 255))
 
 
 def make_machine() -> smach.StateMachine:
     """The state machine of Fig. 7 in the paper, with a look at where it stands, without oracle."""
-    memory = DrinkMemory()
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
-    sm.register_start_cb(lambda userdata, initial_states: memory.begin())
+    sm.register_start_cb(begin)
     with sm:
         smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'LOCALISE'})
         smach.StateMachine.add('LOCALISE', action('localise_at_fridge', LocaliseAtFridgeAction),
@@ -89,13 +88,14 @@ def make_machine() -> smach.StateMachine:
         smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
         smach.StateMachine.add('DETECT_DRINK',
                                action('detect_drink', DetectDrinkAction,
-                                      goal_cb=memory.detect_goal, result_cb=memory.detected,
+                                      goal_cb=detect_goal, result_cb=detected,
+                                      input_keys=['missed'], output_keys=['missed'],
                                       result_slots=['drink', 'size']),
                                {'succeeded': 'PICK_DRINK'})
         smach.StateMachine.add(
             'PICK_DRINK',
-            action('pick', PickAction, goal_cb=memory.pick_goal, input_keys=['drink', 'size'],
-                   result_slots=['grasp']), {'succeeded': 'MOVE_OUT'})
+            action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size', 'picks'],
+                   output_keys=['picks'], result_slots=['grasp']), {'succeeded': 'MOVE_OUT'})
         smach.StateMachine.add('MOVE_OUT', drive(*OUT_OF_THE_FRIDGE), {'succeeded': 'CLOSE_FRIDGE'})
         smach.StateMachine.add('CLOSE_FRIDGE',
                                action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
@@ -107,7 +107,7 @@ def make_machine() -> smach.StateMachine:
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
-    """An action state that does not wait for its server for ever."""
+    """An action state that does not wait for its server forever."""
     return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
                              **options)
 

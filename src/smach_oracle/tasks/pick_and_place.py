@@ -8,7 +8,7 @@ it firmer.
 """
 import argparse
 import sys
-from typing import Any, List, Optional
+from typing import Any, List, Optional, Sequence
 
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -41,61 +41,68 @@ VIEWS = ((0.65, 0.0, 0.75), (0.85, 0.0, 0.75), (0.50, 0.0, 0.75))
 PLACE_TOLERANCE = 0.045  # m, of the area on which the object may stand
 
 
-class TableMemory:
-    """What the script remembers in the course of one trial, and the goals that go by it."""
+# what the script remembers in the course of one trial, in the userdata: so it survives a crash
+MEMORY = {'input_keys': ['memory'], 'output_keys': ['memory']}
 
-    def __init__(self) -> None:
-        self.begin()
 
-    def begin(self) -> None:
-        """Forget the trial before."""
-        self._missed = 0  # looks that did not show the object
-        self._look_at: Optional[PointStamped] = None  # where the last one said there is more to see
-        self._picks = 0
-        # what the object looked like when it was first seen; a 0: not seen yet
-        self._colour, self._size = ColorRGBA(), Vector3()
+def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
+    """Remember nothing yet, at the beginning of a trial; one that goes on has its memory."""
+    if 'memory' not in userdata:
+        userdata.memory = {
+            'missed': 0,  # looks that did not show the object
+            'look_at': None,  # PointStamped, where the last one said there is more to see
+            'picks': 0,
+            # what the object looked like when it was first seen; a 0: not seen yet
+            'colour': ColorRGBA(), 'size': Vector3()
+        }
 
-    def head_goal(self, userdata: smach.UserData, goal: PointHeadGoal) -> PointHeadGoal:
-        """Look at the table; from another head pose after each look that showed too little."""
-        view = PointStamped(Header(frame_id=BASE), Point(*VIEWS[self._missed % len(VIEWS)]))
-        return PointHeadGoal(self._look_at or view)
 
-    def detect_goal(self, userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTabletopGoal:
-        """Find the nearest object, and from then on that one."""
-        return DetectTabletopGoal(MIN_HEIGHT, self._colour, self._size)
+def head_goal(userdata: smach.UserData, goal: PointHeadGoal) -> PointHeadGoal:
+    """Look at the table; from another head pose after each look that showed too little."""
+    view = VIEWS[userdata.memory['missed'] % len(VIEWS)]
+    return PointHeadGoal(userdata.memory['look_at'] or PointStamped(Header(frame_id=BASE),
+                                                                    Point(*view)))
 
-    def detected(self, userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
-        """Keep what the object looks like, or that it was not seen."""
-        if status != GoalStatus.SUCCEEDED:
-            self._missed += 1
-            known = result is not None and result.look_at.header.frame_id
-            self._look_at = result.look_at if known else None
-        elif not self._colour.a:
-            self._colour, self._size = result.colours[0], result.sizes[0]
 
-    def pick_goal(self, userdata: smach.UserData, goal: PickGoal) -> PickGoal:
-        """Pick the object with the right arm."""
-        self._picks += 1
-        return PickGoal('right', userdata.objects[0], userdata.sizes[0], userdata.map_id,
-                        min(self._picks - 1, 255))
+def detect_goal(userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTabletopGoal:
+    """Find the nearest object, and from then on that one."""
+    return DetectTabletopGoal(MIN_HEIGHT, userdata.memory['colour'], userdata.memory['size'])
+
+
+def detected(userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
+    """Keep what the object looks like, or that it was not seen."""
+    memory = userdata.memory
+    if status != GoalStatus.SUCCEEDED:
+        known = result is not None and result.look_at.header.frame_id
+        userdata.memory = dict(memory, missed=memory['missed'] + 1,
+                               look_at=result.look_at if known else None)
+    elif not memory['colour'].a:
+        userdata.memory = dict(memory, colour=result.colours[0], size=result.sizes[0])
+
+
+def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
+    """Pick the object with the right arm."""
+    picks = userdata.memory['picks']
+    userdata.memory = dict(userdata.memory, picks=picks + 1)
+    return PickGoal('right', userdata.objects[0], userdata.sizes[0], userdata.map_id,
+                    min(picks, 255))
 
 
 def make_machine() -> smach.StateMachine:
     """The state machine of Fig. 5 in the paper, without its oracle."""
-    memory = TableMemory()
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'],
                             input_keys=['place_pose'])
-    sm.register_start_cb(lambda userdata, initial_states: memory.begin())
+    sm.register_start_cb(begin)
     with sm:
         smach.StateMachine.add('MOVE_ARMS_ASIDE', action('move_arms_aside', MoveArmsAsideAction),
                                {'succeeded': 'POINT_HEAD'})
-        smach.StateMachine.add('POINT_HEAD', action('point_head', PointHeadAction,
-                                                    goal_cb=memory.head_goal),
+        smach.StateMachine.add('POINT_HEAD',
+                               action('point_head', PointHeadAction, goal_cb=head_goal, **MEMORY),
                                {'succeeded': 'DETECT_TABLETOP'})
         smach.StateMachine.add(
             'DETECT_TABLETOP',
-            action('detect_tabletop', DetectTabletopAction, goal_cb=memory.detect_goal,
-                   result_cb=memory.detected, result_slots=['table', 'objects', 'sizes']),
+            action('detect_tabletop', DetectTabletopAction, goal_cb=detect_goal,
+                   result_cb=detected, result_slots=['table', 'objects', 'sizes'], **MEMORY),
             {'succeeded': 'BUILD_COLLISION_MAP'})
         smach.StateMachine.add(
             'BUILD_COLLISION_MAP',
@@ -104,8 +111,8 @@ def make_machine() -> smach.StateMachine:
             {'succeeded': 'PICK'})
         smach.StateMachine.add(
             'PICK',
-            action('pick', PickAction, goal_cb=memory.pick_goal,
-                   input_keys=['objects', 'sizes', 'map_id'], result_slots=['grasp']),
+            action('pick', PickAction, goal_cb=pick_goal, output_keys=['memory'],
+                   input_keys=['objects', 'sizes', 'map_id', 'memory'], result_slots=['grasp']),
             {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', action('place', PlaceAction, goal_cb=place_goal,
                                                input_keys=['place_pose', 'grasp', 'map_id']))
@@ -113,7 +120,7 @@ def make_machine() -> smach.StateMachine:
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
-    """An action state that does not wait for its server for ever."""
+    """An action state that does not wait for its server forever."""
     return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
                              **options)
 
@@ -124,7 +131,7 @@ def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
 
 
 def place_pose() -> PoseStamped:
-    """Where the object shall stand (m, in the robot's base frame)."""
+    """Where the object should stand (m, in the robot's base frame)."""
     return PoseStamped(Header(frame_id=BASE),
                        Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
 

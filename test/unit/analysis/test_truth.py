@@ -1,4 +1,4 @@
-"""What the world tells of each trial, and how it finds its way to the trial's bag."""
+"""What the world says about each trial, and how it finds its way to the trial's bag."""
 import json
 from types import SimpleNamespace
 

@@ -89,13 +89,13 @@ def without_place(text: str) -> str:
 
 
 def numbers(text: str) -> List[float]:
-    """The numbers of a text, in their order, but for those in names. The words may change."""
+    """The numbers of a text, in their order, except those in names. The words may change."""
     return [float(number)
             for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.]*[/_])', text)]
 
 
 def lacking(held: Any, now: Any, where: str = '') -> Iterator[str]:
-    """Yield each difference. Further keys, and further rows with a name, are none."""
+    """Yield each difference. Further keys, and further rows with a name, do not count."""
     if isinstance(held, dict):
         yield from _lacking_keys(held, now, where)
     elif _are_named(held) and _are_named(now):

@@ -36,7 +36,7 @@ def rates_in(folder):
 def test_an_experiment_that_is_over_is_found_complete(ended):
     folder, result = ended
     assert result.code == 0, result.errors
-    # run_trials writes them anew, from the event that ends each bag
+    # run_trials writes them again, from the event that ends each bag
     assert len(rates_in(EXPERIMENT)) == 3
     assert rates_in(folder) == rates_in(EXPERIMENT)
 

@@ -97,7 +97,7 @@ def test_an_interrupted_trial_is_dropped_with_its_truth_and_its_rates(job: Recor
         assert job.kept_rates() == job.learned(1) and job.seeds_told() == [
             FIRST_SEED, FIRST_SEED + 1
         ]
-    job.record('aborted', start=2)  # run anew
+    job.record('aborted', start=2)  # run again
     assert job.tidy_up().next_trial == 3 and job.kept_rates() == job.learned(2)
 
 

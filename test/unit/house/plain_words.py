@@ -17,9 +17,7 @@ MOST_WORDS = 35
 STYLE = 'doc/style.md'
 # pages and folders that are still to be mended; the list only ever gets shorter
 NOT_YET: Tuple[str, ...] = (
-    'doc/results.md', 'doc/simulation_inside.md', 'src/smach_oracle/pr2/',
-    'src/smach_oracle/scripted_operator/', 'src/smach_oracle/simulation/',
-    'src/smach_oracle/tasks/', 'test/')
+    'doc/results.md', 'doc/simulation_inside.md', 'test/data/')
 INTERFACES = ('.msg', '.srv', '.action')
 
 

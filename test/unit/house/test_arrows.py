@@ -254,7 +254,7 @@ def test_every_ros_package_that_is_imported_is_a_declared_dependency():
         for path in python_files('src', 'scripts', 'test')
         for _, name in imports(path)
     }
-    # rospkg comes with roslib, and is no ROS package itself
+    # rospkg comes with roslib, and is not a ROS package itself
     packages = {name for name in used if OF_ROS.fullmatch(name)} - {'rospkg'}
     assert packages == {name for name in packages if 'depend>{}<'.format(name) in manifest}
 

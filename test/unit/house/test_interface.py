@@ -15,7 +15,7 @@ FIELD = re.compile(r'^[\w/]+(\[\d*\])?\s+\w+\s*(=.*)?$')
 
 
 def undocumented(text):
-    """Yield the number of every field without a comment beside it or above it; constants speak by
+    """Yield the number of every field without a comment next to it or above it; constants speak by
     their names.
     """
     above = False

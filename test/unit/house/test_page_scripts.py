@@ -71,7 +71,7 @@ def test_every_line_has_at_most_100_columns():
 
 
 def test_no_script_asks_which_words_a_text_has():
-    """What is told to people is worded anew now and then; what scripts ask has a name or a flag."""
+    """Texts for people change now and then. Scripts ask for a name or a flag."""
     words = re.compile(r"(?:startsWith\('[A-Z]|includes\('[A-Z]|[!=]== '[A-Z]\w* )[^'\n]*'")
     found = ['{}: {}'.format(shown(path), match.group())
              for path in SCRIPTS for match in words.finditer(text_of(path))]

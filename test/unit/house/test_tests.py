@@ -47,7 +47,7 @@ def asserts(node, helpers, seen=frozenset()):
 
 
 def helpers_of(path):
-    """By name: functions that are no tests, of a module and of those beside it that it imports."""
+    """By name: functions that are no tests, of a module and of those next to it that it imports."""
     modules = {name.split('.')[0] for _, name in imports(path)} | {path.stem}
     beside = [path.with_name(name + '.py') for name in sorted(modules)]
     return {node.name: node for each in beside if each.is_file()

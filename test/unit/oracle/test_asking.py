@@ -184,7 +184,7 @@ def test_falling_back_to_a_state_has_an_end_when_nobody_ever_answers():
                       settings={'on_no_answer': 'goto:A', 'max_recoveries': 2})
     assert machine.run() == 'aborted'
     assert 'gone there 2 times' in machine.of(EventKind.WARNING)[-1].text
-    assert machine.run() == 'aborted'  # the next trial begins anew
+    assert machine.run() == 'aborted'  # the next trial begins again
     assert 'gone there 2 times' in machine.of(EventKind.WARNING)[-1].text
 
 

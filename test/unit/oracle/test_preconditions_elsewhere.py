@@ -94,7 +94,7 @@ def test_userdata_go_where_the_remappings_of_the_author_lead():
     watched = wrapped(mapped_machine(see_with([1, 2]), 'red', grasp_seeing(seen, 'aborted', 'ok')),
                       'GRASP', 'SEE/LOOK')
     assert watched.run() == 'done'
-    assert seen == [('red', 1), ('red', 2)], 'what LOOK has found anew reaches GRASP'
+    assert seen == [('red', 1), ('red', 2)], 'what LOOK has found again reaches GRASP'
     assert watched.machine.userdata.cup_pose == ('red', 2)
 
 

@@ -81,7 +81,7 @@ def _beside(left, right):
 
 
 class Rule:
-    """What the events of a trial may tell where states are guarded; written anew, from the page."""
+    """The events that a trial may have where states are guarded, written again from the page."""
 
     def __init__(self, settings):
         self._settings = settings

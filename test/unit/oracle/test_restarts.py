@@ -1,4 +1,4 @@
-"""The policy `restart`: where a script begins anew, with which userdata, and where it does not."""
+"""The policy `restart`: where a script begins again, with which userdata, and where it does not."""
 import copy
 import threading
 

@@ -44,7 +44,7 @@ def letting_go(gate, answer):
 
 
 def told(machine):
-    """What the bag tells of questions."""
+    """What the bag says about questions."""
     return [(event.kind.name, event.state) for event in machine.of(*QUERIES)]
 
 

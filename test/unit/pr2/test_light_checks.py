@@ -1,4 +1,4 @@
-"""A light in the camera is waited for, in the world's time, and not for ever."""
+"""A light in the camera is waited for, in the world's time, and not forever."""
 import collections
 
 import pytest

@@ -1,4 +1,4 @@
-"""What /diagnostics and roswtf tell of an oracle."""
+"""What /diagnostics and roswtf say about an oracle."""
 import sys
 
 import pytest

@@ -61,7 +61,7 @@ class Link:
 
 
 class Client(SimpleActionClient):
-    """Without a master: the goals go to a server beside it."""
+    """Without a master: the goals go to a server next to it."""
 
     def __init__(self):
         self.action_client = Link()

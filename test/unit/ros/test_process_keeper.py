@@ -1,4 +1,4 @@
-"""The keeper of a command: nothing of it is left behind, whatever it does and whoever dies."""
+"""The keeper of a command leaves nothing of it behind, whichever process ends."""
 import os
 import shutil
 import signal

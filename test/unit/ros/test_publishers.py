@@ -39,7 +39,7 @@ class Machine:
         rows = [('TOP', 'PICK', 'succeeded', 'PLACE', self.visits)]
         if not self.looked.is_set():
             self.looked.set()
-            # for ever would be a deadlock, since the other one waits for this one
+            # forever would be a deadlock, since the other one waits for this one
             self.go_on.wait(0.5)
         return rows
 

@@ -1,4 +1,4 @@
-"""Driving a hand by velocities: no hand, however odd, keeps the driver for ever."""
+"""Driving a hand by velocities: no hand, however odd, keeps the driver forever."""
 import numpy as np
 import pytest
 

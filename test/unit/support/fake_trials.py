@@ -1,4 +1,4 @@
-"""Trials as the executive tells of them, without an executive: for tests of the recorder and of the
+"""Trials as the executive reports them, without an executive: for tests of the recorder and of the
 analysis.
 """
 import random
@@ -29,7 +29,7 @@ class FakeMachine:
         self._seq = 0
 
     def emit(self, kind: EventKind, **fields: object) -> None:
-        """Tell of one step."""
+        """Report one step."""
         self._tell(Event(kind, self._trial_id, self._seq, self.time, self._path, **fields))
         self._seq += 1
 

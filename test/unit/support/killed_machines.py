@@ -84,7 +84,7 @@ def in_a_process(work):
 
 
 class KilledMachine:
-    """A machine with a store; `build(diary, points)` makes it anew for each process."""
+    """A machine with a store; `build(diary, points)` makes it again for each process."""
 
     def __init__(self, folder, build, **settings):
         self.store = str(folder / 'robot.db')

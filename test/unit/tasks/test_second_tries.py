@@ -13,62 +13,75 @@ from smach_oracle.msg import (
     PickGoal,
     PointHeadGoal,
 )
-from smach_oracle.tasks import drink_retrieval
-from smach_oracle.tasks.pick_and_place import VIEWS, TableMemory
+from smach_oracle.ros.stored.ros_codecs import offer_ros_codecs
+from smach_oracle.store.codecs import CODECS
+from smach_oracle.tasks import drink_retrieval, pick_and_place
+from smach_oracle.tasks.pick_and_place import VIEWS, detected
 
 
-@pytest.fixture(name='memory')
-def _memory():
-    return TableMemory()
+@pytest.fixture(name='userdata')
+def _userdata():
+    userdata = smach.UserData()
+    pick_and_place.begin(userdata)
+    drink_retrieval.begin(userdata)
+    return userdata
 
 
-def looked_at(memory):
-    target = memory.head_goal(smach.UserData(), PointHeadGoal()).target
+def looked_at(userdata):
+    target = pick_and_place.head_goal(userdata, PointHeadGoal()).target
     return (target.point.x, target.point.y, target.point.z)
 
 
-def test_after_a_look_that_saw_too_little_the_head_looks_from_elsewhere(memory):
-    assert looked_at(memory) == VIEWS[0] == looked_at(memory)
-    memory.detected(smach.UserData(), GoalStatus.ABORTED, DetectTabletopResult())
-    assert looked_at(memory) == VIEWS[1]
+def test_after_a_look_that_saw_too_little_the_head_looks_from_elsewhere(userdata):
+    assert looked_at(userdata) == VIEWS[0] == looked_at(userdata)
+    detected(userdata, GoalStatus.ABORTED, DetectTabletopResult())
+    assert looked_at(userdata) == VIEWS[1]
     cut = PointStamped(Header(frame_id='base_footprint'), Point(0.5, 0.4, 0.7))
-    memory.detected(smach.UserData(), GoalStatus.ABORTED, DetectTabletopResult(look_at=cut))
-    assert looked_at(memory) == (0.5, 0.4, 0.7)
-    memory.detected(smach.UserData(), GoalStatus.ABORTED, None)  # the server has gone
-    assert looked_at(memory) == VIEWS[0]
+    detected(userdata, GoalStatus.ABORTED, DetectTabletopResult(look_at=cut))
+    assert looked_at(userdata) == (0.5, 0.4, 0.7)
+    detected(userdata, GoalStatus.ABORTED, None)  # the server has gone
+    assert looked_at(userdata) == VIEWS[0]
 
 
-def test_what_was_seen_first_is_the_object_until_the_trial_ends(memory):
+def test_what_was_seen_first_is_the_object_until_the_trial_ends(userdata):
     def goal():
-        return memory.detect_goal(smach.UserData(), DetectTabletopGoal())
+        return pick_and_place.detect_goal(userdata, DetectTabletopGoal())
     assert goal().colour.a == 0
     dark = DetectTabletopResult(objects=[PoseStamped()], sizes=[Vector3()], colours=[ColorRGBA()])
-    memory.detected(smach.UserData(), GoalStatus.SUCCEEDED, dark)
+    detected(userdata, GoalStatus.SUCCEEDED, dark)
     assert goal().colour.a == 0, 'too dark to tell'
     for red in (0.8, 0.1):
         result = DetectTabletopResult(objects=[PoseStamped()], sizes=[Vector3(red, 0.1, 0.1)],
                                       colours=[ColorRGBA(red, 0.2, 0.2, 1.0)])
-        memory.detected(smach.UserData(), GoalStatus.SUCCEEDED, result)
+        detected(userdata, GoalStatus.SUCCEEDED, result)
         assert (goal().colour.r, goal().size.x) == (0.8, 0.8)
-    memory.begin()
-    assert goal().colour.a == 0
+    pick_and_place.begin(userdata)
+    assert goal().colour.r == 0.8, 'a trial that goes on after a crash has its memory'
 
 
-def test_each_pick_of_a_trial_says_how_many_there_were_before(memory):
-    userdata = smach.UserData()
+def test_each_pick_of_a_trial_says_how_many_there_were_before(userdata):
     userdata.objects, userdata.sizes, userdata.map_id = [PoseStamped()], [Vector3()], 'map'
-    assert [memory.pick_goal(userdata, PickGoal()).attempt for _ in range(3)] == [0, 1, 2]
+    assert [pick_and_place.pick_goal(userdata, PickGoal()).attempt for _ in range(3)] == [0, 1, 2]
 
 
-def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_firmer():
-    memory, userdata = drink_retrieval.DrinkMemory(), smach.UserData()
+def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_firmer(userdata):
     for missed in range(3):
-        goal = memory.detect_goal(userdata, DetectDrinkGoal())
+        goal = drink_retrieval.detect_goal(userdata, DetectDrinkGoal())
         assert (goal.colour, goal.view) == (drink_retrieval.ORDERED, missed)
-        memory.detected(userdata, GoalStatus.ABORTED, DetectDrinkResult())
-    memory.detected(userdata, GoalStatus.SUCCEEDED, DetectDrinkResult())
-    assert memory.detect_goal(userdata, DetectDrinkGoal()).view == 3, 'that one showed it'
+        drink_retrieval.detected(userdata, GoalStatus.ABORTED, DetectDrinkResult())
+    drink_retrieval.detected(userdata, GoalStatus.SUCCEEDED, DetectDrinkResult())
+    assert drink_retrieval.detect_goal(userdata, DetectDrinkGoal()).view == 3, 'that one showed it'
     userdata.drink, userdata.size = PoseStamped(), Vector3()
-    assert [memory.pick_goal(userdata, PickGoal()).attempt for _ in range(2)] == [0, 1]
-    memory.begin()
-    assert memory.detect_goal(userdata, DetectDrinkGoal()).view == 0
+    assert [drink_retrieval.pick_goal(userdata, PickGoal()).attempt for _ in range(2)] == [0, 1]
+    drink_retrieval.begin(userdata)
+    assert userdata.picks == 2, 'a trial that goes on after a crash has its memory'
+
+
+def test_what_a_trial_remembers_can_be_stored(userdata):
+    detected(userdata, GoalStatus.SUCCEEDED, DetectTabletopResult(
+        objects=[PoseStamped()], sizes=[Vector3(0.125, 0.125, 0.125)],
+        colours=[ColorRGBA(0.75, 0.25, 0.25, 1.0)]))
+    detected(userdata, GoalStatus.ABORTED, DetectTabletopResult(look_at=PointStamped()))
+    offer_ros_codecs()
+    text, whole, parts = CODECS.encode(userdata.memory)
+    assert CODECS.decode(text, whole, parts.__getitem__) == userdata.memory

@@ -206,7 +206,7 @@ class Manipulation:
 
     @contextlib.contextmanager
     def firmer_after_slip(self, attempt: int = 0) -> Iterator[float]:
-        """How firmly to grip, N; where it slips all the same, the next grip is the firmest.
+        """How firmly to grip, N; where it slips even so, the next grip is the firmest.
 
         :param attempt: how often it has been tried before; after the first time, the grip is firm.
         """

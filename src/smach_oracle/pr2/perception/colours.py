@@ -3,7 +3,7 @@ from typing import List, Tuple
 
 import numpy as np
 
-# degrees of hue from which each name counts, up to the next one's; red goes over 360
+# degrees of hue from which each name counts, up to the next one's; red passes 360
 HUES: List[Tuple[float, str]] = [(0.0, 'red'), (18.0, 'orange'), (43.0, 'yellow'), (68.0, 'green'),
                                  (165.0, 'turquoise'), (205.0, 'blue'), (262.0, 'purple'),
                                  (335.0, 'red')]

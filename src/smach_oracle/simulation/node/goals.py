@@ -171,7 +171,7 @@ def point_in_base(point: PointStamped, odom_from_base: np.ndarray) -> np.ndarray
 
 
 def odom_from_pose(pose: PoseStamped, odom_from_base: np.ndarray) -> np.ndarray:
-    """4x4, where the base shall stand in odom_combined.
+    """4x4, where the base should stand in odom_combined.
 
     :raises BadGoal: for an unknown frame, or a pose that the base cannot have.
     """

@@ -36,7 +36,7 @@ class Lab:
                          self._settings.lasting)
 
     def leave(self, world: World, verdict: TrialVerdict, took_s: float) -> Dict[str, Any]:
-        """Have a trial end; returns what its line of truth tells of that.
+        """Have a trial end; returns what its line of truth says of it.
 
         :param took_s: s of the world's time.
         """
@@ -48,7 +48,7 @@ class Lab:
 def read_lab(settings: WorldSettings) -> Lab:
     """Return the lab that the settings name.
 
-    :raises LabFileError: where its file cannot be read or is none.
+    :raises LabFileError: where its file cannot be read, or is not a lab file.
     """
     try:
         data = json.loads(Path(settings.lab).read_text(encoding='utf-8'))

@@ -37,7 +37,7 @@ class Stopwatch:
         self._since, self._used_since = now, used
 
     def restart(self) -> None:
-        """Begin anew; in the thread whose time it takes."""
+        """Begin again, in the thread whose time it takes."""
         self.spent, self.used = {}, {}
         self._since, self._used_since = time.monotonic(), time.thread_time()
 

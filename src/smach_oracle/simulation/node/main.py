@@ -103,7 +103,7 @@ class WorldNode:
                                rospy.Service('world/judge', Judge, self._answer_judge)]
 
     def run(self) -> None:
-        """Serve until close(); in the thread that shall own the physics."""
+        """Serve until close(); in the thread that owns the physics."""
         rospy.loginfo('pr2_world: ready for %s', self._settings.task)
         self._publish_state()
         self._loop.run(self._end)

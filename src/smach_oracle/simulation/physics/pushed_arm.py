@@ -34,7 +34,7 @@ class PushedArm:
                  motors: bool) -> None:
         """Begin to push.
 
-        :param joints: rad by name, of one arm; the others of it shall stay.
+        :param joints: rad by name, of one arm; the others of it stay.
         :param seconds: that the way takes; the person holds the arm for SETTLING_S more.
         :param motors: whether the arm's controllers run, and hold against it.
         """

@@ -226,7 +226,7 @@ class World:
 
         The same trial has the same errors.
 
-        :param share: of the error that is drawn anew: a short drive keeps most of the last one's.
+        :param share: of the error that is drawn again: a short drive keeps most of the last one's.
         """
         self.drives += 1
         drawn = np.random.default_rng([self.scene.seed, 101,

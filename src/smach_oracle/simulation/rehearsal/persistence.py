@@ -1,6 +1,6 @@
 """How far plain tries get with one kind of cause: a retry of the state, the script started over.
 
-In one process, without an executive. What a try finds of the cause is told by the world's own log.
+In one process, without an executive. What a try finds of the cause comes from the world's own log.
 """
 from typing import Callable, Iterable, List, NamedTuple, Sequence
 

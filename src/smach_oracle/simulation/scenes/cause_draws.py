@@ -60,7 +60,7 @@ def dazzling(eye: np.ndarray, looks_at: np.ndarray, thing: np.ndarray,
     """Values of a glare that hides a thing from a camera.
 
     What reflects the light stands where the thing would be if it were mirrored at the middle of the
-    image: its own mirror image in the lens then lies on the thing, or a few degrees beside it.
+    image: its own mirror image in the lens then lies on the thing, or a few degrees next to it.
 
     :param eye: (3,) m, where the camera is.
     :param looks_at: (3,) m, the middle of its image.

@@ -25,7 +25,7 @@ from .unlike_the_map import localisation_error, true_kitchen, true_table
 
 TIDYING_H = 1.0 / 60  # that a person takes from one trial to the next, at least
 AHEAD_H = 10.0 / 60  # a light that comes later than that after a trial's begin is none of it
-FEWEST = 3  # things on a table, before it is set anew
+FEWEST = 3  # things on a table, before it is set out afresh
 OVERLAP = 0.002  # m by which two things may seem to stand in each other
 FROM_THE_HOUR = ('glare', 'dim_light')  # causes that are not drawn from a trial's seed
 TRIES = 60  # at a place for what is put out
@@ -63,7 +63,7 @@ class LabState(NamedTuple):
 def state_from(data: Mapping[str, Any]) -> LabState:
     """Return the state that was written.
 
-    :raises KeyError, TypeError or ValueError: where it is none.
+    :raises KeyError, TypeError or ValueError: where it is not one.
     """
     things = tuple(Body(**{name: tuple(value) if isinstance(value, list) else value
                            for name, value in thing.items()}) for thing in data['things'])
@@ -107,7 +107,7 @@ class _Trial(NamedTuple):
 
     @property
     def as_it_was(self) -> Optional[LabState]:
-        """How it was left; None where it is set anew: at the begin, and once an hour."""
+        """How it was left; None where it is set out afresh: at the begin, and once an hour."""
         passed = self.state is None or int(self.hour) > int(self.state.began)
         return None if passed else self.state
 

@@ -136,7 +136,7 @@ def _shadow(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDra
 
 
 def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """A further thing stands close behind the nearest one, or beside it."""
+    """A further thing stands close behind the nearest one, or next to it."""
     thing, other = draft.things[TARGET], draft.things[-1]
     gap = float(generator.uniform(0.014, 0.032))
     away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
@@ -180,7 +180,7 @@ def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Optio
 
 
 def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """Things stand on both sides of the place where the object shall go."""
+    """Things stand on both sides of the place where the object should go."""
     heading = float(generator.uniform(-np.pi, np.pi))
     distances = [float(generator.uniform(0.07, 0.11)) for _ in range(2)]
     moved = []

@@ -41,7 +41,7 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
 
 
 def fresh_things(seed: int) -> Tuple[Body, ...]:
-    """Return what stands on a table of TABLE_TOP that is set anew; the nearest thing first."""
+    """Return what stands on a table of TABLE_TOP that is set out afresh, the nearest first."""
     target, *others = _things(np.random.default_rng([seed, 61]))
     return (target, *(another(generator_for(seed, 'clutter:' + each.name), each, TABLE_TOP)
                       for each in others))

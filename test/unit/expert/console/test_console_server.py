@@ -157,7 +157,7 @@ class TestSignIn(console_case.ConsoleCase):
         page = await self.open_page(*await self.signed('operator'))
         assert (await self.say(page, 9, do='claim', question='/robot q'))['ok']
         self.pages.close(next(iter(self.pages.open)).session)
-        for number in range(3):  # before it has heard that it shall go
+        for number in range(3):  # before it has heard that it should go
             page.write_message(json.dumps({'id': number, 'do': 'claim', 'question': '/robot q'}))
         await self.until(lambda: not self.pages.open)
         assert len(self.question_commands.done) == 1

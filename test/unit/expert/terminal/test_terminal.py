@@ -62,7 +62,7 @@ class FakeFrontEnd:
         return next((each for each in self.questions() if each.key == key), None)
 
     def wait_for_change(self, version, timeout_s):
-        time.sleep(min(timeout_s, 0.01))  # nobody tells of changes here, and the caller looks again
+        time.sleep(min(timeout_s, 0.01))  # nobody reports changes here, and the caller looks again
         return version
 
     def connected(self, server):

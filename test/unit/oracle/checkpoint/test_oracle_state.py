@@ -165,7 +165,7 @@ def test_a_damaged_store_is_told_in_one_line(killed, capsys, command):
 
 @pytest.mark.parametrize('command', EVERY)
 def test_a_store_that_cannot_be_written_is_looked_at_and_not_changed(killed, capsys, command):
-    """As from a medium that is read only, and with no file of the log beside it."""
+    """As from a medium that is read only, and with no file of the log next to it."""
     StoreFile(killed.store).close()
     folder = os.path.dirname(killed.store)
     before = sorted(os.listdir(folder))

@@ -23,7 +23,7 @@ LARGE = 'x' * 30000
 
 
 def unshared():
-    """Whether a mount of one's own is allowed here."""
+    """Whether a mount of our own is allowed here."""
     found = shutil.which('unshare')
     return bool(found) and subprocess.call([found, '-rm', 'true'], stderr=subprocess.DEVNULL) == 0
 

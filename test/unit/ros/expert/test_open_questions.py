@@ -87,7 +87,7 @@ def test_the_same_question_again_joins_the_open_one(questions, clock):
     clock.now_s += 3.0
     assert questions.open(goal(deadline_s=5.0)) is None
     assert len(questions) == 1
-    assert questions.listing()[0].remaining == 2.0, 'the deadline does not begin anew'
+    assert questions.listing()[0].remaining == 2.0, 'the deadline does not begin again'
 
 
 def test_a_settled_question_asked_again_gets_its_answer(questions):

@@ -1,4 +1,4 @@
-"""Messages as they go over the wire."""
+"""Messages in the form in which they are sent."""
 import io
 import struct
 

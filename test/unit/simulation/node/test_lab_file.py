@@ -1,4 +1,4 @@
-"""The world's node and a lab that goes on: its file, and what a trial's truth tells of it."""
+"""The world's node and a lab that goes on: its file, and what a trial's truth says about it."""
 import json
 
 import pytest

@@ -159,7 +159,7 @@ def test_a_binned_camera_sees_the_same_in_fewer_pixels(world):
             world.binning = 1
     whole, binned = images
     assert binned.depth.shape == binned.colour.shape[:2] == (HEIGHT // 2, WIDTH // 2)
-    # the middle of four pixels has the mean of their depths, but for edges
+    # the middle of four pixels has the mean of their depths, except at edges
     fours = whole.depth.reshape(HEIGHT // 2, 2, WIDTH // 2, 2).mean(axis=(1, 3))
     known = np.isfinite(fours) & np.isfinite(binned.depth)
     assert known.mean() > 0.5 and np.median(np.abs(fours - binned.depth)[known]) < 2e-3

@@ -10,7 +10,7 @@ from smach_oracle.simulation.scenes import kitchen_scene, tabletop_scene
 
 
 def course(world, scene, task):
-    """How a trial ended, but for the wall's time, and where everything is then."""
+    """How a trial ended, except for the wall's time, and where everything is then."""
     done = rehearse(scene, world, task)
     return (done._replace(wall_s={}, sim_s=round(done.sim_s, 6)), sorted(world.joints().items()),
             [world.body_pose(name).tobytes() for name in world.body_names])

@@ -49,7 +49,7 @@ def test_what_was_left_is_found_again_and_another_thing_is_put_out(task):
         if all(places.get(each.name) == each.position[:2] for each in state.things):
             stayed += 1
             assert len(after) == len(state.things) + 1
-    assert stayed >= 5, 'else there was no room, and all was set anew'
+    assert stayed >= 5, 'else there was no room, and all was set out afresh'
 
 
 @pytest.mark.parametrize('task', TASKS)

@@ -60,7 +60,7 @@ def _mark(service: str) -> Callable[[Any], str]:
         offered, _ = _marking()
         with fake_ros(), mock.patch.object(perception_server, 'MOST_POINTS', MOST_POINTS), \
                 warnings.catch_warnings():
-            warnings.simplefilter('error', RuntimeWarning)  # a number that is none went past
+            warnings.simplefilter('error', RuntimeWarning)  # a NaN went past
             reply = offered.call(service, request)
         return TAKEN if reply.ok else refused(reply.message)
     return take

@@ -40,7 +40,7 @@ class World:
     def tell(self, path: str, event: Any) -> None:
         """Note what happens, up to the cut."""
         if event[0] == 'DECISION' and event[-1] == 'held_back':
-            self._count()  # an author may loop through such a state for ever
+            self._count()  # an author may loop through such a state forever
         with self._lock:
             if not self.is_cut:
                 self.course.append((path, event))
@@ -142,7 +142,7 @@ def owed_branches(state: Any) -> List[Any]:
 class _Impatient(threading.Condition):
     """Upstream's Concurrence looks every 0.1 s whether its threads have ended.
 
-    It waits for ever where a branch ends without an outcome, as at a shutdown: here, up to the cut.
+    It waits forever where a branch ends without an outcome, as at a shutdown: here, up to the cut.
     """
 
     def __init__(self, world: World) -> None:

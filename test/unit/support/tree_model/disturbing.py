@@ -1,4 +1,4 @@
-"""Preempts that come at any moment, from another thread: what must hold all the same."""
+"""Preempts that come at any moment, from another thread: what must hold anyway."""
 import random
 import threading
 from typing import List, Optional

@@ -26,14 +26,14 @@ class IteratorPart(Part):
         return [self._child]
 
     def forget(self) -> None:
-        """Begin anew the next time: in another trial, or for another item of one around."""
+        """Begin again the next time: in another trial, or for another item of one around."""
         self._item: Optional[int] = None  # the one under way
         self._is_finished = False
         self._is_exhausted = False
         self._is_asked = False
 
     def ask_to_go_on(self, goes_on: bool) -> None:
-        """Go on with the unfinished item the next time, or begin anew."""
+        """Go on with the unfinished item the next time, or begin again."""
         self._is_asked = goes_on
 
     def request_preempt(self) -> None:

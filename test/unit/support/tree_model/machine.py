@@ -154,7 +154,7 @@ class MachinePart(Part, Recovering):
         return way
 
     def count_failure(self, failed: Failed, continuous: bool) -> None:
-        """Tell of a failure and remember it."""
+        """Report a failure and remember it."""
         memory, label = self.memory, failed.label
         self.tell('FAILURE', label, failed.outcome, '', failed.kind, memory.failure_class(label),
                   float(memory.rate(label)), continuous)

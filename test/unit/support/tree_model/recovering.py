@@ -296,7 +296,7 @@ class Recovering:
             self.run.let_go_on(machine, label)
 
     def failed_as(self: Any, label: str, ending: Optional[Way]) -> Optional[Failed]:
-        """The failure of its own state that ends so, None where that is none."""
+        """The failure of its own state that ends so, None where it has none."""
         if ending is None:
             return Failed(label, 'EXCEPTION', '', None, None)
         return self.failure_of(label, ending.target, False)

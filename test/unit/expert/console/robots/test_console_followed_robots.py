@@ -34,7 +34,7 @@ def test_a_robot_s_topics_become_its_sections():
         'A', 'ok', 'B', 3, 1.0
     ]]
     assert live['paths'] == ['TASK', 'TASK/B',
-                             'UNSEEN'], 'without introspection what is learned tells of a machine'
+                             'UNSEEN'], 'without introspection what is learned shows a machine'
     assert [state['nested']
             for state in sections.get('graph /robot TASK')['states']] == [False, True]
     robot.on_event(OracleEvent(kind=OracleEvent.JUMP, path='TASK', state='A', target='B'))

@@ -89,7 +89,7 @@ def test_a_bayer_mosaic_is_shown_in_colours():
 
 
 def huge_png():
-    """A few bytes that tell of 40000 x 40000 pixels."""
+    """A few bytes that announce 40000 x 40000 pixels."""
     data = bytes(cv2.imencode('.png', np.zeros((4, 4), np.uint8))[1])
     return data[:16] + struct.pack('>II', 40000, 40000) + data[24:]
 

@@ -103,5 +103,5 @@ def test_the_newest_word_counts_and_a_stamp_of_nothing_is_none(clock):
     clocks.take('/alpha', 40.0, clock.now_s - 1.0)
     assert clocks.now_s('/alpha') == 50.0
     clock.now_s += 1.0
-    clocks.take('/alpha', 10.0)  # simulated time begins anew
+    clocks.take('/alpha', 10.0)  # simulated time begins again
     assert clocks.now_s('/alpha') == 10.0

@@ -44,7 +44,7 @@ def scanned(*folders):
 
 
 def broken_in(folder):
-    """Why bags are refused, by name; the good one is read all the same."""
+    """Why bags are refused, by name; the good one is read anyway."""
     section = scanned(folder)
     assert [trial['bag'] for trial in section['trials']] == ['good.bag']
     return {each['name']: each['reason'] for each in section['broken']}
