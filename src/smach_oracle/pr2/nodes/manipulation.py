@@ -1,6 +1,6 @@
 """The manipulation skills over messages: goals in, results out. The node gives them servers."""
 import contextlib
-from typing import Dict, Iterator, Mapping, Optional, Tuple, Type
+from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Type
 
 import numpy as np
 
@@ -49,7 +49,7 @@ from ..planning.collision_map import (
 from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
 from ..skills.arms_aside import arms_aside, is_aside
 from ..skills.pick import FIRM, HeldObject, ObjectSlipped, pick
-from ..skills.place import ObjectLost, place, put_back, stands_there
+from ..skills.place import NEAR, ObjectLost, place, put_back, stands_there
 from ..skills.spots import FARTHEST
 from .frames import box_in_base, point_in_base, pose_in_base, pose_message
 from .skill_server import ReportStatus
@@ -95,7 +95,10 @@ class Manipulation:
         self._links = read_joints(context.model.urdf)
 
     def move_arms_aside(self, goal: MoveArmsAsideGoal, report: ReportStatus) -> MoveArmsAsideResult:
-        """Move both arms, or those named, to the robot's sides; forget what slipped before."""
+        """Move both arms, or those named, to the robot's sides; forget what slipped before.
+
+        What a hand still holds over the spot where it took it is put down there first.
+        """
         self.forget_slips()
         for arm in goal.arms:
             known_arm(arm)
@@ -103,6 +106,7 @@ class Manipulation:
         joints = encoder_readings(self.context.robot)
         boxes: Dict[str, MapBox] = {}
         if not all(is_aside(joints, arm) for arm in arms):
+            self._return_held(arms, report)
             report('looking for what is in the way')
             boxes = self._seen().boxes
         arms_aside(self.context, arms, boxes)
@@ -225,6 +229,18 @@ class Manipulation:
             except SkillError:
                 pass  # the first failure is the one to report
             raise
+
+    def _return_held(self, arms: Sequence[str], report: ReportStatus) -> None:
+        """Put down what hands hold, where they are over the spot that it was taken from."""
+        for arm in arms:
+            held = self.held.get(arm)
+            joints = encoder_readings(self.context.robot)
+            tool = link_pose(self._links, BASE_FRAME, TOOL_FRAME[arm], joints)
+            if held is not None and np.hypot(*(tool - held.grasp)[:2, 3]) < NEAR:
+                report('putting back what the {} hand holds'.format(arm))
+                now = tool @ held.tool_from_object
+                own = UprightBox(now[:3, 3], 2 * held.half, yaw_of(now))
+                self._put_back(arm, self._seen(own).boxes)
 
     def _put_back(self, arm: str, boxes: Dict[str, MapBox]) -> None:
         """Put an object that the hand still holds straight down; a hand that stands open has none.

@@ -105,6 +105,16 @@ def test_what_cannot_be_put_down_there_stays_in_the_hand_and_the_reason_is_told(
     assert np.hypot(*(bench.world.body_pose('carton')[:2, 3] - CARTON.position[:2])) < 0.01
 
 
+def test_arms_that_go_aside_put_back_first_what_a_hand_still_holds(bench):
+    before = bench.world.body_pose('can')[:3, 3]
+    bench.pick(bench.map().map_id)
+    assert bench.world.holding('can') == 'right'
+    bench.skills.move_arms_aside(MoveArmsAsideGoal(), say)
+    assert is_aside(bench.robot.joints(), 'right') and not bench.world.holding('can')
+    assert bench.world.body_pose('can')[:3, 3] == pytest.approx(before, abs=0.01)
+    assert not bench.world.harm.found(bench.world)
+
+
 def test_what_has_come_to_stand_at_the_place_is_seen_and_a_spot_beside_it_taken():
     """The map was made before that; the place is 4.5 cm wide."""
     box = CARTON._replace(name='late', size=(0.05, 0.05, 0.1), position=(0.665, -0.35, 0.77))
