@@ -328,7 +328,7 @@ def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
         return
     beside = float(np.hypot(*(thing.box.centre - place)[:2]))
     if beside > 0.05:
-        raise ManoeuvreError('{} is {:.0f} cm next to its place'.format(name, 100 * beside))
+        raise ManoeuvreError('{} is {:.0f} cm beside its place'.format(name, 100 * beside))
     if float(thing.box.size[2]) < LIES * (attempt.watcher.tall(name) or 0.0):
         raise ManoeuvreError('{} lies at its place'.format(name))
 

@@ -90,7 +90,7 @@ def _cache() -> Path:
 
 
 def _derive(share: Path, folder: Path) -> None:
-    """Write the model next to its place and move it there as a whole.
+    """Write the model beside its place and move it there as a whole.
 
     Where another process was faster, its model stays and this one is dropped.
     """

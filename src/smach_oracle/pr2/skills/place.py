@@ -58,7 +58,7 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
     :param centre: (3,) m, where its centre should be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it should stand.
-    :param tolerance: m that it may stand next to its place; 0: 2 cm.
+    :param tolerance: m that it may stand beside its place; 0: 2 cm.
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """

@@ -65,7 +65,7 @@ export class QuestionDetail {
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
       takeOver: () => this.claim('take_over') });
     this.form = new AnswerForm(question, (answer) => this.answer(answer));
-    this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What shall it do?'),
+    this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What should it do?'),
       this.form.root);
     this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
     this.root = this.build();

@@ -16,7 +16,7 @@ export class GraphViewport {
   /**
    * @param {SVGSVGElement} drawing
    * @param {HTMLElement} root the frame around it
-   * @param {() => Place} focusOf what shall be in view where not all can be
+   * @param {() => Place} focusOf what should be in view where not all can be
    * @param {(on: boolean) => void} onFollow
    */
   constructor(drawing, root, focusOf, onFollow) {
