@@ -158,7 +158,7 @@ class Manipulation:
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
         """Look at the place, put down what is held at a free spot, and look whether it stands.
 
-        An open hand succeeds where a thing like that stands there, and the map has none there.
+        An empty hand succeeds where a thing like that stands there, and the map has none there.
 
         :raises SkillError: where it does not, or there is no such spot.
         """
@@ -176,8 +176,13 @@ class Manipulation:
             return PlaceResult()
         boxes.update(self._standing_at(arm, centre, goal.tolerance, held, boxes))
         report('choosing a way')
-        with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
-            stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
+        try:
+            with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
+                stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
+        except ObjectLost:
+            if self._is_placed(arm, centre, goal.tolerance, held, made):
+                return PlaceResult()
+            raise
         self.held.pop(arm, None)
         report('looking whether it stands there')
         boxes['placed'] = MapBox(stood, held.half, 0.0)
@@ -188,7 +193,7 @@ class Manipulation:
 
     def _is_placed(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
                    made: CollisionMap) -> bool:
-        """Take an open hand away from a place, and look whether it has put its object down there.
+        """Take an empty hand away from a place, and look whether it has put its object down there.
 
         :param made: a map of what stood there before.
         """
