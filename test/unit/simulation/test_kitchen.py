@@ -30,6 +30,7 @@ from smach_oracle.pr2.perception.door_view import DoorNotSeen, find_door
 from smach_oracle.pr2.planning.arm import Arm, SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import installed_model
 from smach_oracle.pr2.planning.travel import carry, stow
+from smach_oracle.pr2.robot import RobotError
 from smach_oracle.pr2.skills import door
 from smach_oracle.pr2.skills.pick import ObjectSlipped
 from smach_oracle.simulation.physics.judge import judge
@@ -186,6 +187,42 @@ def next_of(machine, label):
     """Where a state's success leads."""
     return next(edge[2] for edge in machine.get_internal_edges()
                 if edge[0] == 'succeeded' and edge[1] == label)
+
+
+def stopped_after(robot, motions):
+    """A robot that is told to stop in the motion after so many, and takes calls again then."""
+    do, left = robot._do, [motions]
+
+    def count(make):
+        left[0] -= 1
+        if left[0] == -1:
+            raise RobotError('the robot was told to stop')
+        return do(make)
+    robot._do = count
+
+
+@pytest.mark.parametrize('motions', [4, 6, 99])
+def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(motions):
+    """99: it had ended, and nobody was told."""
+    world = World(draw(1, benign=True))
+    trial = drink_rehearsal.DrinkRetrievalRehearsal(world)
+    for _, work in trial.states[:-1]:
+        work()
+    hand_over = trial.states[-1][1]
+    stopped_after(trial.robot, motions)
+    if motions < 99:
+        with pytest.raises(SkillError, match='told to stop'):
+            hand_over()
+    else:
+        hand_over()
+    hand_over()
+    world.step(60)
+    assert judge(world, world.scene.goal).success
+    if motions == 99:  # it has been taken from the palm
+        world.reset(world.scene)
+        with pytest.raises(SkillError):
+            hand_over()
+    world.close()
 
 
 def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of_it():

@@ -27,13 +27,16 @@ from ..kitchen import MapBox
 from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
 from ..perception.own_limbs import limbs_of
-from ..perception.tabletop import find_tabletop, things_on_table
+from ..perception.tabletop import SAME_SIZE, find_tabletop, things_on_table
 from ..planning.arm import (
     FEEL_EFFORT,
+    SLOW,
+    Arm,
     SkillContext,
     SkillError,
     encoder_readings,
     known_arm,
+    seed_of,
     stands_open,
 )
 from ..planning.collision_map import (
@@ -46,11 +49,13 @@ from ..planning.collision_map import (
     map_of_image,
     nearest_object,
 )
+from ..planning.travel import draw_back
 from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
 from ..skills.arms_aside import arms_aside, is_aside
 from ..skills.pick import FIRM, HeldObject, ObjectSlipped, pick
-from ..skills.place import NEAR, ObjectLost, place, put_back, stands_there
+from ..skills.place import NEAR, RETREAT, ObjectLost, place, put_back, stands_there
 from ..skills.spots import FARTHEST
+from ..skills.spots import USUAL as USUAL_SPOT
 from .frames import box_in_base, point_in_base, pose_in_base, pose_message
 from .skill_server import ReportStatus
 
@@ -157,6 +162,8 @@ class Manipulation:
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
         """Look at the place, put down what is held at a free spot, and look whether it stands.
 
+        An empty hand succeeds where a thing like that stands there, and the map has none there.
+
         :raises SkillError: where it does not, or there is no such spot.
         """
         arm = known_arm(goal.arm)
@@ -168,10 +175,18 @@ class Manipulation:
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen()
         held, boxes = self._held_object(arm, grasp, made)
         report('looking at the place')
+        if stands_open(encoder_readings(robot), arm) and self._is_placed(
+                arm, centre, goal.tolerance, held, made):
+            return PlaceResult()
         boxes.update(self._standing_at(arm, centre, goal.tolerance, held, boxes))
         report('choosing a way')
-        with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
-            stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
+        try:
+            with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
+                stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
+        except ObjectLost:
+            if self._is_placed(arm, centre, goal.tolerance, held, made):
+                return PlaceResult()
+            raise
         self.held.pop(arm, None)
         report('looking whether it stands there')
         boxes['placed'] = MapBox(stood, held.half, 0.0)
@@ -179,6 +194,25 @@ class Manipulation:
         if not stands_there(self.context.robot.see(), stood, held):
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
+
+    def _is_placed(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
+                   made: CollisionMap) -> bool:
+        """Take an empty hand away from a place, and look whether it has put its object down there.
+
+        :param made: a map of what stood there before.
+        """
+        robot = self.context.robot
+        robot.look_at(centre)
+        with Arm(self.context, arm, made.boxes, seed_of(arm, centre)) as hand:
+            if np.hypot(*(hand.pose()[:2, 3] - centre[:2])) < ABOUT:
+                draw_back(hand, RETREAT, hand.space.names(), SLOW)
+        arms_aside(self.context, [arm], made.boxes)
+        limbs = limbs_of(self._links, encoder_readings(robot))
+        return any(
+            np.hypot(*(box.centre - centre)[:2]) < (tolerance or USUAL_SPOT) + KNOWN
+            and np.abs(box.size - 2 * held.half).max() < SAME_SIZE
+            and nearest_object(made, box.centre) is None
+            for box in things_on_table(robot.see(), limbs))
 
     def _standing_at(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
                      boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:

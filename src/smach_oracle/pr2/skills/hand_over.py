@@ -1,14 +1,29 @@
-"""Hand a held object over: look for the palm that waits, set the object down on it, let go."""
+"""Hand a held object over: look for the palm that waits, set the object down on it, let go.
+
+Where the program that asked for it was stopped, the hand may be on its way, or may have let go.
+The skill looks for what an empty hand has set down.
+"""
+from typing import Dict, Optional
+
 import numpy as np
 
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
 
 from ..kitchen import MapBox
-from ..planning.arm import SkillContext, SkillError
-from ..planning.travel import stow
+from ..planning.arm import (
+    SLOW,
+    Arm,
+    SkillContext,
+    SkillError,
+    encoder_readings,
+    lifted,
+    seed_of,
+    stands_open,
+)
+from ..planning.travel import carry, draw_back, stow
 from .pick import HeldObject
-from .place import place, stands_there
+from .place import RETREAT, ObjectLost, place, stands_there
 
 PALM = 'palm'
 NEAR = 0.16  # m around the place where the palm is expected, horizontally
@@ -18,10 +33,13 @@ LEAST_EXTENT = 0.09  # m that a palm extends; a sleeve is narrower
 LEAST_HALF = 0.11  # m: part of it may be hidden
 THICK = 0.03  # m of a hand
 COLUMNS = 320  # that are looked at
+BESIDE = 0.28  # m between a hand and the palm that it hides, horizontally
+UP = 0.10  # m, straight up from a palm
+LEAST_TOP = 40  # points
 
 
 def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:
-    """Set the held object down on a palm.
+    """Set the held object down on a palm; an empty one succeeds where it is seen to stand there.
 
     :param expected: (3,) m in base_footprint, the middle of the palm's upper face, right to some
         0.1 m.
@@ -29,14 +47,75 @@ def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldO
         stand there then.
     """
     context.robot.look_at(expected)
+    if stands_open(encoder_readings(context.robot), arm):
+        if _is_given(context, arm, expected, held):
+            return
+    else:
+        _clear_view(context, arm, expected, held)
     palm = find_palm(context.robot.see(), expected)
     boxes = {PALM: palm}
     top = palm.centre + [0.0, 0.0, palm.half[2]]
-    stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM)
+    try:
+        stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM)
+    except ObjectLost:
+        if _is_given(context, arm, expected, held):
+            return
+        raise
     boxes['given'] = MapBox(stood, held.half, 0.0)
     stow(context, (arm,), boxes)
     if not stands_there(context.robot.see(), stood, held):
         raise SkillError('it was let go, but it does not stand in the hand')
+
+
+def _is_given(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> bool:
+    """Take an empty hand away from a palm, and look whether the object stands there."""
+    boxes = _about_palm(expected)
+    with Arm(context, arm, boxes, seed_of(arm, expected)) as hand:
+        if _beside(hand, expected):
+            draw_back(hand, RETREAT, boxes, SLOW)
+    stow(context, (arm,), boxes)
+    image = context.robot.see()
+    top = middle_of_top(image, expected, 2 * held.half[2])
+    return top is not None and stands_there(image, top - [0.0, 0.0, held.half[2]], held)
+
+
+def _clear_view(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:
+    """Take a hand that was stopped above a palm up and to the side, with what it holds."""
+    boxes = _about_palm(expected)
+    with Arm(context, arm, boxes, seed_of(arm, expected)) as hand:
+        if not _beside(hand, expected):
+            return
+        hand.close(held.effort)
+        with hand.space.touchable(boxes):
+            path = hand.line(hand.now(), lifted(hand.pose(), UP))
+        if path is not None:
+            hand.follow(path, SLOW)
+        hand.space.attach(held.half, held.tool_from_object)
+        carry(hand)
+
+
+def _beside(hand: Arm, expected: np.ndarray) -> bool:
+    return float(np.hypot(*(hand.pose()[:3, 3] - expected)[:2])) < BESIDE
+
+
+def _about_palm(expected: np.ndarray) -> Dict[str, MapBox]:
+    """A palm that has not been seen, as low as it may be."""
+    return {PALM: MapBox(expected - [0.0, 0.0, LEVEL + THICK / 2],
+                         np.array([LEAST_HALF, LEAST_HALF, THICK / 2]), 0.0)}
+
+
+def middle_of_top(image: CameraImage, expected: np.ndarray, height: float) -> Optional[np.ndarray]:
+    """The middle (3,) of the top of what stands on a palm, in m in base_footprint.
+
+    :param expected: as for hand_over().
+    :param height: m, of what stands there; right to some LEVEL.
+    :returns: None where nothing as high is seen.
+    """
+    points = _near(image, expected + [0.0, 0.0, height])
+    if len(points) < LEAST_TOP:
+        return None
+    top = float(np.percentile(points[:, 2], 95))
+    return np.append(np.median(points[points[:, 2] > top - 0.015, :2], axis=0), top)
 
 
 def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
@@ -45,14 +124,7 @@ def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
     :param expected: (3,) m in base_footprint, as for hand_over().
     :raises SkillError: where there is none near.
     """
-    stride = image.stride(COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
-                       stride=stride)
-    points = points.reshape(-1, 3)
-    with np.errstate(invalid='ignore'):
-        near = ((np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) &
-                (np.abs(points[:, 2] - expected[2]) < LEVEL))
-    points = points[near]
+    points = _near(image, expected)
     if len(points) < LEAST_POINTS:
         raise SkillError('no hand waits where it should: {} points within {:.0f} cm of it'.format(
             len(points), 100 * NEAR))
@@ -67,3 +139,15 @@ def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
     centre = (low + high) / 2
     return MapBox(np.array([centre[0], centre[1], height - THICK / 2]),
                   np.array([*np.maximum((high - low) / 2, LEAST_HALF), THICK / 2]), 0.0)
+
+
+def _near(image: CameraImage, expected: np.ndarray) -> np.ndarray:
+    """(n, 3): what an image shows about a point, in base_footprint."""
+    stride = image.stride(COLUMNS)
+    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
+                       stride=stride)
+    points = points.reshape(-1, 3)
+    with np.errstate(invalid='ignore'):
+        near = ((np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) &
+                (np.abs(points[:, 2] - expected[2]) < LEVEL))
+    return points[near]

@@ -90,6 +90,24 @@ def test_a_grasp_survives_a_shake_and_the_object_then_stands_where_it_was_to_be(
     assert is_aside(bench.robot.joints(), 'right')
 
 
+def test_a_place_goal_that_is_sent_again_succeeds_where_its_object_is_seen_and_only_there(bench):
+    made = bench.map()
+    goal = placing('right', pose(0.6, -0.35, 0.79), bench.pick(made.map_id), made.map_id)
+    bench.robot.look_at((0.6, -0.2, 0.8))
+    bench.skills.place(goal, say)
+    before = bench.world.body_pose('can')
+    bench.skills.place(goal, say)
+    bench.robot.gripper('right', 0.03)  # stopped as it closed
+    bench.skills.place(goal, say)
+    assert np.allclose(bench.world.body_pose('can'), before, atol=1e-3)
+    goal.pose = pose(*CARTON.position)  # where the map has another thing
+    with pytest.raises(SkillError, match='the right hand holds nothing'):
+        bench.skills.place(goal, say)
+    goal.pose = pose(0.6, -0.15, 0.79)
+    with pytest.raises(SkillError, match='the right hand holds nothing'):
+        bench.skills.place(goal, say)
+
+
 def test_what_cannot_be_put_down_there_stays_in_the_hand_and_the_reason_is_told(bench):
     made = bench.map()
     grasp = bench.pick(made.map_id)
