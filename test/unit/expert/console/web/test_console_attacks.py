@@ -22,7 +22,8 @@ ARGUMENTS = {
     'linear': [0, 0, 0], 'angular': [0, 0, 0], 'gripper': '', 'sent': 1.0, 'xsrf': 'x',
     'trial': 't', 'outcome': 'succeeded', 'stamp': '1.000000000', 'region': [[0, 0], [9, 0],
                                                                              [9, 9]], 'strokes': [],
-    'robot': '/r', 'path': '', 'pattern': 'A', 'remove': False
+    'robot': '/r', 'path': '', 'pattern': 'A', 'remove': False,
+    'down': 'd', 'moment': 1, 'label': 'A', 'container': 'M', 'key': 'k', 'json': '1'
 }
 FRAMES = {'use_frame': 'fresh', 'drive': 'tool'}
 
