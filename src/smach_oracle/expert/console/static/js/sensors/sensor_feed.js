@@ -37,7 +37,7 @@ export function numberOf(app, topic, type) {
  * @property {(text: string, missing: Missing) => void} say '' where all is well
  * @property {number} [width] px of images
  * @property {number} [every] ms between two of them, at least
- * @property {() => number | undefined} [beside] the number of a robot at which the facts should tell
+ * @property {() => number | undefined} [beside] the number of a robot where the facts tell
  *   the sensor's place, undefined for none
  */
 
