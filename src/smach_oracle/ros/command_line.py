@@ -9,17 +9,10 @@ from typing import Any, Iterator
 import rosgraph
 import rospy
 
+from .master_watch import TimedTransport
+
 ANSWER_S = 2.0  # that a node of the same name has to show that it runs
 OWN_NAME = '__name:='
-
-
-class _Impatient(xmlrpc.client.Transport):
-    """A node that hangs does not keep the one that asks."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = ANSWER_S
-        return connection
 
 
 def parameters_only(description: str) -> None:
@@ -74,7 +67,7 @@ def _runs(master: Any, name: str) -> bool:
     except rosgraph.MasterError:
         return False
     try:
-        xmlrpc.client.ServerProxy(uri, transport=_Impatient()).getPid(name)
+        xmlrpc.client.ServerProxy(uri, transport=TimedTransport(ANSWER_S)).getPid(name)
     except (OSError, http.client.HTTPException, xmlrpc.client.Error):
         return False  # it was killed, and the master does not know it yet
     return True

@@ -36,11 +36,15 @@ class Registrations(NamedTuple):
 
 
 class TimedTransport(xmlrpc.client.Transport):
-    """XML-RPC over a connection with a time limit."""
+    """XML-RPC over a connection with a time limit, in s."""
+
+    def __init__(self, limit_s: float = CALL_LIMIT_S) -> None:
+        super().__init__()
+        self._limit_s = limit_s
 
     def make_connection(self, host: Union[str, Tuple[str, Dict[str, str]]]) -> HTTPConnection:
         connection = super().make_connection(host)
-        connection.timeout = CALL_LIMIT_S
+        connection.timeout = self._limit_s
         return connection
 
 

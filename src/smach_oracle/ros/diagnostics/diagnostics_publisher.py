@@ -1,5 +1,6 @@
 """Publishes on /diagnostics how the oracle of this node fares, once a second."""
 import threading
+import time
 import weakref
 from typing import List, MutableSet, Optional
 
@@ -61,10 +62,9 @@ class DiagnosticsPublisher:
         self._recorder = message
 
     def _run(self) -> None:
-        told = threading.Event()  # nobody sets it: a pause by the wall's clock
         while not rospy.is_shutdown():
             message = DiagnosticArray(status=self.statuses())
             message.header.stamp = rospy.Time.now()
             with quiet_at_shutdown():
                 self._publisher.publish(message)
-            told.wait(self._period_s)
+            time.sleep(self._period_s)

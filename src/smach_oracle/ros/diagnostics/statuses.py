@@ -13,8 +13,7 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 def questions_status(node: str, queries: Sequence[OpenQuery]) -> DiagnosticStatus:
     """Whether a question of this node waits for an expert: WARN."""
     own = [each for each in queries if each.query.robot == node]
-    text = _counted(len(own), 'open question') if own \
-        else 'no open question'
+    text = _counted(len(own), 'open question') if own else 'no open question'
     return _status(node, 'questions', WARN if own else OK, text, {
         each.query.query_id: '{} of {}, for {:.0f} s'.format(
             each.query.failed_state, each.query.container_path, each.age)
