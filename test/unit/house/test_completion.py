@@ -5,8 +5,10 @@ import sys
 import pytest
 from house import ROOT
 
-FILE = ROOT / 'env-hooks/60.completion.bash'
+WORDS = ROOT / 'env-hooks/60.completion_words.bash'
+FILE = ROOT / 'env-hooks/61.completion.bash'
 ASK = '''{before}
+source "{words_file}"
 source "{file}"
 COMP_WORDS=({words})
 COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1))
@@ -18,7 +20,7 @@ ROSBASH = 'theirs() { COMPREPLY=(theirs); }; complete -F theirs rosrun'
 
 def offered(words, function='_smach_oracle_rosrun', before=':'):
     """What Tab offers for the last of the words."""
-    script = ASK.format(before=before, file=FILE, words=words, function=function,
+    script = ASK.format(before=before, words_file=WORDS, file=FILE, words=words, function=function,
                         first=words.split()[0])
     done = subprocess.run(['bash', '-euc', script], stdout=subprocess.PIPE, check=True,
                           timeout=30).stdout.decode().splitlines()
@@ -48,7 +50,7 @@ def test_the_words_of_a_command_with_works_are_offered():
 
 def test_other_packages_are_completed_as_before():
     assert offered('rosrun turtlesim turtle', before=ROSBASH) == ['theirs']
-    twice = '{}; source "{}"'.format(ROSBASH, FILE)
+    twice = '{}; source "{}"; source "{}"'.format(ROSBASH, WORDS, FILE)
     assert offered('rosrun turtlesim turtle', before=twice) == ['theirs']
 
 
@@ -56,5 +58,5 @@ def test_the_file_is_what_the_parsers_say_now():
     code = 'import write_completion; print(write_completion.text(), end="")'
     told = subprocess.run([sys.executable, '-c', code], cwd=str(ROOT / 'env-hooks'), timeout=500,
                           stdout=subprocess.PIPE, check=True).stdout.decode()
-    assert FILE.read_text(encoding='utf-8') == told[told.index('# Tab completion'):], \
+    assert WORDS.read_text(encoding='utf-8') == told[told.index('# The words'):], \
         'run env-hooks/write_completion.py'
