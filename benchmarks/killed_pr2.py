@@ -25,13 +25,7 @@ import time
 from pathlib import Path
 from typing import List, NamedTuple, Optional
 
-from smach_oracle.experiment.launching import (
-    LOG_FILE,
-    end_marked,
-    environment_of,
-    free_port,
-    last_words,
-)
+from smach_oracle.experiment.launching import LOG_FILE, Launch, last_words
 from smach_oracle.store.rows import StoredMoment
 from smach_oracle.store.store_file import StoreFile
 
@@ -82,7 +76,7 @@ def kill_in_task(task: str, options: argparse.Namespace) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         robot = RobotUnderKills(folder, task)
         try:
-            robot.start()
+            robot.wait_until_ready()
             for seed in range(options.seed, options.seed + options.trials):
                 undisturbed = robot.run_trial(seed)
                 instant, killed = chance.random() * undisturbed.took_s, None
@@ -119,36 +113,26 @@ class RobotUnderKills:
 
     def __init__(self, folder: str, task: str) -> None:
         self._folder, self._task = folder, task
-        self._port = free_port()
-        self._env = environment_of(Path(folder), self._port)
         self._truth = os.path.join(folder, 'truth.jsonl')
         self._store = os.path.join(folder, 'robot.db')
         self._journal = os.path.join(folder, 'journal')
-        self._launch: Optional[subprocess.Popen] = None
+        self._launch = Launch(Path(folder), 'pr2.launch', {'task': task, 'truth': self._truth})
 
-    def start(self) -> None:
-        """Start the world and the robot.
+    def wait_until_ready(self) -> None:
+        """Wait until the world is there.
 
-        :raises SystemExit: where they do not come.
+        :raises SystemExit: where it does not come.
         """
-        log_file = Path(self._folder) / LOG_FILE
-        with log_file.open('w') as log:
-            self._launch = subprocess.Popen(
-                ['roslaunch', '--port', str(self._port), 'smach_oracle', 'pr2.launch',
-                 'task:=' + self._task, 'truth:=' + self._truth], env=self._env, stdout=log,
-                stderr=subprocess.STDOUT)
-        ready = subprocess.run(['timeout', str(READY_S), 'bash', '-c', READY], env=self._env,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        ready = subprocess.run(['timeout', str(READY_S), 'bash', '-c', READY],
+                               env=self._launch.environment, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
         if ready.returncode:
-            raise SystemExit('killed_pr2: no world:' + last_words(log_file, 20))
+            raise SystemExit('killed_pr2: no world:'
+                             + last_words(Path(self._folder) / LOG_FILE, 20))
 
     def stop(self) -> None:
         """End all that was started."""
-        if self._launch is not None:
-            self._launch.send_signal(signal.SIGINT)
-        end_marked(self._folder, 30.0)
-        if self._launch is not None:
-            self._launch.wait()
+        self._launch.stop()
 
     def run_trial(self, seed: int, kill_at_s: Optional[float] = None) -> Ended:
         """Run one trial; kill its executive so many s after its beginning, where that is given."""
@@ -183,7 +167,8 @@ class RobotUnderKills:
 
     def _reset(self, seed: int) -> None:
         answer = subprocess.run(['rosservice', 'call', '/world/reset', 'seed: {}'.format(seed)],
-                                env=self._env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+                                env=self._launch.environment, stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT)
         if b'ok: True' not in answer.stdout:
             raise RuntimeError('world/reset: ' + answer.stdout.decode())
 
@@ -196,7 +181,7 @@ class RobotUnderKills:
                  '--name', self._task.upper(), '--checkpoint', self._store, *words,
                  str(ROSTESTS / 'killed_pr2_robot.py'), self._task, self._journal,
                  '__name:=' + self._task, '_pass_time:=/world/pass_time'],
-                env=self._env, stdout=log, stderr=subprocess.STDOUT)
+                env=self._launch.environment, stdout=log, stderr=subprocess.STDOUT)
 
     def _told(self, word: str) -> Optional[str]:
         """Return what stands behind a word in the journal; None where it is not there."""

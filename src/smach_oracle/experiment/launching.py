@@ -40,10 +40,11 @@ class Launch:
         """
         self._mark = str(folder)
         port = free_port()
+        self.environment = environment_of(folder, port)  # of its processes
         command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
         command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
         self._log_file: IO[str] = (folder / LOG_FILE).open('a')
-        self._process = subprocess.Popen(command, env=environment_of(folder, port),
+        self._process = subprocess.Popen(command, env=self.environment,
                                          stdout=self._log_file, stderr=subprocess.STDOUT,
                                          start_new_session=True, preexec_fn=end_with_parent)
 
