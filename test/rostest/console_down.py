@@ -88,13 +88,6 @@ class DownTest(ConsolePage, unittest.TestCase):
         cls.browser.close()
         cls.console.stop()
 
-    def sign_in(self, role):
-        with open(self.tokens) as lines:
-            token = next(line.split()[1] for line in lines if line.startswith(role))
-        self.browser.find('#token').send_keys(token)
-        self.browser.click('#sign-in')
-        self.browser.click('#tab-machines')
-
     def start(self):
         return oracle_run(self, '--checkpoint', self.store, '--resume', script(self, SCRIPT),
                           self.done)
@@ -126,7 +119,7 @@ class DownTest(ConsolePage, unittest.TestCase):
 
     def test_1_a_killed_machine_is_shown_and_an_onlooker_changes_nothing(self):
         browser = self.browser
-        self.sign_in('viewer')
+        self.sign_in_to_machines('viewer')
         self.assertTrue(browser.says('there is no such store', '.down-problem'))
         task = self.start()
         self.assertTrue(task.says('PICKS', 40.0), task.output())
@@ -151,7 +144,7 @@ class DownTest(ConsolePage, unittest.TestCase):
         browser = self.browser
         browser.click('#person')
         browser.click('dialog button')
-        self.sign_in('operator')
+        self.sign_in_to_machines('operator')
         browser.click(DOWN + ' summary')
         self.choose(KEY, 'TASK cup')
         browser.find(JSON).send_keys('blue')

@@ -49,13 +49,6 @@ class Hold(ConsolePage, unittest.TestCase):
         return Node(find_node('smach_oracle', 'oracle_run')[0], '--config', cls.config,
                     os.path.join(HERE, robot), '__name:=alpha')
 
-    def sign_in(self, role):
-        with open(self.tokens) as lines:
-            token = next(line.split()[1] for line in lines if line.startswith(role))
-        self.browser.find('#token').send_keys(token)
-        self.browser.click('#sign-in')
-        self.browser.click('#tab-machines')
-
     def stands(self, words):
         self.assertTrue(self.browser.says(words, STANDING), self.browser.text())
 
@@ -71,7 +64,7 @@ class Hold(ConsolePage, unittest.TestCase):
 
     def test_1_who_may_only_look_and_has_no_name_stops_the_machine_at_once(self):
         browser = self.browser
-        self.sign_in('viewer')
+        self.sign_in_to_machines('viewer')
         self.assertEqual(self.press_at_once(STOP), 0, 'nothing delays it')
         self.assertTrue(wait_for(lambda: self.outcomes() == ['preempted']), self.audited)
         self.assertTrue(browser.says(MACHINE + ' is asked to stop', '.hand-reply'))
@@ -98,7 +91,7 @@ class Hold(ConsolePage, unittest.TestCase):
     def test_3_what_will_run_is_said_and_is_not_run_by_a_second_tap(self):
         browser = self.browser
         rospy.set_param('/alpha/done', ['FIRST'])
-        self.sign_in('operator')
+        self.sign_in_to_machines('operator')
         refused = self.press_at_once(RESUME)
         self.assertEqual(refused, 1, 'it had just come there')
         self.stands('Waits before SECOND in ' + MACHINE)

@@ -107,6 +107,14 @@ class ConsolePage:
         if name:
             cls.remember_name(cls.browser, name)
 
+    def sign_in_to_machines(self, role):
+        """With the token of a role, in the file `tokens` of the test."""
+        with open(self.tokens) as lines:
+            token = next(line.split()[1] for line in lines if line.startswith(role))
+        self.browser.find('#token').send_keys(token)
+        self.browser.click('#sign-in')
+        self.browser.click('#tab-machines')
+
     @staticmethod
     def remember_name(browser, name):
         """As if it had been given before; the page begins again."""

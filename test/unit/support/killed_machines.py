@@ -64,6 +64,18 @@ class Noted(smach.State):
         return 'aborted' if self._failures >= 0 else 'succeeded'
 
 
+def around(label, container, leads_to, **others):
+    """A machine of a container under a label; each of `others`, states by label, ends it."""
+    ends = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+    machine = smach.StateMachine(list(ends))
+    machine.userdata.done = []
+    with machine:
+        machine.add(label, container, leads_to)
+        for name, state in others.items():
+            machine.add(name, state, ends)
+    return machine
+
+
 def in_a_process(work):
     """Run `work(tell)` in a process of its own; return what it has told, None if it was killed."""
     reader, writer = os.pipe()

@@ -3,7 +3,7 @@ import json
 import threading
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import KilledMachine, Noted, around
 from killed_trees import ENDS, flat
 from waiting import wait_for
 
@@ -130,12 +130,8 @@ def test_no_state_that_follows_by_its_author_begins(tmp_path, how):
         inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
         with inner:
             inner.add('FAILS', Noted('FAILS', diary, points, failures=1), ENDS)
-        machine = smach.StateMachine(['succeeded', 'aborted'])
-        machine.userdata.done = []
-        with machine:
-            machine.add('IN', inner, {'succeeded': 'succeeded', 'aborted': 'HOME'})
-            machine.add('HOME', Noted('HOME', diary, points), ENDS)
-        return machine
+        return around('IN', inner, {'succeeded': 'succeeded', 'aborted': 'HOME'},
+                      HOME=Noted('HOME', diary, points))
 
     task = Task(tmp_path, build, how, author_recoveries='override')
     assert task.goes_down()['ended_by'] == 'shutdown'
@@ -154,12 +150,8 @@ def test_a_branch_that_runs_beside_the_question_is_in_doubt(tmp_path, how):
         with both:
             both.add('ASKS', Noted('ASKS', diary, points, failures=1))
             both.add('RUNS', Waits(diary))
-        machine = smach.StateMachine(['succeeded', 'aborted'])
-        machine.userdata.done = []
-        with machine:
-            machine.add('BOTH', both, {'succeeded': 'succeeded', 'aborted': 'HOME'})
-            machine.add('HOME', Noted('HOME', diary, points), ENDS)
-        return machine
+        return around('BOTH', both, {'succeeded': 'succeeded', 'aborted': 'HOME'},
+                      HOME=Noted('HOME', diary, points))
 
     task = Task(tmp_path, build, how)
     assert task.goes_down()['ended_by'] == 'shutdown'

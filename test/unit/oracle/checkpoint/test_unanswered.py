@@ -6,7 +6,7 @@ import os
 import signal
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import KilledMachine, Noted, around
 from killed_trees import ALL, ENDS, flat, make, points_of, tree
 from waiting import wait_for
 
@@ -195,12 +195,8 @@ def meeting(folder):
         with both:
             both.add('LEFT', Meets('LEFT', diary, folder))
             both.add('RIGHT', Meets('RIGHT', diary, folder))
-        machine = smach.StateMachine(['succeeded', 'aborted'])
-        machine.userdata.done = []
-        with machine:
-            machine.add('BOTH', both, {'succeeded': 'C', 'aborted': 'C'})
-            machine.add('C', Noted('C', diary, points), ENDS)
-        return machine
+        return around('BOTH', both, {'succeeded': 'C', 'aborted': 'C'},
+                      C=Noted('C', diary, points))
     return build
 
 
@@ -256,11 +252,7 @@ def test_a_failure_of_a_concurrence_whose_branches_had_ended_is_asked_about(tmp_
         with inner:
             inner.add('LEFT', Noted('LEFT', diary, points))
             inner.add('RIGHT', Noted('RIGHT', diary, points))
-        machine = smach.StateMachine(['succeeded', 'aborted'])
-        machine.userdata.done = []
-        with machine:
-            machine.add('BOTH', inner, ENDS)
-        return machine
+        return around('BOTH', inner, ENDS)
 
     asked, tried = tmp_path / 'asked', 0
     for point in range(5, points_of(tmp_path, both)):

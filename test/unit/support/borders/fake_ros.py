@@ -29,6 +29,16 @@ def as_bytes(message: genpy.Message) -> genpy.Message:
     return message
 
 
+class SilentPublisher:
+    """In place of what publishes how machines stand."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_: None
+
+
 class FakeActionServer:
     """Takes goals by hand."""
 

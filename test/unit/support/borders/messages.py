@@ -51,7 +51,7 @@ from smach_oracle.srv import (
 )
 
 from .border import BOTH, REFUSED, TAKEN, Border, refused
-from .fake_ros import FakeHandle, fake_ros
+from .fake_ros import FakeHandle, SilentPublisher, fake_ros
 from .json_texts import json_texts, no_number, pickles
 from .values import message, words
 
@@ -137,14 +137,6 @@ def _take_handed_over(result: SharedAutonomyResult) -> str:
 
 # -- an operator's hand
 
-class _Silent:
-    def __init__(self, *_: object) -> None:
-        pass
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *_: None
-
-
 def _machine() -> Any:
     inner = smach.StateMachine(outcomes=['done'])
     with inner:
@@ -160,7 +152,7 @@ def _machine() -> Any:
 def _hand(service: str) -> Callable[[Any], str]:
     def take(request: Any) -> str:
         with fake_ros() as offered, mock.patch.multiple(
-                hand_server, ControlPublisher=_Silent, ViewerCommands=_Silent):
+                hand_server, ControlPublisher=SilentPublisher, ViewerCommands=SilentPublisher):
             made, machine = HandServer(), _machine()
             made.watch(machine)
             return _told(offered.call('~oracle/' + service, request))

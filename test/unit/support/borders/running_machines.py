@@ -14,18 +14,8 @@ from smach_oracle.ros.hand.hand_server import HandServer
 from smach_oracle.srv import CommandMachineRequest, SendMachineRequest
 
 from .border import TAKEN, Border, refused
-from .fake_ros import Offered, fake_ros
+from .fake_ros import Offered, SilentPublisher, fake_ros
 from .values import message, words
-
-
-class SilentPublisher:
-    """In place of what publishes how machines stand."""
-
-    def __init__(self, *_: object) -> None:
-        pass
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *_: None
 
 
 def _nested() -> OracleContainer:
