@@ -33,7 +33,7 @@ class InterfaceDialog:
         outcomes = [choice.outcome for choice in listed.goal.supersede_outcomes]
         choices: List[Choice] = [('f{}'.format(number), 'finish with ' + outcome)
                                  for number, outcome in enumerate(outcomes, 1)]
-        choices += [('g', 'give up; the oracle asks again'), ('o', 'show what it prints'),
+        choices += [('g', 'give up: the oracle asks again'), ('o', 'show what it prints'),
                     ('l', 'leave it to itself')]
         for key, meaning in choices:
             self._say('  {:3} {}'.format(key, clean(meaning)), 'cyan')
