@@ -1,11 +1,11 @@
 """SMACH: build hierarchical state machines in Python and run them.
 
-A machine is a container of states; a state does its work in ``execute`` and returns one of its
-outcomes; the container maps (state, outcome) to the next state or to an outcome of its own. This
+A machine is a container of states. A state does its work in ``execute`` and returns one of its
+outcomes. The container maps (state, outcome) to the next state or to an outcome of its own. This
 package knows nothing of ROS.
 """
 # The names below are looked up here at every use (smach.loginfo, smach.is_shutdown), so that
-# replacing one of them replaces it everywhere; hence this module must have them before the others
+# replacing one of them replaces it everywhere. Hence this module must have them before the others
 # are imported.
 from smach.log import logdebug, logerr, loginfo, logwarn, set_loggers
 from smach.exceptions import (InvalidConstructionError, InvalidStateError, InvalidTransitionError,

@@ -15,12 +15,12 @@ ChildTerminationCallback = Callable[[Outcomes], Union[bool, None, Sequence[str]]
 class Concurrence(Container):
     """Executes all children in parallel and ends when all have ended.
 
-    The outcome is, in this order: what ``outcome_cb({label: outcome})`` returns, if anything; the
+    The outcome is, in this order: what ``outcome_cb({label: outcome})`` returns, if anything. The
     entry of ``outcome_map`` ({outcome: {label: child outcome, ...}}) whose conditions all hold, the
     one with most conditions if several do; 'preempted', if that is an outcome, the container was
     preempted and all children serviced it; ``default_outcome``.
 
-    ``child_termination_cb({label: outcome or None})`` is called whenever a child ends; returning
+    ``child_termination_cb({label: outcome or None})`` is called whenever a child ends. Returning
     True preempts the children still running, returning a list of labels preempts those.
     """
 
@@ -151,7 +151,7 @@ class Concurrence(Container):
             run.preempt()
 
     def _settle_preempt(self, run: ParallelRun) -> bool:
-        """Whether this container was preempted and its children serviced that; leaves no request
+        """Whether this container was preempted and its children serviced that. It leaves no request
         with any child.
 
         A preempt that came when no child was running any more reached nobody. It stays with the
@@ -197,7 +197,7 @@ class Concurrence(Container):
         return outcome
 
     def _mapped_outcome(self, outcomes: Outcomes) -> Optional[str]:
-        """The entry of the outcome map with most conditions of those that hold; the first of
+        """The entry of the outcome map with most conditions of those that hold, the first of
         several such. An entry without conditions never holds.
         """
         holding = [(len(conditions), outcome) for outcome, conditions in _entries(self._outcome_map)
@@ -227,7 +227,7 @@ class Concurrence(Container):
         return list(self._states)
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
-        """Add the keys of ``userdata`` to the container's; all states are initial ones, whatever is
+        """Add the keys of ``userdata`` to the container's. All states are initial ones, whatever is
         asked for.
         """
         if set(initial_states) != set(self._states):
@@ -254,7 +254,7 @@ class Concurrence(Container):
 
 
 def _entries(conditions: Any) -> List[Tuple[Any, Any]]:
-    """The entries of an outcome map, or of the conditions in it; whatever is empty has none.
+    """The entries of an outcome map, or of the conditions in it. Whatever is empty has none.
 
     :raises TypeError: where it is no mapping.
     """

@@ -27,7 +27,7 @@ class Container(State):
     StateMachine).
     """
 
-    # All open containers of the process, the innermost last; one thread builds at a time.
+    # All open containers of the process, the innermost last. One thread builds at a time.
     _construction_stack: List['Container'] = []
     _construction_lock = threading.RLock()
 
@@ -51,7 +51,7 @@ class Container(State):
 
     @classmethod
     def _currently_opened_container(cls) -> Any:
-        """The innermost open container; InvalidStateError if there is none, or none of this
+        """The innermost open container. InvalidStateError if there is none, or none of this
         class.
         """
         if not Container._construction_stack:
@@ -69,7 +69,7 @@ class Container(State):
         Container._construction_stack.append(self)
 
     def close(self) -> None:
-        """End what open() began; an inconsistency is logged here, long before the container
+        """End what open() began. An inconsistency is logged here, long before the container
         runs.
         """
         self._pop_construction_stack()
@@ -116,7 +116,7 @@ class Container(State):
                      % ''.join(traceback.format_exception(exc_type, exc_val, exc_tb)))
 
     def check_consistency(self) -> None:
-        """Raise InvalidStateError or InvalidTransitionError if the container cannot run;
+        """Raise InvalidStateError or InvalidTransitionError if the container cannot run,
         overridden.
         """
         raise NotImplementedError()
@@ -129,7 +129,7 @@ class Container(State):
             return False
         return True
 
-    # -- what outsiders may ask; overridden by each kind
+    # -- what outsiders may ask, overridden by each kind
 
     def __getitem__(self, key: str) -> State:
         raise NotImplementedError()
@@ -176,22 +176,22 @@ class Container(State):
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
-        """Call the start callbacks; what they raise is logged."""
+        """Call the start callbacks. What they raise is logged."""
         if self._start_cbs:
             self._call_all('start', self._start_cbs, self.get_initial_states())
 
     def call_transition_cbs(self) -> None:
-        """Call the transition callbacks; what they raise is logged."""
+        """Call the transition callbacks. What they raise is logged."""
         if self._transition_cbs:
             self._call_all('transition', self._transition_cbs, self.get_active_states())
 
     def call_termination_cbs(self, terminal_states: Any, outcome: str) -> None:
-        """Call the termination callbacks; what they raise is logged."""
+        """Call the termination callbacks. What they raise is logged."""
         if self._termination_cbs:
             self._call_all('termination', self._termination_cbs, terminal_states, outcome)
 
     def _call_all(self, kind: str, callbacks: List[Callback], *first_args: Any) -> None:
-        """Call each callback in turn; as soon as one raises, the rest of this round is left out."""
+        """Call each callback in turn. As soon as one raises, the rest of this round is left out."""
         try:
             for callback, args in callbacks:
                 callback(self.userdata, *first_args, *args)
@@ -201,14 +201,14 @@ class Container(State):
     # -- userdata at the border
 
     def _copy_input_keys(self, parent_ud: Any, ud: Any) -> None:
-        """Copy this container's input keys from the parent's userdata; a missing one is a
+        """Copy this container's input keys from the parent's userdata. A missing one is a
         warning.
         """
         if parent_ud is not None:
             _copy_keys(self.get_registered_input_keys(), parent_ud, ud, 'input')
 
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
-        """Copy this container's output keys to the parent's userdata; a missing one is a
+        """Copy this container's output keys to the parent's userdata. A missing one is a
         warning.
         """
         if parent_ud is not None:
@@ -244,7 +244,7 @@ class Container(State):
         return [children[label] for label in self.get_active_states() if label in children]
 
     def _wait_while_paused(self) -> None:
-        """Return once resumed, preempted or shut down; at once if not paused."""
+        """Return once resumed, preempted or shut down, at once if not paused."""
         if not self._pause_requested:
             return
         smach.loginfo('%s paused before executing the next state.' % type(self).__name__)

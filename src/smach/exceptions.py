@@ -14,7 +14,7 @@ __all__ = ['SmachError', 'InvalidTransitionError', 'InvalidStateError', 'Invalid
 
 
 class SmachError(Exception):
-    """Root of all errors this package raises on its own account; each one is logged where it is
+    """Root of all errors this package raises on its own account. Each one is logged where it is
     made.
     """
 
@@ -36,4 +36,4 @@ class InvalidConstructionError(SmachError):
 
 
 class InvalidUserCodeError(SmachError):
-    """Code of a state or of a callback went wrong; the text carries its traceback."""
+    """Code of a state or of a callback went wrong. The text carries its traceback."""

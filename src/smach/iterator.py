@@ -17,7 +17,7 @@ class Iterator(Container):
 
     ``it`` is an iterable, or a callable that returns one and is called when execution begins. The
     iteration stops at an outcome of the contained state that is a break outcome, or at a preempt,
-    and ends with that outcome; when the items run out it ends with ``exhausted_outcome``. Either is
+    and ends with that outcome. When the items run out it ends with ``exhausted_outcome``. Either is
     mapped through ``final_outcome_map``. The contained state works on the iterator's own userdata:
     there is no remapping, and nothing needs to be declared.
     """
@@ -72,13 +72,13 @@ class Iterator(Container):
         iterator._final_outcome_map = dict(final_outcome_map or {})
 
     def check_consistency(self) -> None:
-        """An iterator is always consistent; one without a state can only be run over no items."""
+        """An iterator is always consistent. One without a state can only be run over no items."""
 
     # -- execution
 
     def execute(self, parent_ud: Any = None) -> str:
-        """Go through the items and return the outcome; InvalidUserCodeError if the state or the
-        iterable raised.
+        """Go through the items and return the outcome. It raises InvalidUserCodeError if the state
+        or the iterable raised.
         """
         self._is_running = True
         try:
@@ -100,7 +100,7 @@ class Iterator(Container):
         return iter(self._items() if callable(self._items) else self._items)
 
     def _iterate(self, items: Iterator_[Any]) -> str:
-        """Execute the state until something stops it; return its last outcome, or that of
+        """Execute the state until something stops it, and return its last outcome, or that of
         exhaustion.
         """
         outcome = self._exhausted_outcome
@@ -123,7 +123,7 @@ class Iterator(Container):
         return outcome
 
     def _stops_at(self, outcome: str) -> bool:
-        """Whether to leave the remaining items; an outcome the state never registered is logged, as
+        """Whether to leave the remaining items. An outcome the state never registered is logged, as
         nobody maps it.
         """
         if outcome in self._break_outcomes:
@@ -164,7 +164,7 @@ class Iterator(Container):
             self._state.request_preempt()
 
     def _end_preempt(self) -> None:
-        """Stopping is servicing; a state that did not notice must not find the old request in its
+        """Stopping is servicing. A state that did not notice must not find the old request in its
         next run.
         """
         self._preempt_requested = False
@@ -190,8 +190,8 @@ class Iterator(Container):
         return [self._state_label]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
-        """Add the keys of ``userdata`` to the container's; KeyError for another label than that of
-        the only state.
+        """Add the keys of ``userdata`` to the container's. It raises KeyError for another label
+        than that of the only state.
         """
         for label in initial_states:
             if label != self._state_label:

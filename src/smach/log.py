@@ -34,5 +34,5 @@ def logerr(msg: object) -> None:
 
 
 def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
-    """Replace all four loggers; each is called with one finished text per message."""
+    """Replace all four loggers. Each is called with one finished text per message."""
     vars(smach).update(loginfo=info, logwarn=warn, logdebug=debug, logerr=error)

@@ -21,7 +21,7 @@ _GRACE_S = 1.0
 class ParallelRun(object):
     """Executes each state in a thread of its own, once.
 
-    ``execute(label)`` runs the state and returns its outcome; ``began(label)`` and ``ended(label)``
+    ``execute(label)`` runs the state and returns its outcome. ``began(label)`` and ``ended(label)``
     are called in the state's thread, never for two states at once. The first error of any of them
     preempts the other states.
     """
@@ -53,7 +53,7 @@ class ParallelRun(object):
         return [label for label in self._states if label in self._running]
 
     def run(self) -> None:
-        """Start all and return when all have ended; an interrupt of this thread preempts them and
+        """Start all and return when all have ended. An interrupt of this thread preempts them and
         goes on.
         """
         try:

@@ -28,7 +28,7 @@ _warned_of: Set[Tuple[str, str]] = set()
 
 
 class Const(object):
-    """A view of an object, which stays as it is whatever is set on the view; so do the objects
+    """A view of an object, which stays as it is whatever is set on the view. So do the objects
     reached through it.
 
     An attribute that is set is kept with this view alone: who read the object through it reads what
@@ -114,7 +114,7 @@ class Const(object):
 
 
 class CallableConst(Const):
-    """A view of an object that can be called; apart, so that callable() is right about the
+    """A view of an object that can be called. Apart, so that callable() is right about the
     others.
     """
 

@@ -28,7 +28,7 @@ class Sequence(StateMachine):
     def add(label: str, state: State, transitions: Optional[Mapping[str, Optional[str]]] = None,
             remapping: Optional[Mapping[str, str]] = None,
             constants: Optional[Mapping[str, Any]] = None) -> State:
-        """Add a state to the innermost open sequence and return it; see
+        """Add a state to the innermost open sequence and return it. See
         :meth:`StateMachine.add`.
         """
         sequence = Sequence._currently_opened_container()

@@ -9,8 +9,8 @@ __all__ = ['State', 'CBState']
 class State(object):
     """Base of everything that can be put into a container.
 
-    ``outcomes`` are the names ``execute`` may return; ``input_keys`` may be read and
-    ``output_keys`` written through the userdata it is given; ``io_keys`` are both.
+    ``outcomes`` are the names ``execute`` may return. ``input_keys`` may be read and
+    ``output_keys`` written through the userdata it is given. ``io_keys`` are both.
     """
 
     def __init__(
@@ -24,7 +24,7 @@ class State(object):
         self._preempt_requested = False
 
     def execute(self, ud: Any) -> Any:
-        """Do the work of this state and return one of its outcomes; every subclass has its own."""
+        """Do the work of this state and return one of its outcomes. Every subclass has its own."""
         raise NotImplementedError('%s has no execute()' % type(self).__name__)
 
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
@@ -58,7 +58,7 @@ class State(object):
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
-        """Ask the state to stop early; it is up to ``execute`` to notice."""
+        """Ask the state to stop early. It is up to ``execute`` to notice."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:

@@ -38,7 +38,7 @@ class StateMachine(Container):
         self._initial_state_label: Optional[str] = None
 
         self._is_running = False
-        # Held while the machine moves from one state to the next; re-entrant so that callbacks may
+        # Held while the machine moves from one state to the next. Re-entrant so that callbacks may
         # request a preempt.
         self._state_transitioning_lock = threading.RLock()
         self._current_label: Optional[str] = None
@@ -61,7 +61,7 @@ class StateMachine(Container):
             constants: Optional[Mapping[str, Any]] = None) -> State:
         """Add a state to the innermost open machine and return it.
 
-        ``transitions`` maps outcomes of the state to labels or to outcomes of the machine; outcomes
+        ``transitions`` maps outcomes of the state to labels or to outcomes of the machine. Outcomes
         left out, or mapped to None, end the machine with its outcome of the same name.
         ``remapping`` maps the state's userdata keys to the machine's. ``constants`` maps keys of
         the machine to values: they are written before each visit of the state, and stay.
@@ -189,7 +189,7 @@ class StateMachine(Container):
                       % (self._current_label, list(self.userdata.keys())))
 
     def _set_current_state(self, state_label: Optional[str]) -> None:
-        """Make this state the one that is executed next; None after the last."""
+        """Make this state the one that is executed next, or None after the last."""
         self._current_label = state_label
         self._current_outcome = None
         if state_label is None:
@@ -203,8 +203,8 @@ class StateMachine(Container):
         """Execute the current state and make the transition: None to go on, or the outcome of the
         machine.
 
-        Called with the transitioning lock held; lets go of it while the state executes. Every
-        transition takes this path, so it is one flat piece; what is rare is in methods of its own.
+        Called with the transitioning lock held. It lets go of it while the state executes. Every
+        transition takes this path, so it is one flat piece. What is rare is in methods of its own.
         """
         if self._preempt_requested or (self._is_hooked and self.preempt_requested()):
             self._pass_preempt_on()
@@ -290,7 +290,7 @@ class StateMachine(Container):
     # -- preemption
 
     def request_preempt(self) -> None:
-        """Ask the active state to stop; if it ends without servicing this, the next one is asked
+        """Ask the active state to stop. If it ends without servicing this, the next one is asked
         before it runs.
         """
         self._is_preempt_passed_on = False
@@ -374,11 +374,11 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> List[str]:
-        """The label of the current state, in a list; 'None' while there is none."""
+        """The label of the current state, in a list. 'None' while there is none."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> List[Edge]:
-        """All transitions as (outcome, from, to); to is None where the outcome falls through."""
+        """All transitions as (outcome, from, to). To is None where the outcome falls through."""
         return [(outcome, label, to) for label, transitions in self._transitions.items()
                 for outcome, to in transitions.items()]
 

@@ -7,7 +7,7 @@ import smach
 def inconsistencies(states: Mapping[str, Any],
                     transitions: Mapping[str, Mapping[str, Optional[str]]],
                     initial: Optional[str], outcomes: Collection[str]) -> List[str]:
-    """Return what is wrong with a machine, a sentence each; nothing where it is consistent."""
+    """Return what is wrong with a machine, a sentence each, or nothing where it is consistent."""
     errors = []
     if initial is None:
         errors.append('It has no initial state.')

@@ -2,7 +2,7 @@
 
 Both classes are made for speed: a step of a machine reads and writes through them many times a
 microsecond apart. A read or write of one key is one dictionary operation, which Python itself makes
-atomic; so they need no locks to be safe for several threads.
+atomic. So they need no locks to be safe for several threads.
 """
 import copy
 from typing import Any, Callable, Collection, Dict, Iterable, List, Mapping, Union
@@ -65,7 +65,7 @@ class UserData(object):
         self._data.update(_as_dict(other_userdata))
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> 'UserData':
-        """A new userdata with shallow copies of the given keys; ``remapping`` maps new names to
+        """A new userdata with shallow copies of the given keys. ``remapping`` maps new names to
         keys of this one.
         """
         new_names = {old: new for new, old in remapping.items()}
@@ -75,7 +75,7 @@ class UserData(object):
         return extracted
 
     def merge(self, ud: 'UserData', keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Write shallow copies of the given keys of ``ud`` here; ``remapping`` maps keys of ``ud``
+        """Write shallow copies of the given keys of ``ud`` here. ``remapping`` maps keys of ``ud``
         to keys of this.
         """
         for key in keys:
@@ -91,7 +91,7 @@ class Remapper(object):
     """The userdata as one state sees it: its own names for the keys, and only those it declared.
 
     ``remapping`` maps the state's names to the keys of ``ud``. Reading a key that is not in
-    ``input_keys`` raises InvalidUserCodeError; writing one that is not in ``output_keys`` logs an
+    ``input_keys`` raises InvalidUserCodeError. Writing one that is not in ``output_keys`` logs an
     error and changes nothing. The collections of keys are kept, not copied: keys that a state
     declares later are seen at once.
     """
@@ -103,7 +103,7 @@ class Remapper(object):
 
     def __init__(self, ud: Any, input_keys: Collection[str] = (), output_keys: Collection[str] = (),
                  remapping: Mapping[str, str] = _NO_REMAPPING) -> None:
-        # A plain UserData is read and written at its dictionary; anything else through its own item
+        # A plain UserData is read and written at its dictionary, anything else through its own item
         # access.
         _set_parts(self, (ud, input_keys, output_keys, remapping, type(ud) is UserData))
 

@@ -104,7 +104,7 @@ class ActionLink(object):
     def _disable_nagle(self) -> None:
         # A goal a few milliseconds after the last one would otherwise wait for a delayed TCP
         # acknowledgement (40 ms).
-        # Both directions are asked for by whoever opens the topic here first; these handles stay
+        # Both directions are asked for by whoever opens the topic here first. These handles stay
         # for that purpose.
         if self._fast_ends:
             return
@@ -131,7 +131,7 @@ class ActionLink(object):
         return bool(connections) and time.monotonic() - self._seen_at >= SETTLE_S
 
     def _connections(self) -> Tuple[Any, ...]:
-        """The connections on which result and feedback come; () while any topic is without the
+        """The connections on which result and feedback come, or () while any topic is without the
         server.
         """
         client, watch = self.client, self.watch
@@ -150,8 +150,8 @@ class ActionLink(object):
 
     def send_goal(self, goal: Any, on_transition: Callable[[Any], None],
                   on_feedback: Callable[[Any, Any], None]) -> Any:
-        """Send ``goal`` (the action's Goal message); returns actionlib's goal handle, which keeps
-        the goal tracked.
+        """Send ``goal`` (the action's Goal message), and return actionlib's goal handle, which
+        keeps the goal tracked.
         """
         if self.client is None:
             raise smach.InvalidStateError("Action '%s' is not connected: send_goal() before ready()"

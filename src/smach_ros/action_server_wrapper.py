@@ -17,13 +17,13 @@ class ActionServerWrapper(object):
     ``run_server()``.
 
     Each goal is put into a parent userdata: the goal under ``goal_key``, a fresh feedback under
-    ``feedback_key`` and a fresh result under ``result_key``; ``goal_slots_map`` {goal field:
+    ``feedback_key`` and a fresh result under ``result_key``. ``goal_slots_map`` {goal field:
     userdata key} adds single fields, ``expand_goal_slots`` all of them by their own names. The
     container sees the keys it declares. At each of its transitions the feedback is published, with
-    the fields in ``feedback_slots_map`` {feedback field: userdata key} set; at its end the result,
+    the fields in ``feedback_slots_map`` {feedback field: userdata key} set. At its end the result,
     with ``result_slots_map`` {result field: userdata key}, or with ``pack_result_slots`` every
     field, taken from userdata. The container's outcome, by the list it stands in, ends the goal as
-    succeeded, aborted or preempted; an unlisted outcome or an exception aborts it. A cancel, a
+    succeeded, aborted or preempted. An unlisted outcome or an exception aborts it. A cancel, a
     newer goal or a shutdown of the node preempts the container.
     """
 

@@ -16,8 +16,8 @@ class ConditionState(smach.State):
     a preempt.
 
     ``poll_rate`` is the pause between checks and ``timeout`` the limit of the whole wait
-    (``rospy.Duration`` or seconds of wall time; no timeout: None or 0). ``max_checks`` more checks
-    follow a first false one; -1: without end. ``execute`` raises InvalidUserCodeError if
+    (``rospy.Duration`` or seconds of wall time, no timeout: None or 0). ``max_checks`` more checks
+    follow a first false one. -1 means without end. ``execute`` raises InvalidUserCodeError if
     ``cond_cb`` raises.
     """
 
@@ -36,7 +36,7 @@ class ConditionState(smach.State):
         self._signal = Signal()
 
     def request_preempt(self) -> None:
-        """Ask to stop; a pause between checks ends at once."""
+        """Ask to stop. A pause between checks ends at once."""
         smach.State.request_preempt(self)
         self._signal.notify()
 

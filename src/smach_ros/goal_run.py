@@ -67,7 +67,7 @@ class GoalRun(object):
         self._link.active_runs.discard(self)
 
     def abandon(self) -> None:
-        """Track the goal no more; it counts as lost, without a result."""
+        """Track the goal no more. It counts as lost, without a result."""
         self._listener = None
         self.handle = None
         self.status, self.result = GoalStatus.LOST, None

@@ -19,7 +19,7 @@ class IntrospectionClient(object):
     """Talks to the introspection servers of this master."""
 
     def get_servers(self) -> List[str]:
-        """Names of all servers that publish now; raises what rospy raises if the master does not
+        """Names of all servers that publish now. It raises what rospy raises if the master does not
         answer.
         """
         return sorted(topic[:-len(STATUS_TOPIC)] for topic, kind in rospy.get_published_topics()
@@ -31,7 +31,7 @@ class IntrospectionClient(object):
         (UserData) added.
 
         Waits until the server confirms, at most ``timeout`` (``rospy.Duration`` or seconds of wall
-        time; None: without end). Returns whether it did.
+        time, None means without end). Returns whether it did.
 
         :raises InvalidUserCodeError: for userdata that cannot be sent.
         """

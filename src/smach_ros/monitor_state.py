@@ -36,7 +36,7 @@ class MonitorState(smach.State):
         self._signal = Signal()
 
     def request_preempt(self) -> None:
-        """Ask to stop; noticed at once, and never lost if it comes before ``execute``."""
+        """Ask to stop. Noticed at once, and never lost if it comes before ``execute``."""
         smach.State.request_preempt(self)
         self._signal.notify()
 

@@ -66,8 +66,8 @@ class ServerWatch(object):
                 and getattr(connection, 'socket', None) is not None]
 
     def problem(self, frozen_after_s: float = FROZEN_AFTER_S) -> Optional[str]:
-        """Why the server must be regarded as lost; None while it lives or nothing is certain yet.
-        Never blocks.
+        """Why the server must be regarded as lost, or None while it lives or nothing is certain
+        yet. Never blocks.
         """
         now = self._clock()
         connections = self.connections()

@@ -32,7 +32,7 @@ class ServiceState(smach.State):
     return one of ``outcomes``, then to userdata as a whole (``response_key``) or by field
     (``response_slots``).
 
-    The first execution waits for an absent service until it comes; a service that has gone since
+    The first execution waits for an absent service until it comes. A service that has gone since
     aborts later ones. A service cannot be cancelled: a preempt leaves a call ``preempt_timeout``
     (``rospy.Duration`` or seconds of wall time) to finish, then walks away from it.
     """
@@ -81,7 +81,7 @@ class ServiceState(smach.State):
         self.register_output_keys(self._response_slots)
 
     def request_preempt(self) -> None:
-        """Ask to stop; waiting for an absent service ends at once."""
+        """Ask to stop. Waiting for an absent service ends at once."""
         smach.State.request_preempt(self)
         self._signal.notify()
 
@@ -110,7 +110,7 @@ class ServiceState(smach.State):
         return self._use_response(ud, call.value)
 
     def _await_service(self) -> bool:
-        """True once the service is there, or was before; False on a preempt or a shutdown."""
+        """True once the service is there, or was before. It is False on a preempt or a shutdown."""
         if self._proxy is not None:
             return not self.preempt_requested()
         search = Aside('find %s' % self._service_name, self._signal, self._find_service)

@@ -29,15 +29,15 @@ class SimpleActionState(smach.State):
     fields ``goal_slots`` filled from the userdata keys of the same names, and goes through
     ``goal_cb(userdata, goal, *args, **kwargs)``, which may change it or return another. The result
     goes to ``result_cb(userdata, status, result, *args, **kwargs)`` (an actionlib_msgs/GoalStatus
-    constant; no result: None), which may return one of ``outcomes``, then to userdata as a whole
+    constant, no result: None), which may return one of ``outcomes``, then to userdata as a whole
     (``result_key``) or by field (``result_slots``).
 
     A goal that ends in any other way than SUCCEEDED is 'aborted', or 'preempted' if we asked for
     its end. Limits (``rospy.Duration`` or seconds, of wall time): a server that has not come
-    ``server_wait_timeout`` after ``execute`` began is 'aborted'; a goal not ended after
-    ``exec_timeout`` (None or 0: no limit) is cancelled and 'aborted'; a server that has not ended a
+    ``server_wait_timeout`` after ``execute`` began is 'aborted'. A goal not ended after
+    ``exec_timeout`` (None or 0: no limit) is cancelled and 'aborted'. A server that has not ended a
     cancelled goal after ``preempt_timeout`` is left alone. A server that dies while it works on the
-    goal is noticed; the goal is 'aborted', and the log says why.
+    goal is noticed. The goal is 'aborted', and the log says why.
 
     ``_goal_active_cb()``, ``_goal_feedback_cb(feedback)`` and ``_goal_done_cb(status, result)`` may
     be overridden.
@@ -115,7 +115,7 @@ class SimpleActionState(smach.State):
 
     @property
     def _action_client(self) -> Optional[StateClient]:
-        """A SimpleActionClient for the latest goal, for scripts; None until the node is
+        """A SimpleActionClient for the latest goal, for scripts, or None until the node is
         initialised.
         """
         if self._client is None and self._link.client is not None:
@@ -205,7 +205,7 @@ class SimpleActionState(smach.State):
                                              % (self._action_name, self._goal_type, err)) from err
 
     def _see_through(self, run: GoalRun) -> None:
-        """Wait for the goal's end; after this the run is done, or abandoned with the reason in the
+        """Wait for the goal's end. After this the run is done, or abandoned with the reason in the
         log.
         """
         self._goal_status, self._goal_result = None, None

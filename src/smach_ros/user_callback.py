@@ -8,7 +8,7 @@ class UserCallback(object):
     """Calls ``cb(userdata, *values, *args, **kwargs)`` with userdata narrowed to the callback's own
     interface.
 
-    A callback decorated with ``smach.cb_interface`` brings its keys along; any other gets the keys
+    A callback decorated with ``smach.cb_interface`` brings its keys along. Any other gets the keys
     its state declares for callbacks.
 
     :raises InvalidStateError: if ``cb`` cannot be called.
@@ -45,7 +45,7 @@ class UserCallback(object):
 
 
 def checked_slots(what: str, slots: Iterable[str], message: Any) -> Tuple[str, ...]:
-    """``slots`` as a tuple; raises ``smach.InvalidStateError`` for one that is no field of
+    """``slots`` as a tuple. It raises ``smach.InvalidStateError`` for one that is no field of
     ``message``.
     """
     slots = tuple(slots)

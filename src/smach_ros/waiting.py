@@ -38,7 +38,7 @@ def seconds(duration: Any) -> Optional[float]:
 
 
 def deadline_after(timeout_s: Optional[float]) -> Optional[float]:
-    """The monotonic time (s) ``timeout_s`` from now; None stays None."""
+    """The monotonic time (s) ``timeout_s`` from now. None stays None."""
     return None if timeout_s is None else time.monotonic() + timeout_s
 
 
@@ -59,8 +59,8 @@ class Signal(object):
 
     def wait(self, happened: Callable[[], bool], deadline: Optional[float] = None,
              longest_s: Optional[float] = None) -> bool:
-        """Wait for ``happened()``, a monotonic ``deadline``, ``longest_s`` or a shutdown; returns
-        ``happened()``.
+        """Wait for ``happened()``, a monotonic ``deadline``, ``longest_s`` or a shutdown, and
+        return ``happened()``.
         """
         limits = [limit for limit in (deadline, deadline_after(longest_s)) if limit is not None]
         with self._condition:
@@ -78,7 +78,7 @@ class Aside(threading.Thread):
 
     It also keeps talk with the master out of the main thread: rospy's own handling of Ctrl-C, which
     runs there, waits for the lock of an interrupted call forever. The event ``stopped`` is set by
-    ``stop()``; ``ended`` is true once ``value`` or ``error`` is set.
+    ``stop()``. ``ended`` is true once ``value`` or ``error`` is set.
     """
 
     def __init__(self, name: str, signal: Signal, work: Callable[[threading.Event], Any]) -> None:
@@ -92,7 +92,7 @@ class Aside(threading.Thread):
         self.start()
 
     def stop(self) -> None:
-        """Ask the work to end; does not wait."""
+        """Ask the work to end. It does not wait."""
         self._stopped.set()
 
     def run(self) -> None:

@@ -1,4 +1,4 @@
 """From bags of trials to tables and figures.
 
-Needs rosbags and, for figures, matplotlib; neither ROS nor SMACH.
+Needs rosbags and, for figures, matplotlib, neither ROS nor SMACH.
 """

@@ -18,7 +18,7 @@ _KINDS = {int(kind): kind for kind in EventKind}
 
 
 class BagError(OracleError):
-    """A bag cannot be used; the text says why."""
+    """A bag cannot be used. The text says why."""
 
 
 class SkippedBag(NamedTuple):
@@ -40,7 +40,7 @@ class RecordedCause(NamedTuple):
 class BagContent(NamedTuple):
     """What the analysis takes from a bag."""
 
-    events: List[Event]  # in the order of their stamps; `seq` is that of their happening
+    events: List[Event]  # in the order of their stamps. `seq` is that of their happening
     causes: Dict[str, RecordedCause]  # by trial id
     nodes: Dict[str, str]  # by trial id: the node, from the topic of the events
 
@@ -65,7 +65,7 @@ def find_bags(places: Sequence[str]) -> List[str]:
 
 
 def walk_bags(folder: str) -> Iterator[str]:
-    """Paths of what has the name of a bag, in a folder and below; links to folders are left out."""
+    """Paths of what has the name of a bag, in a folder and below. Links to folders are left out."""
     for parent, _, names in os.walk(folder):
         for name in names:
             backup_of = name[:-len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
@@ -74,7 +74,7 @@ def walk_bags(folder: str) -> Iterator[str]:
 
 
 class MessageStores:
-    """Reads messages; remembers the definitions it has met, so that many bags are quick."""
+    """Reads messages. It remembers the definitions it has met, so that many bags are quick."""
 
     def __init__(self) -> None:
         """:raises ImportError: where rosbags is missing."""
@@ -86,7 +86,7 @@ class MessageStores:
         self._stores: Dict[str, Any] = {}
 
     def read(self, connection: Any, data: bytes) -> Any:
-        """One message of a connection; raises whatever a damaged one makes rosbags raise."""
+        """One message of a connection. It raises whatever a damaged one makes rosbags raise."""
         definition = connection.msgdef
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
         if text not in self._stores:
@@ -110,7 +110,7 @@ class EventReader:
         self._most_events = most_events
 
     def read(self, path: str) -> BagContent:
-        """All events in a bag, and the cause of each trial; the topics' names do not matter.
+        """All events in a bag, and the cause of each trial. The topics' names do not matter.
 
         A cause is latched: a bag may begin with that of the trial before. The last one before a
         trial's end counts.

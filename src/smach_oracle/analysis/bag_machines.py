@@ -29,7 +29,7 @@ class FailureImage(NamedTuple):
 class RecordedMachines(NamedTuple):
     """The machines of a bag."""
 
-    containers: Dict[str, RecordedContainer]  # by path, as in events; the latest word on each
+    containers: Dict[str, RecordedContainer]  # by path, as in events, the latest word on each
     frames: List[FailureImage]
 
 

@@ -20,7 +20,7 @@ from .variants import VariantCounts, count_variants, time_series
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     args = _parse(argv)
     try:
         found = load_trials(args.folders, FailingNames(args.failing_outcomes))

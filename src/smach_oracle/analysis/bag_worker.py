@@ -30,8 +30,8 @@ class BagRequest(NamedTuple):
     """What is to be read, and within which limits."""
 
     paths: List[str]  # they are read as one
-    trials: List[str]  # ids; none: every trial
-    shown_events: int = 0  # of the one trial that is to be replayed; 0: summaries alone
+    trials: List[str]  # ids. Empty means every trial
+    shown_events: int = 0  # of the one trial that is to be replayed. 0 means summaries alone
     most_events: int = 200000  # of a bag
     memory_bytes: int = 2 ** 29  # beyond what the process has when it begins
     cpu_s: int = 60
@@ -165,7 +165,7 @@ def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
         try:
             machines = read_machines(path)
         except Exception as err:
-            # a damaged file can make rosbags raise anything; the events are there
+            # a damaged file can make rosbags raise anything. The events are there
             problem = '{!r}'.format(err)[:300]
             continue
         found.containers.update(machines.containers)
@@ -183,7 +183,7 @@ def _bounded(frames: Sequence[FailureImage]) -> List[FailureImage]:
 
 
 def _limit(request: BagRequest) -> None:
-    """Hold this process to the limits; a call that needs more memory raises MemoryError."""
+    """Hold this process to the limits. A call that needs more memory raises MemoryError."""
     with open('/proc/self/statm', encoding='ascii') as status:
         present = int(status.read().split()[0]) * resource.getpagesize()
     memory = present + request.memory_bytes

@@ -8,7 +8,7 @@ NO_CAUSE = '(none)'
 
 
 class CauseRow(NamedTuple):
-    """The trials of one variant that were given a cause of one kind; each row counts trials."""
+    """The trials of one variant that were given a cause of one kind. Each row counts trials."""
 
     experiment: str
     variant: str
@@ -47,7 +47,7 @@ def _row(experiment: str, variant: str, kind: str, trials: Sequence[TrialSummary
 
 
 def format_causes(rows: Sequence[CauseRow]) -> str:
-    """The rows as text, a table for each variant; '' where no trial has a cause."""
+    """The rows as text, a table for each variant, or '' where no trial has a cause."""
     lines: List[str] = []
     width = max([len(row.kind) for row in rows] + [5])
     heading = '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(

@@ -40,7 +40,7 @@ class Share(NamedTuple):
     trials: int
     of: int
     interval: Interval  # 95% Wilson score interval
-    over_replicates: Optional[Interval]  # 95% t interval; None for fewer than two
+    over_replicates: Optional[Interval]  # 95% t interval, or None for fewer than two
 
     @property
     def share(self) -> float:
@@ -49,7 +49,7 @@ class Share(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """What the trials of a variant cost; None: it is not known of some trial."""
+    """What the trials of a variant cost. None means it is not known of some trial."""
 
     attempts: float  # a trial
     questions: float  # a trial
@@ -59,7 +59,7 @@ class Costs(NamedTuple):
     wrong_objects: Optional[int]
     damage: Optional[float]  # things that came to harm, a completed task
     completion_s: Optional[float]  # median time of a true success
-    trials_between: Optional[float]  # trials an intervention; None: there was none
+    trials_between: Optional[float]  # trials an intervention. None means there was none
     hours_between: Optional[float]
 
 
@@ -81,7 +81,7 @@ def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
 def costs_of(rows: Sequence[TrialRow]) -> Costs:
     """Return what the trials of one variant cost.
 
-    Lost trials count as trials; nothing else is known of them, and they are left out of what is
+    Lost trials count as trials. Nothing else is known of them, and they are left out of what is
     known of all others.
     """
     ended = [row for row in rows if row.ending != LOST]
@@ -101,7 +101,7 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
 
 
 def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:
-    """Return how long robots were at work in trials that have ended; None: not known of some.
+    """Return how long robots were at work in trials that have ended. None means not known of some.
 
     Where a world goes on, the time from one trial to the next counts, too.
     """
@@ -186,7 +186,7 @@ def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     parser = argparse.ArgumentParser(prog='compare_variants', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('files', nargs='+', metavar='FILE', type=path_of,

@@ -54,7 +54,7 @@ class VariantSeries(NamedTuple):
 
 def save_time_series(trials: Sequence[TrialSummary], stem: str, columns: int = 1,
                      x_axis: str = 'trials') -> List[str]:
-    """Draw the trials of one experiment to `stem`.svg and `stem`.png; returns the paths.
+    """Draw the trials of one experiment to `stem`.svg and `stem`.png, and return the paths.
 
     :param columns: 1 or 2, the width in columns of a paper.
     :param x_axis: 'trials' (number) or 'time' (since the variant's first trial began).

@@ -40,7 +40,7 @@ def t_quantile(freedom: int) -> float:
 
 
 def replicate_interval(shares: Sequence[float]) -> Optional[Interval]:
-    """Student's t interval of the mean of replicates' shares, cut to 0 to 1; None for one."""
+    """Student's t interval of the mean of replicates' shares, cut to 0 to 1, or None for one."""
     count = len(shares)
     if count < 2:
         return None

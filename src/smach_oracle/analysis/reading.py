@@ -14,7 +14,7 @@ ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
 
 
 def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
-    """Path and content of every bag in folders and below; unusable ones are added to `skipped`.
+    """Path and content of every bag in folders and below. Unusable ones are added to `skipped`.
 
     :raises BagError: where a place does not exist, or there are no bags.
     """
@@ -32,7 +32,7 @@ def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tupl
 
 
 def report_skipped(skipped: Sequence[SkippedBag]) -> int:
-    """Name on standard error what was skipped, with the reasons; returns the exit code."""
+    """Name on standard error what was skipped, with the reasons, and return the exit code."""
     sys.stdout.flush()
     for item in skipped:
         sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
@@ -55,7 +55,7 @@ def write_json(path: str, data: Mapping[str, object]) -> None:
 
 
 def report_error(command: str, why: Union[str, Exception]) -> int:
-    """Print on standard error why a command has no result; returns the exit code."""
+    """Print on standard error why a command has no result, and return the exit code."""
     text = isinstance(why, ImportError) and lacking(why) or str(why)
     sys.stdout.flush()
     sys.stderr.write('{}: {}\n'.format(command, text))

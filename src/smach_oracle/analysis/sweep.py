@@ -104,7 +104,7 @@ def _with_interval(count: Count) -> str:
 
 
 def save_figure(points: Sequence[SweepPoint], stem: str) -> List[str]:
-    """Draw interventions over memory to `stem`.svg and `stem`.png; returns the paths.
+    """Draw interventions over memory to `stem`.svg and `stem`.png, and return the paths.
 
     :raises OSError: where a file cannot be written.
     """
@@ -124,7 +124,7 @@ def by_label(points: Sequence[SweepPoint]) -> Dict[str, List[SweepPoint]]:
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     parser = argparse.ArgumentParser(prog='compare_oracles', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,

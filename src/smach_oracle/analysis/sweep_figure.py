@@ -14,7 +14,7 @@ LOOKS = ((BLUE, 'o', '-'), (VERMILLION, 's', '--'), (GREEN, '^', ':'), (BLACK, '
 
 
 def save(series: Mapping[str, Sequence[Any]], stem: str) -> List[str]:
-    """Draw the points of each series to `stem`.svg and `stem`.png; returns the paths.
+    """Draw the points of each series to `stem`.svg and `stem`.png, and return the paths.
 
     :raises OSError: where a file cannot be written.
     """

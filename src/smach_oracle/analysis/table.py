@@ -24,7 +24,10 @@ _INDENTED = (ANSWERED, NOT_ANSWERED)
 
 
 def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary] = ()) -> str:
-    """The table in the paper's form, each variant in full, and the causes; ends with a newline."""
+    """The table in the paper's form, each variant in full, and the causes.
+
+    It ends with a newline.
+    """
     lines = _paper_table(variants)
     for variant in variants:
         lines += [''] + _variant_lines(variant)
@@ -163,7 +166,7 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
 
 
 def _harm(truth: Optional[Truth]) -> List[Any]:
-    """The wrong object, and how often something came to harm; '' where that is not known."""
+    """The wrong object, and how often something came to harm, or '' where that is not known."""
     if truth is None or truth.damage is None:
         return ['', '']
     return [truth.wrong_object, len(truth.damage)]

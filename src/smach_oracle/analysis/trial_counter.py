@@ -24,7 +24,7 @@ class TrialEnding(Enum):
 
 
 class TrialCounter:
-    """The counts of one trial so far; its events are added in the order of their numbers."""
+    """The counts of one trial so far. Its events are added in the order of their numbers."""
 
     def __init__(self, failing: FailingNames = DEFAULT_FAILING) -> None:
         """`failing`: outcomes of the top machine that are failures."""
@@ -53,7 +53,9 @@ class TrialCounter:
 
     @property
     def recovers(self) -> Optional[bool]:
-        """With or without the oracle, as TRIAL_START has it; True where an oracle was at work.
+        """With or without the oracle, as TRIAL_START has it.
+
+        It is True where an oracle was at work.
 
         None where neither is recorded.
         """
@@ -64,13 +66,13 @@ class TrialCounter:
 
     @property
     def settings(self) -> Tuple[Tuple[str, Any], ...]:
-        """The oracle's settings, sorted; () where they are not recorded."""
+        """The oracle's settings, sorted, or () where they are not recorded."""
         stated = self._start.get('settings')
         return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
     @property
     def duration_s(self) -> float:
-        """s from the first to the last recorded event; `down_s` of it its program did not run."""
+        """s from the first to the last recorded event. `down_s` of it its program did not run."""
         return self._latest_s - self._earliest_s
 
     @property
@@ -86,7 +88,7 @@ class TrialCounter:
 
     @property
     def outcome(self) -> str:
-        """Outcome of the top machine; '' where it ended in an exception or is unfinished."""
+        """Outcome of the top machine, or '' where it ended in an exception or is unfinished."""
         return self._end.outcome if self._end is not None else ''
 
     @property

@@ -16,7 +16,7 @@ from .reading import read_bags, report_error, report_skipped
 from .trials import summarise
 
 SAME, NOT_THE_SAME = 0, 1  # exit codes
-# Who takes a question, and when, is the expert's affair; a warning may be of the network.
+# Who takes a question, and when, is the expert's affair. A warning may be of the network.
 LEFT_OUT = (EventKind.QUERY_CLAIMED, EventKind.QUERY_RELEASED, EventKind.WARNING)
 
 TrialStep = Tuple[object, ...]  # a kind of event, and its fields without times and names
@@ -77,7 +77,7 @@ def _first_difference(ours: Sequence[TrialStep], theirs: Sequence[TrialStep]) ->
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     parser = argparse.ArgumentParser(prog='same_trials', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folders', nargs=2, metavar='FOLDER', type=path_of,

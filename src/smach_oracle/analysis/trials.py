@@ -16,11 +16,11 @@ class TrialSummary(NamedTuple):
 
     trial_id: str
     experiment: str  # path of the top machine
-    recovers: Optional[bool]  # with (True) or without the oracle; None: it is not recorded
+    recovers: Optional[bool]  # with (True) or without the oracle. None means it is not recorded
     start_time: float  # s since the epoch, the machine's own clock
     duration_s: float  # from the first to the last recorded event
     ending: TrialEnding
-    outcome: str  # of the top machine; '' where it ended in an exception or is unfinished
+    outcome: str  # of the top machine, or '' where it ended in an exception or is unfinished
     failures: int
     recoveries: int  # of the oracle, without the expert
     questions: int  # to the expert
@@ -28,7 +28,7 @@ class TrialSummary(NamedTuple):
     failures_by_state: Tuple[Tuple[str, int], ...]  # 'PATH/STATE', sorted
     lost_events: int  # gaps in the numbering
     bags: Tuple[str, ...]
-    # of the oracle, sorted; () where they are not recorded
+    # of the oracle, sorted, or () where they are not recorded
     settings: Tuple[Tuple[str, Any], ...] = ()
     cause: Optional[RecordedCause] = None  # what a simulated world was given to fail with
     truth: Optional[Truth] = None  # how it ended, by the judge of a simulated world
@@ -55,7 +55,7 @@ class Trials(NamedTuple):
 
 
 def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) -> Trials:
-    """Read all bags in folders and below; those that cannot be used are listed with the reason.
+    """Read all bags in folders and below. Those that cannot be used are listed with the reason.
 
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.

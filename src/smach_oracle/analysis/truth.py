@@ -11,7 +11,7 @@ from .bag_events import BagError
 
 TRUTH_FILE = 'truth.jsonl'
 # by name: the types that are allowed, and their name
-DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds; each lists names of things
+DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds. Each lists names of things
 Allowed = Mapping[str, Tuple[Tuple[type, ...], str]]
 _FIELDS: Allowed = {
     'seed': ((int,), 'an int'), 'task': ((str,), 'a str'), 'success': ((bool,), 'a bool'),
@@ -33,7 +33,7 @@ class Truth(NamedTuple):
     wall_s: float  # time that it took
     share: Mapping[str, float]  # of wall_s, per part of the simulation
     wrong_object: str = ''  # another thing than the task's own that was brought to the goal
-    # kind (one of DAMAGE) and thing, once for each time; None: the line is older than that
+    # kind (one of DAMAGE) and thing, once for each time. None means the line is older than that
     damage: Optional[Tuple[Tuple[str, str], ...]] = None
 
     @property
@@ -43,7 +43,7 @@ class Truth(NamedTuple):
 
 
 def read_truth(path: str) -> Dict[int, Truth]:
-    """The lines of a truth file by seed; if a seed appears twice, the later line is used.
+    """The lines of a truth file by seed. If a seed appears twice, the later line is used.
 
     A last line that was cut off in its writing is skipped.
 
@@ -120,7 +120,7 @@ class TruthFiles:
         self._read: Dict[str, Dict[int, Truth]] = {}
 
     def of(self, folder: str, seed: Optional[int]) -> Optional[Truth]:
-        """The truth of the trial with that seed recorded in that folder; None where there is none.
+        """The truth of the trial with that seed in that folder, or None where there is none.
 
         :raises BagError: where the file cannot be used.
         """

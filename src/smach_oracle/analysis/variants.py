@@ -45,7 +45,7 @@ class Count(NamedTuple):
     share: float  # of the trials in which it is known, 0 to 1
     interval: Interval  # 95% Wilson score interval of the share, over trials
     events: Optional[int]  # None where it happens at most once a trial
-    # 95% t interval of the mean share; None for fewer than two replicates
+    # 95% t interval of the mean share, or None for fewer than two replicates
     over_replicates: Optional[Interval] = None
 
 
@@ -102,7 +102,7 @@ def find_variants(trials: Sequence[TrialSummary]) -> List[VariantTrials]:
 
 def _by_settings(experiment: str, name: str, recovers: Optional[bool],
                  trials: Sequence[TrialSummary]) -> List[VariantTrials]:
-    """One variant for each settings of the oracle, named by what differs; one without oracle."""
+    """One variant for each settings of the oracle, named by what differs, one without oracle."""
     parts: Dict[SettingsKey, List[TrialSummary]] = {}
     for trial in trials:
         parts.setdefault(_settings_key(trial) if recovers else (), []).append(trial)
@@ -192,7 +192,7 @@ def _found(holds: Callable[[bool, bool], bool]) -> Callable[[TrialSummary], bool
 
 def make_count(name: str, happened: Callable[[TrialSummary], bool], trials: Sequence[TrialSummary],
                parts: Sequence[Sequence[TrialSummary]]) -> Count:
-    """In how many trials something happened, of at least one; `parts`: the same by replicate."""
+    """In how many trials something happened, of at least one. `parts`: the same by replicate."""
     number = sum(map(happened, trials))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
     return Count(name, number, number / len(trials), wilson_interval(number, len(trials)), None,

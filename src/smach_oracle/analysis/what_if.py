@@ -90,7 +90,7 @@ class Replay:
         self._go_on: Set[str] = set()  # those that ran when the program was stopped
 
     def take(self, event: Event) -> Optional[str]:
-        """Follow one event; returns the action at a DECISION ('not known' included), else None."""
+        """Follow one event. Return the action at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
         elif event.kind == EventKind.RESUMED:
@@ -226,7 +226,7 @@ def _policy_of(settings: Mapping[str, Any]) -> Policy:
 
 
 def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return the recorded settings with others; another policy has the parameters it comes with."""
+    """Return the recorded settings with others. Another policy has the parameters it comes with."""
     kept = {key: value for key, value in recorded.items()
             if 'policy' not in settings or not key.startswith('policy.')}
     return {**kept, **settings}
@@ -348,7 +348,7 @@ def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,

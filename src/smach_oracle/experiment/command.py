@@ -131,7 +131,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def parse(argv: Optional[List[str]]) -> argparse.Namespace:
-    """Parse the command line; `args.plan` is the experiment.
+    """Parse the command line. `args.plan` is the experiment.
 
     A wrong one ends the process, and so does an empty one.
     """
@@ -255,7 +255,7 @@ def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> Lis
 
 
 def freeze_seeds(args: argparse.Namespace) -> int:
-    """Freeze the protocol, or abandon the last freeze; returns the exit code."""
+    """Freeze the protocol, or abandon the last freeze, and return the exit code."""
     what = ABANDONED if args.freeze is None else FROZEN
     note = args.abandon_freeze if args.freeze is None else args.freeze
     try:
@@ -267,7 +267,7 @@ def freeze_seeds(args: argparse.Namespace) -> int:
 
 
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:
-    """Print the tables, draw the figures, name what was lost; returns the exit code."""
+    """Print the tables, draw the figures, name what was lost, and return the exit code."""
     places = [str(output / name) for name in dict.fromkeys(job.variant.name for job in jobs)]
     code = bag_statistics.main(places + [
         '--figure',

@@ -114,7 +114,7 @@ def checkout() -> Path:
 
 
 def run_freeze(root: Path, what: str, note: str) -> str:
-    """Freeze, or abandon the last freeze; returns the seeds, as a text to print.
+    """Freeze, or abandon the last freeze, and return the seeds, as a text to print.
 
     :param what: FROZEN or ABANDONED.
     :raises ExperimentError: as frozen_seeds() and last_freeze() do, and without a note.

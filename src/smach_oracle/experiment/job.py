@@ -23,7 +23,7 @@ LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a tri
 
 
 class ExperimentJob:
-    """Runs until all its trials are complete or lost; a trial may fail without failing the job."""
+    """Runs until all its trials are complete or lost. A trial may fail without failing the job."""
 
     def __init__(self, plan: ExperimentPlan, variant: Variant, replicate: int, output: Path,
                  hung_after_s: float) -> None:
@@ -119,7 +119,7 @@ class ExperimentJob:
         }
 
     def watch(self) -> None:
-        """Take in new trials; start again after a trial in which something hung or died.
+        """Take in new trials. Start again after a trial in which something hung or died.
 
         :raises ExperimentError: where this does not help.
         """

@@ -15,7 +15,7 @@ from typing import IO, Any, Dict, List, Mapping, Optional
 
 LOG_FILE = 'launch.log'
 MARK = 'SMACH_ORACLE_JOB'  # in the environment of every process of a job: the job's folder
-# s, before roslaunch kills a node that does not end; on a busy machine the world takes some for the
+# s, before roslaunch kills a node that does not end. On a busy machine the world takes some for the
 # last trial's line of truth
 NODE_STOP = ['--sigint-timeout', '15', '--sigterm-timeout', '2']
 STOP_S = 40.0  # for roslaunch to do so with the nodes, rosout and the master, one after the other
@@ -88,7 +88,7 @@ def environment_of(folder: Path, port: int) -> Dict[str, str]:
 
 
 def size_of(log: Path) -> int:
-    """Bytes; 0 where there is none."""
+    """Bytes, or 0 where there is none."""
     try:
         return log.stat().st_size
     except OSError:
@@ -96,7 +96,7 @@ def size_of(log: Path) -> int:
 
 
 def last_words(log: Path, count: int = 6) -> str:
-    """The last lines of a log, each on a line of its own; '' where there is none."""
+    """The last lines of a log, each on a line of its own, or '' where there is none."""
     if not log.exists():
         return ''
     lines = [
@@ -132,7 +132,7 @@ def free_port() -> int:
 
 
 def given_by_chance() -> range:
-    """The ports that the system gives by itself; those of Linux where that cannot be read."""
+    """The ports that the system gives by itself. Those of Linux where that cannot be read."""
     try:
         first, last = map(int, GIVEN_BY_CHANCE.read_text(encoding='ascii').split())
     except (OSError, ValueError):

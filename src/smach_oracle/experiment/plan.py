@@ -21,11 +21,11 @@ PACKAGES = ('pybullet', 'ompl', 'numpy', 'scipy', 'opencv-python-headless', 'exa
 
 
 class ExperimentError(Exception):
-    """The experiment cannot be run; the text says which part of it, why and where its log is."""
+    """The experiment cannot be run. The text says which part of it, why and where its log is."""
 
 
 class Variant(NamedTuple):
-    """Trials under the same oracle, or without one; its name is that of its folder."""
+    """Trials under the same oracle, or without one. Its name is that of its folder."""
 
     name: str
     recovers: bool
@@ -42,11 +42,11 @@ class ExperimentPlan(NamedTuple):
     variants: Tuple[Variant, ...]
     answer_delay: float  # s
     benign: bool = False  # worlds without causes to fail
-    lasting: Optional[float] = None  # share of the causes that last; None: the world's own
-    hours: Optional[float] = None  # of a world that goes on; None: each trial has a fresh one
+    lasting: Optional[float] = None  # share of the causes that last. None means the world's own
+    hours: Optional[float] = None  # of a world that goes on. None means each trial has a fresh one
 
     def first_seed(self, replicate: int) -> int:
-        """Seed of the first trial of a replicate (from 0); each next trial has the next seed."""
+        """Seed of the first trial of a replicate (from 0). Each next trial has the next seed."""
         return self.seed + replicate * self.trials
 
     def as_data(self) -> Dict[str, Any]:
@@ -142,7 +142,7 @@ def _refuse_another(path: Path, plan: ExperimentPlan) -> None:
 
 
 def setting_text(value: Any) -> str:
-    """A setting for an error's text; variants by their names and settings."""
+    """A setting for an error's text. Variants by their names and settings."""
     if isinstance(value, list):
         return ', '.join('{} {}'.format(variant['name'], variant['settings'] or '').strip()
                          for variant in value)

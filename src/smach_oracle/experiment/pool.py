@@ -35,7 +35,7 @@ class PoolResult(NamedTuple):
 
 def run(plan: ExperimentPlan, output: Path, at_a_time: int,
         hung_after_s: float) -> List[ExperimentJob]:
-    """Run the jobs of an experiment that are not over, some at a time; returns them all.
+    """Run the jobs of an experiment that are not over, some at a time, and return them all.
 
     :raises ExperimentError: naming the job and its folder.
     :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
@@ -56,7 +56,7 @@ def run_parts(parts: Sequence[Part], output: Path, at_a_time: int,
               hung_after_s: float) -> PoolResult:
     """Run the jobs of all parts that are not over, the longest first.
 
-    A job that cannot go on costs its replicate; the others go on.
+    A job that cannot go on costs its replicate. The others go on.
 
     :param output: each part gets a folder in it.
     :raises ExperimentError: where a folder cannot be gone on with, or job after job breaks.
@@ -102,7 +102,7 @@ def _longest_first(jobs: Sequence[ExperimentJob]) -> List[ExperimentJob]:
 
 
 def stop_all(jobs: Sequence[ExperimentJob]) -> None:
-    """End the processes of every job; of several errors the first is raised, after all."""
+    """End the processes of every job. Of several errors the first is raised, after all."""
     for job in jobs:
         job.request_stop()
     errors: List[Exception] = []
@@ -119,7 +119,7 @@ def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals
              progress: ProgressLine, broken: Optional[Dict[str, str]] = None) -> None:
     """Start the jobs one after the other and wait for their ends.
 
-    :param broken: gets the jobs that cannot go on, and why; None: the first such is raised.
+    :param broken: gets the jobs that cannot go on, and why. None means the first such is raised.
     :raises ExperimentError: likewise, and where jobs break before any trial has ended.
     """
     waiting = [job for job in jobs if not job.over]

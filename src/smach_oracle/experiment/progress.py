@@ -73,7 +73,7 @@ class PoolProgress(ProgressLine):
 
 
 def time_left(elapsed_s: float, done: int, missing: int) -> str:
-    """E.g. "   12 min left"; nothing where nothing can be said yet."""
+    """E.g. "   12 min left", or nothing where nothing can be said yet."""
     if not done or not missing:
         return ''
     left_s = elapsed_s / done * missing

@@ -65,7 +65,7 @@ def run_protocol(args: argparse.Namespace, output: Path) -> Tuple[int, str]:
 def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
     """Return what would be run, and how long it takes.
 
-    :param output: the experiment's folder, whose rows count as done; None: there is none yet.
+    :param output: the experiment's folder, whose rows count as done. None means there is none yet.
     """
     lines = ['{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
         'part', 'seeds from', 'replicates', 'trials', 'done', 'one by one', 'variants')]

@@ -18,7 +18,7 @@ BLOCK_OF = dict(zip(('pick_and_place', 'drink_retrieval', 'persistence', 'memory
 
 
 class Part(NamedTuple):
-    """One part; its name is that of its folder below the protocol's."""
+    """One part. Its name is that of its folder below the protocol's."""
 
     name: str
     plan: ExperimentPlan

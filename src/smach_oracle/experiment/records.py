@@ -29,7 +29,7 @@ class RecordedTrial(NamedTuple):
     """One trial, from its bag."""
 
     summary: TrialSummary
-    learned: Optional[Mapping[str, Any]]  # at its end; None where the bag lacks it
+    learned: Optional[Mapping[str, Any]]  # at its end, or None where the bag lacks it
 
 
 class JobProgress(NamedTuple):
@@ -43,7 +43,7 @@ class JobProgress(NamedTuple):
 
 
 class KeptTrials(NamedTuple):
-    """Trials from the first one on that a job keeps rows of; they may have no bags here."""
+    """Trials from the first one on that a job keeps rows of. They may have no bags here."""
 
     numbers: List[int]
     lost: Dict[int, str]  # number of the trial, from 0: why
@@ -76,7 +76,7 @@ class ReplicateRecords:
         folder.mkdir(parents=True, exist_ok=True)
 
     def tidy_up(self, kept: KeptTrials = NONE_KEPT) -> JobProgress:
-        """Put aside what is not complete, and prepare to go on; only while nothing runs.
+        """Put aside what is not complete, and prepare to go on. Only while nothing runs.
 
         Afterwards there are the bags and the truth of complete trials, and the rates as the last
         one left them. Trials of `kept` count without a bag where all bags come behind them.
@@ -119,7 +119,7 @@ class ReplicateRecords:
         return cause.seed - self._first_seed if cause is not None else 0
 
     def read(self, path: str) -> Optional[RecordedTrial]:
-        """The trial of a bag; None where the bag cannot be read, or is not of one trial."""
+        """The trial of a bag, or None where the bag cannot be read, or is not of one trial."""
         try:
             content = self._reader.read(path)
         except BagError:

@@ -26,7 +26,7 @@ RESULTS_FILE = 'results.csv'
 
 
 def code_version() -> str:
-    """Return the commit of the code that runs, '-dirty' behind it; '' where there is none."""
+    """Return the commit of the code that runs, '-dirty' behind it, or '' where there is none."""
     try:
         return subprocess.run(
             ['git', 'describe', '--always', '--dirty', '--abbrev=12'], check=True,
@@ -85,7 +85,7 @@ class JobResults:
         return [self._rows[seed] for seed in sorted(self._rows)]
 
     def last_left(self) -> Optional[Mapping[str, Any]]:
-        """Return how the last trial left a world that goes on; None: none has ended.
+        """Return how the last trial left a world that goes on. None means none has ended.
 
         :raises ExperimentError: where a row does not tell.
         """
@@ -98,7 +98,7 @@ class JobResults:
                       if seed < self._first_seed + number}
 
     def add(self, trials: Sequence[RecordedTrial], lost: Mapping[int, str], truth: Path) -> None:
-        """Append the rows of trials that have none; `lost`: why, by number of the trial.
+        """Append the rows of trials that have none. `lost`: why, by number of the trial.
 
         A trial that tells no seed has no row.
 

@@ -36,7 +36,7 @@ class QuestionSource(Protocol):
     """The open questions and their servers, such as a FrontEnd knows them."""
 
     def find(self, key: str) -> Optional[ListedQuestion]:
-        """One open question by its key; None where it is open no longer."""
+        """One open question by its key, or None where it is open no longer."""
 
     def server(self, listed: ListedQuestion) -> ClaimServer:
         """The server of a question.
@@ -53,7 +53,7 @@ class _KeptClaim(NamedTuple):
 class ClaimKeeper:
     """Renews claims three times a lease until they are dropped or lost. Any thread.
 
-    Several holders may have the same claim, such as two pages of one expert; each is a number of
+    Several holders may have the same claim, such as two pages of one expert. Each is a number of
     the caller's choice.
     """
 
@@ -79,7 +79,10 @@ class ClaimKeeper:
             self._kept.setdefault(claim, _KeptClaim(listed, set())).holders.add(holder)
 
     def leave(self, claim: Claim, holder: int) -> bool:
-        """Take a holder from a claim; whether no other is left, and it is renewed no longer."""
+        """Take a holder from a claim.
+
+        Return whether no other is left, and it is renewed no longer.
+        """
         with self._lock:
             kept = self._kept.get(claim)
             if kept is None:
@@ -90,12 +93,15 @@ class ClaimKeeper:
             return not kept.holders
 
     def leave_all(self, holder: int) -> None:
-        """Take a holder from all claims; those that no other holds run out."""
+        """Take a holder from all claims. Those that no other holds run out."""
         for claim in self.held:
             self.leave(claim, holder)
 
     def drop(self, claim: Claim) -> bool:
-        """Renew a claim no longer, whatever its holders; whether it was renewed until now."""
+        """Renew a claim no longer, whatever its holders.
+
+        Return whether it was renewed until now.
+        """
         with self._lock:
             return self._kept.pop(claim, None) is not None
 
@@ -104,7 +110,7 @@ class ClaimKeeper:
         self._stopped.set()
 
     def renew(self) -> None:
-        """Renew all claims once; a server that hangs costs no claim of the others."""
+        """Renew all claims once. A server that hangs costs no claim of the others."""
         held = self.held
         for claim in set(self._missed) - set(held):
             del self._missed[claim]
@@ -120,7 +126,7 @@ class ClaimKeeper:
             self.renew()
 
     def _renew(self, claim: Claim) -> None:
-        """Drop a claim that is lost or whose question is closed; keep it while its server hangs."""
+        """Drop a claim that is lost or whose question is closed. Keep it while its server hangs."""
         listed = self._questions.find(claim.question)
         # closed, or its server is being restarted: then its expert claims it again
         if listed is None:

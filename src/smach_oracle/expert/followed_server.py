@@ -24,7 +24,7 @@ _HANGING_S = 15.0
 
 
 class ListedQuestion(NamedTuple):
-    """An open question as last heard of; times are this process's monotonic clock's, in seconds."""
+    """An open question as last heard of. Times are this process's monotonic clock's, in seconds."""
 
     server: str
     goal: ExpertQueryGoal
@@ -43,7 +43,7 @@ class ListNews(NamedTuple):
     """When a server spoke last."""
 
     came_s: float  # by this process's monotonic clock
-    stamp_s: float  # by the server's ROS clock; 0 where that does not run yet
+    stamp_s: float  # by the server's ROS clock, or 0 where that does not run yet
 
 
 class FollowedServer:
@@ -73,14 +73,14 @@ class FollowedServer:
 
     @property
     def news(self) -> Optional[ListNews]:
-        """When its list came last; None before the first.
+        """When its list came last, or None before the first.
 
         While a question is open the list comes every second.
         """
         return self._news
 
     def questions(self) -> List[ListedQuestion]:
-        """The open questions, oldest first; none while the server is gone."""
+        """The open questions, oldest first. None while the server is gone."""
         known = self._questions
         if self.connected:
             return list(known)
@@ -99,7 +99,7 @@ class FollowedServer:
                           limit_s)
 
     def answer(self, query_id: str, decision: ExpertDecision) -> AnswerQueryResponse:
-        """Call the answer service; asking the same twice does no harm.
+        """Call the answer service. Asking the same twice does no harm.
 
         :raises ServerGoneError: if there is no such service now, or no answer within 5 s.
         """

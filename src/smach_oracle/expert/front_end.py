@@ -15,12 +15,12 @@ from .followed_server import FollowedServer, ListedQuestion, ListNews
 
 _DISCOVERY_PERIOD_S = 2.0
 _FORGET_S = 600.0  # after which a server that was found, and is gone, is followed no longer
-# for giving back claims at the end; a server or master that hangs does not hold it up
+# for giving back claims at the end. A server or master that hangs does not hold it up
 _FAREWELL_S = 1.0
 
 
 class FrontEnd:
-    """Open questions, claims and answers for one expert; may be used from any thread.
+    """Open questions, claims and answers for one expert. May be used from any thread.
 
     Without names of servers it follows every topic of type smach_oracle/OpenQueries that the master
     knows, now or later.
@@ -56,7 +56,7 @@ class FrontEnd:
         return followed is not None and followed.connected
 
     def news(self, server: str) -> Optional[ListNews]:
-        """When the server's list came last; None before the first."""
+        """When the server's list came last, or None before the first."""
         followed = self._servers.get(server)
         return followed.news if followed is not None else None
 
@@ -72,7 +72,7 @@ class FrontEnd:
     def wait_for_change(self, version: int, timeout_s: float) -> int:
         """Block until a list has come since `version`, or the time is over.
 
-        :param version: returned by an earlier call; begin with 0.
+        :param version: returned by an earlier call. Begin with 0.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._version != version or self._stopped.is_set(),
@@ -92,7 +92,7 @@ class FrontEnd:
         return response
 
     def release(self, listed: ListedQuestion) -> None:
-        """Give a claim back; a server that cannot be reached lets it run out."""
+        """Give a claim back. A server that cannot be reached lets it run out."""
         if not self._claims.drop(Claim(listed.key, self.expert)):
             return
         try:
@@ -101,9 +101,9 @@ class FrontEnd:
             rospy.logdebug('A claim was not given back: %s', err)
 
     def answer(self, listed: ListedQuestion, decision: ExpertDecision) -> AnswerQueryResponse:
-        """Settle a question under this expert's name; a refused answer leaves a claim as it is.
+        """Settle a question under this expert's name. A refused answer leaves a claim as it is.
 
-        :raises ServerGoneError: if its server cannot be reached; the same answer may be sent again.
+        :raises ServerGoneError: if its server cannot be reached. The same answer may be sent again.
         """
         decision.by = self.expert
         response = self.server(listed).answer(listed.goal.query_id, decision)

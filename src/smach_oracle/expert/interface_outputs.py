@@ -14,7 +14,7 @@ class InterfaceOutputs:
     """Follows `<robot>/interface_output` of robots and holds the newest message of each."""
 
     def __init__(self, query_id: str = '') -> None:
-        """`query_id`: of the only question whose interface is followed; '' follows all."""
+        """`query_id`: of the only question whose interface is followed. '' follows all."""
         self._query_id = query_id
         self._topics = RobotTopics(TOPIC, InterfaceOutput, self.taker, queue_size=5)
         self._lock = threading.Lock()
@@ -25,7 +25,7 @@ class InterfaceOutputs:
         self._topics.follow(robots)
 
     def newest(self, query_id: str) -> Optional[InterfaceOutput]:
-        """The newest message about a question; None where nothing was started for it."""
+        """The newest message about a question, or None where nothing was started for it."""
         with self._lock:
             return next((each for each in self._newest.values() if each.query_id == query_id), None)
 

@@ -10,7 +10,7 @@
     })
 
 A key is the label of the failed state, alone or behind its container path, which is the more
-specific one; `default` is for all others. The same questions in the same order get the same
+specific one. `default` is for all others. The same questions in the same order get the same
 answers. A question about a state that still runs is ignored: rules are for failures.
 """
 import math
@@ -73,7 +73,7 @@ class Rule(NamedTuple):
         return choice.state == self.state and self.container in ('', choice.container)
 
     def answer(self, by: str) -> Answer:
-        """The answer; a rule that ignores has none.
+        """The answer. A rule that ignores has none.
 
         :raises KeyError: for a rule that ignores.
         """
@@ -99,7 +99,7 @@ class Rules:
         return cls({state: _parse_rules(state, value) for state, value in settings.items()})
 
     def next(self, robot: str, trial_id: str, container_path: str, state: str) -> Rule:
-        """The rule for one more question; each call counts."""
+        """The rule for one more question. Each call counts."""
         path = '{}/{}'.format(container_path, state)
         keys = (path, '/'.join([OLD_NAME] + path.split('/')[1:]), state, DEFAULT)
         rules = next((self._by_state[key] for key in keys if key in self._by_state), ())
@@ -144,7 +144,7 @@ class RuleExpert(Expert):
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Call the function of that name; None where there is none."""
+        """Call the function of that name. Return None where there is none."""
         progress('interface_start', offer.name, '')
         run = self._interfaces.get(offer.name)
         answer: Optional[Answer] = run(

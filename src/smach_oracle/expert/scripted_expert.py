@@ -31,7 +31,7 @@ class _PlannedAnswer(NamedTuple):
 
     listed: ListedQuestion
     rule: Rule
-    due_s: float  # monotonic; infinity for a question left to others
+    due_s: float  # monotonic, or infinity for a question left to others
 
 
 class ScriptedExpert:
@@ -51,7 +51,7 @@ class ScriptedExpert:
         self._thread.start()
 
     def stop(self) -> None:
-        """Answer nothing any more; the front end is stopped too."""
+        """Answer nothing any more. The front end is stopped too."""
         self._stopped = True
         self._front_end.stop()
         self._thread.join(0.5)  # it may be waiting for a server that does not answer
@@ -140,7 +140,7 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
 
 
 def servers_of(value: object) -> List[str]:
-    """Names of servers from a text, separated by spaces, or a list; none for all that there are.
+    """Names of servers from a text, separated by spaces, or a list. None for all that there are.
 
     :raises SettingsError: for anything else.
     """

@@ -1,6 +1,6 @@
 """Failures and events in words, for every front end. Pure.
 
-Text that a robot has sent comes out of `clean` fit for a terminal; a page shows it as text, never
+Text that a robot has sent comes out of `clean` fit for a terminal. A page shows it as text, never
 as markup.
 """
 import json
@@ -21,7 +21,7 @@ def clean(text: str, lines: bool = False) -> str:
 
 
 def still_runs(goal: ExpertQueryGoal) -> bool:
-    """Whether a question is about a state that still runs; GOTO that state is to wait on."""
+    """Whether a question is about a state that still runs. GOTO that state is to wait on."""
     return bool(goal.failure_kind == ExpertQueryGoal.STILL_RUNNING)
 
 
@@ -59,7 +59,7 @@ def _jumps_to(event: Union[OracleEvent, Event]) -> str:
 
 
 def next_step_words(event: Union[OracleEvent, Event]) -> str:
-    """An event that follows an answer, as a sentence; '' for events of other kinds."""
+    """An event that follows an answer, as a sentence, or '' for events of other kinds."""
     state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
     path = clean(event.path)
     return {
@@ -117,7 +117,7 @@ def event_words(event: Event) -> str:
 
 
 def _decision(event: Event) -> str:
-    """The sentence that the oracle made; bags of 0.1 have none."""
+    """The sentence that the oracle made. Bags of 0.1 have none."""
     if event.text and DECIDED_BY in (event.data or {}):
         return clean(event.text) + '.'
     return 'The oracle decides: {}{}.'.format(event.outcome.replace('_', ' '),

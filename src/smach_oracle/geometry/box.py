@@ -13,10 +13,10 @@ ROUND = 0.86
 
 
 class UprightBox(NamedTuple):
-    """A box that stands upright; its x axis is turned by `yaw`."""
+    """A box that stands upright. Its x axis is turned by `yaw`."""
 
     centre: np.ndarray  # (3,) m
-    # (3,) m, along its own axes; x is not shorter than y, except where it is round
+    # (3,) m, along its own axes. X is not shorter than y, except where it is round
     size: np.ndarray
     yaw: float  # rad, within a quarter turn of 0
 
@@ -65,7 +65,7 @@ def _spans(values: np.ndarray, trim: float) -> Tuple[np.ndarray, np.ndarray]:
 def _heading(flat: np.ndarray) -> float:
     """Direction of the longer side of the tightest rectangle, in (-pi/2, pi/2].
 
-    :returns: rad; 0 for something round.
+    :returns: rad, or 0 for something round.
     """
     flat = outer_points(flat)
     try:

@@ -26,7 +26,7 @@ class JointChain:
     """
 
     def __init__(self, joints: List[Joint], fixed: Mapping[str, float]) -> None:
-        """See from_urdf; `joints` are all of those between root and tip, with the fixed ones."""
+        """See from_urdf. `joints` are all of those between root and tip, with the fixed ones."""
         moving: List[Tuple[np.ndarray, Joint]] = []
         before = np.eye(4)
         for joint in joints:
@@ -106,12 +106,12 @@ class JointChain:
                 iterations: int = 50) -> Optional[np.ndarray]:
         """Joint positions that take the tip to `pose`, within the limits.
 
-        :param pose: 4x4, root from tip; reached to 1 mm and 0.3 degrees.
-        :param seed: (n,), where to start; continuous joints end within half a turn of it.
-        :param generator: draws further starts, tried at the same time; None: the seed alone, so
-            that the solution is the one next to it.
-        :returns: (n,), the solution found first (the one nearest to the seed, where several were);
-            None where there was none.
+        :param pose: 4x4, root from tip, reached to 1 mm and 0.3 degrees.
+        :param seed: (n,), where to start. Continuous joints end within half a turn of it.
+        :param generator: draws further starts, tried at the same time. None means the seed alone,
+            so that the solution is the one next to it.
+        :returns: (n,), the solution found first (the one nearest to the seed, where several were),
+            or None where there was none.
         :raises ValueError: for a pose or seed that is not finite.
         """
         found = self._solve(pose, seed, generator, restarts, iterations, first=True)
@@ -164,7 +164,7 @@ class JointChain:
         return solved[order]
 
     def _descend(self, pose: np.ndarray, q: np.ndarray, iterations: int, first: bool) -> np.ndarray:
-        """Levenberg-Marquardt from all starts (k, n) at once; those that arrived (m, n)."""
+        """Levenberg-Marquardt from all starts (k, n) at once, those that arrived (m, n)."""
         arrived: List[np.ndarray] = []
         for _ in range(iterations):
             frames, tips = self._frames(q)
@@ -199,7 +199,7 @@ class JointChain:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products over the last axis; most of np.cross's time goes into its checks."""
+    """Cross products over the last axis. Most of np.cross's time goes into its checks."""
     return np.stack([
         a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
         a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2], a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
@@ -212,7 +212,7 @@ def _check_finite(poses: np.ndarray, seed: np.ndarray) -> None:
 
 
 def _is_there(error: np.ndarray) -> np.ndarray:
-    """(k,) whether a tip is where it should be; `error` as _error() has it."""
+    """(k,) whether a tip is where it should be. `error` as _error() has it."""
     there: np.ndarray = ((np.linalg.norm(error[:, :3], axis=1) < POSITION_TOLERANCE)
                          & (np.linalg.norm(error[:, 3:], axis=1) < ANGLE_TOLERANCE))
     return there

@@ -28,9 +28,9 @@ class Joint(NamedTuple):
     child: str
     origin: np.ndarray  # 4x4, parent from joint at zero
     axis: np.ndarray  # (3,), unit length, in the joint's frame
-    lower: float  # rad or m; -inf for a continuous joint
+    lower: float  # rad or m, or -inf for a continuous joint
     upper: float  # likewise, or inf
-    velocity: float  # rad/s or m/s, the limit; inf where none is given
+    velocity: float  # rad/s or m/s, the limit, or inf where none is given
     # (3, 4, 4): the motion at q is parts[0] + sin q * parts[1] + cos q * parts[2], of a joint that
     # slides parts[0] + q * parts[1]
     parts: np.ndarray
@@ -53,7 +53,7 @@ class Joint(NamedTuple):
     def position(self, positions: Mapping[str, float]) -> float:
         """Where it stands, in rad or m.
 
-        :param positions: rad or m by joint; a joint that is missing goes with the one that it
+        :param positions: rad or m by joint. A joint that is missing goes with the one that it
             mimics, else it stands at zero.
         """
         if self.name in positions:
@@ -109,7 +109,7 @@ def _joints_of(urdf: str) -> Mapping[str, Joint]:
 
 
 def origin_of(element: ElementTree.Element) -> np.ndarray:
-    """4x4 of the <origin> of a joint, a shape or an inertia; the identity where it has none.
+    """4x4 of the <origin> of a joint, a shape or an inertia. The identity where it has none.
 
     :raises ValueError: where its place or its angles are not three numbers.
     """

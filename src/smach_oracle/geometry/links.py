@@ -11,7 +11,7 @@ def link_poses(joints: Sequence[Joint], root: str,
     """4x4 by link: `root` from it.
 
     :param joints: below `root`, every link's after that of the link that it hangs on.
-    :param positions: rad or m by joint; joints that are missing go with those that they mimic, or
+    :param positions: rad or m by joint. Joints that are missing go with those that they mimic, or
         stand at zero.
     """
     poses = {root: np.eye(4)}
@@ -42,7 +42,7 @@ def joints_between(joints: Mapping[str, Joint], root: str, link: str) -> List[st
 
 
 def joints_down(joints: Mapping[str, Joint], root: str, link: str) -> List[Joint]:
-    """All joints on the way from `root` to `link`, in this order; fixed ones are among them.
+    """All joints on the way from `root` to `link`, in this order. Fixed ones are among them.
 
     :param joints: as `joints.read_joints` gives them, by the link that each carries.
     :raises ValueError: where `link` does not hang below `root`.

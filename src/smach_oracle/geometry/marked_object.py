@@ -24,9 +24,9 @@ def object_above(points: np.ndarray, surface: Optional[Plane],
 
     It is the largest connected piece.
 
-    :param surface: what it stands on, where that is known; else it reaches down to its lowest
+    :param surface: what it stands on, where that is known, else it reaches down to its lowest
         points.
-    :param clearance: m above the surface; lower points belong to that.
+    :param clearance: m above the surface. Lower points belong to that.
     :returns: None where no point is left.
     """
     chosen = np.ones(len(points), bool)

@@ -21,7 +21,7 @@ _DEEPEST = 60  # nodes of a COLLADA scene within each other
 
 
 class MeshError(ValueError):
-    """A file without a usable mesh; the text gives the reason and quotes nothing of the file."""
+    """A file without a usable mesh. The text gives the reason and quotes nothing of the file."""
 
 
 class Mesh(NamedTuple):
@@ -93,7 +93,7 @@ def _merged(mesh: Mesh, cell: float) -> Mesh:
 
     Triangles that collapse are left out.
 
-    :param cell: m; 0: corners at the same place.
+    :param cell: m. 0 means corners at the same place.
     """
     corners = mesh.corners
     low, span = corners.min(axis=0), float(np.ptp(corners, axis=0).max())

@@ -12,7 +12,7 @@ PATCH_CELL = 0.02  # m, of the grid in which a surface is connected
 PATCH_SHARE = 0.1  # of the points of the largest piece that another one must have to count
 CLUSTER_CELL = 0.01  # m: things closer than this to each other are one piece
 LEAST_POINTS = 60  # of a thing
-FARTHEST = 6.0  # m from the first corner; whatever is further away is taken to be there
+FARTHEST = 6.0  # m from the first corner. Whatever is further away is taken to be there
 
 
 def piece_labels(points: np.ndarray, cell: float) -> np.ndarray:
@@ -60,7 +60,7 @@ def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: flo
     Few points are taken for noise.
 
     :param points: (n, 3), m, all finite.
-    :param patch: (m, 3) points of the surface; things stand within its convex hull.
+    :param patch: (m, 3) points of the surface. Things stand within its convex hull.
     :param lowest: m above the surface from which points count, up to `highest`.
     :param margin: m that things must stand inside the hull.
     """

@@ -30,8 +30,8 @@ class Shape(NamedTuple):
     link: str
     kind: str  # box, cylinder, sphere or mesh
     origin: np.ndarray  # 4x4, link from shape
-    size: np.ndarray  # (3,): m, extents; of a mesh the factors by which it is scaled
-    mesh: str  # file name as the URDF has it; '' for others
+    size: np.ndarray  # (3,): m, extents. Of a mesh the factors by which it is scaled
+    mesh: str  # file name as the URDF has it, or '' for others
     colour: Colour
 
 
@@ -41,7 +41,7 @@ class RobotShapes(NamedTuple):
     name: str
     root: str  # the link on which all others hang
     joints: List[Joint]  # every link's after that of the link that it hangs on
-    shapes: List[Shape]  # as the robot looks; where a link has no looks, what it collides with
+    shapes: List[Shape]  # as the robot looks. Where a link has no looks, what it collides with
     # of links that have looks: what may stand for a mesh that cannot be had
     collisions: List[Shape]
 
@@ -53,7 +53,7 @@ class RobotShapes(NamedTuple):
     def poses(self, positions: Mapping[str, float]) -> Dict[str, np.ndarray]:
         """4x4 by link: the root from it.
 
-        :param positions: rad or m by joint; joints that are missing go with those that they mimic,
+        :param positions: rad or m by joint. Joints that are missing go with those that they mimic,
             or stand at zero.
         """
         return link_poses(self.joints, self.root, positions)
@@ -176,7 +176,7 @@ def _numbers(where: str, element: Optional[ElementTree.Element], name: str, defa
 
 
 def _materials(root: ElementTree.Element) -> Dict[str, Colour]:
-    """Colours by name; the first definition counts."""
+    """Colours by name. The first definition counts."""
     known: Dict[str, Colour] = {}
     for material in root.iter('material'):
         if material.find('color') is not None and material.get('name'):

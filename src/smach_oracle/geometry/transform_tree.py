@@ -20,7 +20,7 @@ class TransformTree:
     """Moving and fixed links of a robot description.
 
     :param urdf: its text.
-    :param measured: joints whose positions are known at any time; the others stay at zero.
+    :param measured: joints whose positions are known at any time. The others stay at zero.
     :raises ValueError: for text that is no URDF.
     """
 

@@ -1,6 +1,6 @@
 """Rigid transforms as 4x4 arrays: `a_from_b` takes points in frame b to frame a.
 
-Lengths are m; frames are right-handed (REP 103).
+Lengths are m. Frames are right-handed (REP 103).
 """
 from typing import Sequence, Union
 

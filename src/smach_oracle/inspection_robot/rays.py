@@ -7,7 +7,7 @@ Circle = Tuple[float, float, float]  # x, y, radius in m
 
 
 def to_walls(origin: Sequence[float], angles: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """(n,) m along each ray to the first wall; inf where there is none.
+    """(n,) m along each ray to the first wall, or inf where there is none.
 
     :param angles: (n,) rad, of the rays, in the frame of the origin.
     :param walls: (m, 4) m, both ends of each.
@@ -24,7 +24,7 @@ def to_walls(origin: Sequence[float], angles: np.ndarray, walls: np.ndarray) -> 
 
 
 def to_circle(origin: Sequence[float], angles: np.ndarray, circle: Circle) -> np.ndarray:
-    """(n,) m along each ray to a circle; inf where it misses. From within it is 0."""
+    """(n,) m along each ray to a circle, or inf where it misses. From within it is 0."""
     offset = np.array([circle[0] - origin[0], circle[1] - origin[1]])
     along = offset[0] * np.cos(angles) + offset[1] * np.sin(angles)
     inside = circle[2]**2 - (offset @ offset - along**2)

@@ -28,7 +28,7 @@ PANELS = (GaugePanel(1, 1.8, 7.0, -math.pi / 2), GaugePanel(2, 5.0, 0.0, math.pi
 
 ROBOT_RADIUS = 0.25  # m
 CAMERA_HEIGHT = 1.0  # m
-PANEL_SIDE = 0.6  # m; panels are square
+PANEL_SIDE = 0.6  # m. Panels are square
 # of a panel's side: its dark frame, the middle and the radius of the dial, the ends of the needle
 FRAME = 0.09
 DIAL = (0.5, 0.44, 0.29)

@@ -1,6 +1,6 @@
 """The SharedAutonomy action of an interface that one person uses at a time.
 
-That person ends its one goal. A second goal is refused with a text; a preempt, and the loss of the
+That person ends its one goal. A second goal is refused with a text. A preempt, and the loss of the
 node that asked, end the goal.
 """
 import time
@@ -41,7 +41,7 @@ class _AskerConnection(Protocol):
 
 
 class InterfaceGoalError(OracleError, ValueError):
-    """A goal cannot be ended in that way; the text says what is allowed."""
+    """A goal cannot be ended in that way. The text says what is allowed."""
 
 
 class InterfaceGoal:
@@ -54,7 +54,7 @@ class InterfaceGoal:
                  ended: Callable[[], None]) -> None:
         """
         :param name: of the action, e.g. manipulation_interface.
-        :param begun: called with each new goal; may raise ValueError, whose text refuses the goal.
+        :param begun: called with each new goal. May raise ValueError, whose text refuses the goal.
         :param ended: called when a goal has ended.
         """
         self.name = rospy.resolve_name(name)
@@ -65,7 +65,7 @@ class InterfaceGoal:
         self._asker_seen_s = 0.0
         self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal,
                                               self._on_cancel, auto_start=False)
-        # its callbacks come under it; a second lock would invite a deadlock
+        # its callbacks come under it. A second lock would invite a deadlock
         self._lock = self._action.lock
         self._action.start()
 
@@ -85,10 +85,10 @@ class InterfaceGoal:
                text: str = '', query_id: str = '') -> None:
         """Supersede the state with `outcome`.
 
-        :param known: outputs that the interface has; keys that the state does not have are left
+        :param known: outputs that the interface has. Keys that the state does not have are left
             out.
         :param given: outputs that the person gave, which override those.
-        :param query_id: the question that is meant; '' for whichever is active.
+        :param query_id: the question that is meant, or '' for whichever is active.
         :raises InterfaceGoalError: where no such goal is active, or the outcome or an output given
             does not fit it.
         """
@@ -101,9 +101,9 @@ class InterfaceGoal:
             self._end(lambda handle: handle.set_succeeded(result, text))
 
     def give_up(self, text: str, query_id: str = '') -> None:
-        """End the goal without a result; the oracle asks again.
+        """End the goal without a result. The oracle asks again.
 
-        :param query_id: the question that is meant; '' for whichever is active.
+        :param query_id: the question that is meant, or '' for whichever is active.
         :raises InterfaceGoalError: where no such goal is active.
         """
         with self._lock:
@@ -111,7 +111,7 @@ class InterfaceGoal:
             self._end(lambda handle: handle.set_aborted(SharedAutonomyResult(text=text), text))
 
     def drop_if_asker_is_gone(self) -> None:
-        """End a goal whose asker's connection has been gone for 3 s; call it now and then."""
+        """End a goal whose asker's connection has been gone for 3 s. Call it now and then."""
         with self._lock:
             handle = self._handle
             if handle is not None and self._asker_missing_s(handle) > ASKER_GONE_S:

@@ -16,9 +16,9 @@ _SESSION = Path('/proc/self/autogroup')
 
 
 def take_priority() -> None:
-    """Take the nice value of the parameter ~nice, -20 (first) to 19 (last); 0 leaves it as it is.
+    """Take the nice value of the parameter ~nice, -20 (first) to 19 (last). 0 leaves it as it is.
 
-    To go before others needs a right that only root has by itself; without it the node goes on as
+    To go before others needs a right that only root has by itself. Without it the node goes on as
     it is. Call it once the node has begun: it counts for the threads that there are, and for those
     that they start.
 
@@ -31,7 +31,7 @@ def take_priority() -> None:
 
 
 def set_nice(nice: int) -> bool:
-    """Give all threads of this process a nice value; whether the system allows it.
+    """Give all threads of this process a nice value. Return whether the system allows it.
 
     It counts among all processes where this one has a session of its own, as roslaunch gives it.
     """

@@ -1,4 +1,4 @@
-"""The executive. It imports smach and the standard library; its pure parts not even smach.
+"""The executive. It imports smach and the standard library, its pure parts not even smach.
 
 From the top down, each package above all that follow it: `operator_hand`, for operators;
 `container`, the public face; `execution`, `recovery`, `machine`, `control`, `asking`, `records`,

@@ -28,7 +28,7 @@ class BackgroundCall:
         self._thread.start()
 
     def leave(self) -> bool:
-        """Leave the thread to itself; False where it has ended after all."""
+        """Leave the thread to itself. Return False where it has ended after all."""
         with self._lock:
             self.left = not self.done.is_set()
             return self.left

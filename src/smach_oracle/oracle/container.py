@@ -46,7 +46,7 @@ class OracleContainer(smach.StateMachine):
     is in one attribute, `_oracle`, so that it hides no name of a subclass.
     """
 
-    _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none; never written
+    _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none, never written
     _pause_requested = False  # of engines that do not pause
 
     def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
@@ -56,8 +56,8 @@ class OracleContainer(smach.StateMachine):
                  strict: bool = True, health: Optional[HealthFunction] = None) -> None:
         """Make an empty machine under an oracle.
 
-        `settings`: a Settings or a dictionary of them; `preconditions`: lists by LABEL or
-        PATH/LABEL; `health`: says whether the robot is well, by True or '', or what is wrong.
+        `settings`: a Settings or a dictionary of them. `preconditions`: lists by LABEL or
+        PATH/LABEL. `health`: says whether the robot is well, by True or '', or what is wrong.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
@@ -123,7 +123,7 @@ class OracleContainer(smach.StateMachine):
             machine._oracle.in_force.given_with_add[label] = given
         return state if added is None else added
 
-    # -- what adapters read; see oracle_of
+    # -- what adapters read. See oracle_of
 
     name = _Shown('name')
     path = _Shown('path')
@@ -157,7 +157,7 @@ class OracleContainer(smach.StateMachine):
     def save_rates(self, path: str) -> None:
         """Write the learned rates to a file, atomically.
 
-        :raises OSError: where it cannot be written; an old file is then untouched.
+        :raises OSError: where it cannot be written. An old file is then untouched.
         """
         write_rates(path, nodes_of(self))
 
@@ -197,7 +197,7 @@ class OracleContainer(smach.StateMachine):
                           userdata: Optional[smach.UserData] = None) -> None:
         """Begin at this label (one, in a list) from now on, with these keys added to the userdata.
 
-        :raises InvalidStateError: for ORACLE, which failures alone enter; nothing is changed then.
+        :raises InvalidStateError: for ORACLE, which failures alone enter. Nothing is changed then.
         """
         labels = [initial_states] if isinstance(initial_states, str) else initial_states
         for label in labels:
@@ -279,7 +279,7 @@ class OracleContainer(smach.StateMachine):
         super().call_start_cbs()
 
     def _tell_start(self) -> None:
-        """Log where it starts; upstream's engine does not ask."""
+        """Log where it starts. Upstream's engine does not ask."""
         if self._oracle.resuming is None and self._oracle.entry not in self._states:
             super()._tell_start()
 
@@ -380,7 +380,7 @@ class OracleContainer(smach.StateMachine):
         return reduced if classes is None else (rebuild, classes) + tuple(reduced[2:])
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
-        """A shallow copy gets a node of its own; a deep or pickled one brings it."""
+        """A shallow copy gets a node of its own. A deep or pickled one brings it."""
         set_base: Optional[Callable[[Any], None]] = getattr(super(), '__setstate__', None)
         if set_base is not None:
             set_base(state)

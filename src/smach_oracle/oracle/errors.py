@@ -27,19 +27,19 @@ class SettingsError(OracleError, ValueError):
 
 
 class AnswerError(OracleError, ValueError):
-    """An expert's answer does not fit its question; the text says what would."""
+    """An expert's answer does not fit its question. The text says what would."""
 
 
 class OperatorError(OracleError, ValueError):
-    """An operator's command cannot be obeyed; the text says why, and what is allowed."""
+    """An operator's command cannot be obeyed. The text says why, and what is allowed."""
 
 
 class InterfaceError(AnswerError):
-    """The interface that an expert chose cannot be used now; the text says why."""
+    """The interface that an expert chose cannot be used now. The text says why."""
 
 
 class CheckpointError(OracleError):
-    """The store that the setting `checkpoint` names cannot be used; the text says which and why.
+    """The store that the setting `checkpoint` names cannot be used. The text says which and why.
 
     Nothing of the machine has run.
     """

@@ -1,4 +1,4 @@
-"""What counts as a number. Pure; True and False are no numbers here."""
+"""What counts as a number. Pure. True and False are no numbers here."""
 import math
 import sys
 

@@ -66,7 +66,7 @@ class OperatorHand:
     # -- what is never refused
 
     def pause(self, by: str = '') -> str:
-        """Hold every container at its next state boundary; what runs now runs to its end."""
+        """Hold every container at its next state boundary. What runs now runs to its end."""
         self._top.tree.control.pause(by)
         return self._told('pause', self._how_it_pauses(), by)
 
@@ -99,8 +99,8 @@ class OperatorHand:
 
         The machine is paused from now on.
 
-        :param path: of the container, as in events; '': every one.
-        :raises OperatorError: where nothing waits there; the machine is paused nevertheless, but
+        :param path: of the container, as in events. '' means every one.
+        :raises OperatorError: where nothing waits there. The machine is paused nevertheless, but
             not where there is no such container.
         """
         self._nodes_at(path)
@@ -116,7 +116,7 @@ class OperatorHand:
     def confirm(self, path: str = '', by: str = '') -> str:
         """Confirm the states before which containers wait for that.
 
-        :param path: of the container, as in events; '': every one.
+        :param path: of the container, as in events. '' means every one.
         :raises OperatorError: where none waits for it.
         """
         held = self._top.tree.control.confirm(path)
@@ -138,7 +138,7 @@ class OperatorHand:
         below begin in the states that lead there. Where none runs, the state's container begins
         there from now on.
 
-        :param path: of the container, as in events; '': the top machine.
+        :param path: of the container, as in events. '' means the top machine.
         :param confirm_repeats: states that are not to be repeated by themselves may be.
         :param written: userdata keys that were written for it.
         :raises OperatorError: where there is no such container or state, where it cannot be
@@ -214,7 +214,7 @@ class OperatorHand:
         """Set the autonomy of states. The latest setting for a state applies.
 
         :param pattern: LABEL or PATH/LABEL, with `*` and `**`.
-        :param level: 'run', 'announce' or 'confirm'; '': as the settings say.
+        :param level: 'run', 'announce' or 'confirm'. '' means as the settings say.
         :raises OperatorError: for another level, or a pattern that cannot be read.
         """
         meant = _pattern(pattern)
@@ -313,7 +313,7 @@ class OperatorHand:
         return 'nothing waits{}. {}'.format(' in ' + path if path else '', self._how_it_pauses())
 
     def _node_at(self, path: str, state: str) -> TreeNode:
-        """Return the container at a path; of branches, which have one path, that of the state."""
+        """Return the container at a path. Of branches, which have one path, that of the state."""
         found = self._nodes_at(path)
         return next((node for node in found if state in node.labels()), found[0])
 

@@ -22,11 +22,11 @@ class OutcomeProspect(NamedTuple):
     outcome: str
     route: Route
     is_failure: bool
-    author_recovers: bool  # from this failure; the author's own transition is kept
+    author_recovers: bool  # from this failure. The author's own transition is kept
 
 
 class StateProspect(NamedTuple):
-    """One state; `actions`: what the policy may do on its failure, by class of its rate."""
+    """One state. `actions`: what the policy may do on its failure, by class of its rate."""
 
     label: str
     state: smach.State
@@ -37,7 +37,7 @@ class StateProspect(NamedTuple):
 
 
 class ContainerProspect(NamedTuple):
-    """One wrapped container; `initial` is '' where it has no state.
+    """One wrapped container. `initial` is '' where it has no state.
 
     `guarded`: the states at or below it that the oracle repeats by no decision of its own. A
     Concurrence or an Iterator whose plain states have oracles `has_branches`: it is no wrapped
@@ -76,7 +76,7 @@ def _joined(one: ContainerProspect, other: ContainerProspect) -> ContainerProspe
 
 
 def good_outcome(container: smach.Container, settings: Settings) -> Optional[str]:
-    """Return an outcome of a container that is no failure, the first by name; None if none is.
+    """Return an outcome of a container that is no failure, the first by name, or None if none is.
 
     `succeeded` comes before all others, a preempt after them.
     """

@@ -155,7 +155,7 @@ def _placed(base_from_part: np.ndarray, centre: Tuple[float, float, float],
 def _like(name: str, value: Any) -> Any:
     """`value` in the type of this name's default: an int, a float, or a tuple of floats.
 
-    :raises ValueError: for other values. A tuple has as many numbers as its default; there may be
+    :raises ValueError: for other values. A tuple has as many numbers as its default. There may be
         any number of shelves.
     """
     default = Kitchen._field_defaults[name]
@@ -169,7 +169,7 @@ def _like(name: str, value: Any) -> Any:
 
 
 def _floats(values: Sequence[float], count: int) -> Tuple[float, ...]:
-    """The values as floats; `count` of them, or for 0 any number from 1."""
+    """The values as floats. `count` of them, or for 0 any number from 1."""
     made = tuple(float(value) for value in values)
     if not all(is_number(each) for each in made) or (len(made) != count if count else not made):
         raise ValueError('{} numbers, not all finite'.format(len(made)))

@@ -1,4 +1,4 @@
-"""What the PR2 offers its own subsystems: encoders, controllers, a camera; never the truth.
+"""What the PR2 offers its own subsystems: encoders, controllers, a camera, never the truth.
 
 Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the
 world's DirectRobot, which runs in one process. Lengths in m, angles in rad, times in s; frames as
@@ -27,7 +27,7 @@ FINGER_JOINTS: Dict[str, List[str]] = {
     arm: ['{}_gripper_{}_finger_joint'.format(arm[0], finger) for finger in 'lr'] for arm in ARMS
 }
 TOOL_FRAME = {arm: arm[0] + '_gripper_tool_frame' for arm in ARMS}
-# on the floor below the middle of the base; the frame subsystems think in
+# on the floor below the middle of the base, the frame subsystems think in
 BASE_FRAME = 'base_footprint'
 BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
 ODOM_FRAME = 'odom_combined'
@@ -37,7 +37,7 @@ GRIPPER_OPEN = 0.09  # m between the finger tips
 
 
 class RobotError(Exception):
-    """A controller refused or missed a command; the text names it, the command and the outcome."""
+    """A controller refused or missed a command. The text names it, the command and the outcome."""
 
 
 class GripperState(NamedTuple):
@@ -77,7 +77,7 @@ class Robot(Protocol):
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
         """Open or close a gripper to `position` m between the tips, with at most `max_effort` N.
 
-        :raises RobotError: where it is refused or does not come to its end; to stall at something
+        :raises RobotError: where it is refused or does not come to its end. To stall at something
             is no error.
         """
 
@@ -108,7 +108,7 @@ class Robot(Protocol):
     def spend(self, what: str, work: Work) -> None:
         """Let the time pass that work takes, where a robot's world waits for that.
 
-        Never raises; processing an image is spent by see().
+        Never raises. Processing an image is spent by see().
 
         :param what: 'planning' or 'perception'.
         """

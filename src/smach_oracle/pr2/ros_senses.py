@@ -45,21 +45,21 @@ class MessageHistory:
                                             buff_size=1 << 24, tcp_nodelay=True)
 
     def connected(self) -> bool:
-        """Whether somebody publishes; waits until a new publisher has registered this node."""
+        """Whether somebody publishes. It waits until a new publisher has registered this node."""
         connections = live_connections(self._subscriber)
         if connections:
             self._grace.wait(connections)
         return bool(connections)
 
     def at(self, stamp: rospy.Time, timeout_s: float) -> genpy.Message:
-        """The message with this stamp; waits for it, by the wall's clock.
+        """The message with this stamp. It waits for it, by the wall's clock.
 
         :raises RobotError: where it does not come.
         """
         return self.at_one_of([stamp], timeout_s)
 
     def at_one_of(self, stamps: Sequence[rospy.Time], timeout_s: float) -> genpy.Message:
-        """The message with one of these stamps that came last; waits as `at`.
+        """The message with one of these stamps that came last. It waits as `at`.
 
         :raises RobotError: where none comes.
         """
@@ -92,7 +92,7 @@ class MessageHistory:
 class RosSenses:
     """Encoders, odometry and camera of a robot, read from its topics.
 
-    :param snapshot: service smach_oracle/Snapshot; '': none, the next messages count.
+    :param snapshot: service smach_oracle/Snapshot. '' means none, the next messages count.
     :param timeout_s: wall s to wait for anything.
     """
 
@@ -103,7 +103,7 @@ class RosSenses:
         self._calling = threading.Lock()
         self._states = MessageHistory('joint_states', JointState)
         self._starting = threading.Lock()
-        # a world that gives snapshots sends images only when asked; a robot's stream is for those
+        # a world that gives snapshots sends images only when asked. A robot's stream is for those
         # who really look
         self._camera = self._subscribe() if snapshot else []
         self._buffer = tf2_ros.Buffer(rospy.Duration(60.0))
@@ -217,7 +217,7 @@ class RosSenses:
         return self._states.next(self._timeout_s)
 
     def _shot(self, camera: bool) -> rospy.Time:
-        """Have the world publish a snapshot; its stamp."""
+        """Have the world publish a snapshot. Return its stamp."""
         self._connected(self._states)
         self._tree_connected()
         try:

@@ -9,19 +9,19 @@ from smach_oracle.srv import PassTime
 
 
 class WorldTime:
-    """Lets time pass in the world by its service; where there is none, time passes by itself."""
+    """Lets time pass in the world by its service. Where there is none, time passes by itself."""
 
     def __init__(self, service: str) -> None:
         """Connect to nothing yet.
 
-        :param service: smach_oracle/PassTime; '': none.
+        :param service: smach_oracle/PassTime. '' means none.
         """
         self._name = rospy.resolve_name(service) if service else ''
         self._proxy: Optional[rospy.ServiceProxy] = None  # while it is connected
         self._calling = threading.Lock()
 
     def spend(self, seconds: float, what: str) -> None:
-        """Let so many s of the world's time pass; returns when they have.
+        """Let so many s of the world's time pass, and return when they have.
 
         A world that is not there, or goes meanwhile, costs nothing: whatever is done next fails.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 # With a millisecond for a check of the whole robot, a path of 75 to 1000 checks takes 0.1 to 1 s,
 # and the budget of a path, 6000 checks, about the 5 s that MoveIt gives a planner by default.
 CHECK_S = 0.001
-# MoveIt gives an iterative solver of the inverse kinematics 5 ms by default; many end before that.
+# MoveIt gives an iterative solver of the inverse kinematics 5 ms by default. Many end before that.
 SAMPLE_S = 0.003
 # From the last pixel to a cloud of 300000 points, with colours and without the robot's own arms:
 # a few images a second is what such a chain of nodes delivers.

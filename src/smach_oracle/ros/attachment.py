@@ -51,13 +51,13 @@ from .recording.recorder_topics import MessageClass, action_topics, audit_topic,
 from .stored import prepare_store
 from .waiting.service_waiting import ServiceWaiting
 
-# for trials to tell their end, before their bags are closed under them; roslaunch gives a node 15 s
+# for trials to tell their end, before their bags are closed under them. Roslaunch gives a node 15 s
 TRIAL_END_WAIT_S = 10.0
 CLOSE_S = 1.0
 
 
 class RecordingOptions(NamedTuple):
-    """What the process was started with; overrides the private parameters of the same names."""
+    """What the process was started with. It overrides the private parameters of the same names."""
 
     record: str = ''  # folder, '' where `~record` decides
     record_topics: Tuple[str, ...] = ()
@@ -82,7 +82,7 @@ class Attachments:
         self._trials: List[OracleContainer] = []  # within execute, their last events included
         # those of them that are attached to the node
         self._on_ros: MutableSet[OracleContainer] = weakref.WeakSet()
-        # our servers, by path; each holds its machine
+        # our servers, by path. Each holds its machine
         self._introspection: Dict[str, IntrospectionServer] = {}
         self._shown: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by the same paths
         self._expert: Optional[ExpertQueryClient] = None
@@ -110,7 +110,7 @@ class Attachments:
             self._trials.remove(machine)
 
     def attach(self, machine: OracleContainer) -> None:
-        """Attach a top-level machine; does nothing the second time.
+        """Attach a top-level machine. It does nothing the second time.
 
         Outside a ROS node it only records, where that is asked for.
 
@@ -224,7 +224,7 @@ class Attachments:
         return self._expert
 
     def _plan_recording(self, node: bool) -> Optional[_RecordingPlan]:
-        """Folder and topics for a recorder; None where there is one already, or none is wanted."""
+        """Folder and topics for a recorder, or None where one is there or none is wanted."""
         if self._recorder is not None or not self._recorder_wanted:
             return None
         folder = self.options.record or (private_text('record') if node else '')

@@ -58,7 +58,7 @@ def _free_name(name: str) -> str:
     try:
         return next(each for each in _names(name) if not _runs(master, _full(each)))
     except (OSError, rosgraph.MasterException):
-        return name  # no master yet; rospy waits for it
+        return name  # no master yet. Rospy waits for it
 
 
 def _runs(master: Any, name: str) -> bool:

@@ -24,7 +24,7 @@ TOPIC_ERRORS = (AttributeError, TypeError, rospy.ROSException)
 
 
 def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
-    """Its connections; without those whose socket is gone, which only wait to be made again."""
+    """Its connections, without those whose socket is gone, which only wait to be made again."""
     if subscriber.impl is None:
         return []
     return [
@@ -34,7 +34,7 @@ def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
 
 @contextmanager
 def quiet_at_shutdown() -> Iterator[None]:
-    """Within it one publishes; nothing is raised where the node goes down meanwhile.
+    """Within it one publishes. Nothing is raised where the node goes down meanwhile.
 
     rospy closes the topics before `rospy.is_shutdown` says so. Whoever publishes in between meets a
     closed topic, or one that is being taken apart.
@@ -47,7 +47,7 @@ def quiet_at_shutdown() -> Iterator[None]:
 
 
 class ConnectionGrace:
-    """Gives new connections their time; who asks once need not ask again.
+    """Gives new connections their time. Who asks once need not ask again.
 
     A publisher greets a new subscriber before it lists it among those that it sends to (rospy).
     What it sends in between is lost. So it is asked for its list.
@@ -86,7 +86,7 @@ def _wait_until_known(connections: Sequence[Connection]) -> None:
 
 
 def _topics_sent_by(uri: str) -> Optional[Set[str]]:
-    """The topics on which a node sends to this one; None where it does not tell.
+    """The topics on which a node sends to this one, or None where it does not tell.
 
     :param uri: of the node's own server.
     """

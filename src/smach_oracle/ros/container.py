@@ -52,7 +52,7 @@ _given: MutableMapping[BareContainer, _GivenSettings] = weakref.WeakKeyDictionar
 class OracleContainer(BareContainer):
     """A `smach.StateMachine` with an ORACLE state, attached to its ROS node.
 
-    Settings given as a dictionary lie under the parameter `~oracle`; a `Settings` object is taken
+    Settings given as a dictionary lie under the parameter `~oracle`. A `Settings` object is taken
     as it is.
     """
 
@@ -88,7 +88,7 @@ class OracleContainer(BareContainer):
         return wrapped
 
     def execute(self, *args: object, **kwargs: object) -> Optional[str]:
-        """Run the machine; a top-level one is attached to its node first.
+        """Run the machine. A top-level one is attached to its node first.
 
         :raises SettingsError: where the parameters of the node are wrong.
         :raises CheckpointError: where the store that `checkpoint` names cannot be used.

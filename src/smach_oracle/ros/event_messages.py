@@ -16,7 +16,7 @@ from .sendable_text import sendable_text
 def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
     """Translate one event.
 
-    :param stamp: ROS time of the step; none: now, or zero where this process runs without ROS.
+    :param stamp: ROS time of the step. None means now, or zero where this process runs without ROS.
     """
     header = Header(stamp=ros_now() if stamp is None else stamp)
     place = (event.path, event.state, event.outcome, event.target)

@@ -1,7 +1,7 @@
 """Sends goals to an action server, and notices at once when the server is gone.
 
 actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and does not
-notice a server that has died; this goes by the connections themselves.
+notice a server that has died. This goes by the connections themselves.
 """
 import queue
 import threading
@@ -22,7 +22,7 @@ _RESULT_S = 2.0  # so was the result of a goal that has ended so long ago
 
 
 class GoalEvent(NamedTuple):
-    """Feedback (`feedback` set), or the end of the goal (`status` set; `result` may be None)."""
+    """Feedback (`feedback` set), or the end of the goal (`status` set, `result` may be None)."""
 
     feedback: Optional[genpy.Message] = None
     status: int = 0
@@ -31,7 +31,7 @@ class GoalEvent(NamedTuple):
 
 
 class SentGoal:
-    """One goal on its way; `poll` waits for its next event."""
+    """One goal on its way. `poll` waits for its next event."""
 
     def __init__(self, sent_s: float) -> None:
         # not a SimpleQueue: its timed get waits forever where a signal handler takes longer than
@@ -60,7 +60,7 @@ class SentGoal:
         return not self._acknowledged and now_s - self._sent_s > _ACK_S
 
     def cancel(self) -> None:
-        """Take it back; returns at once."""
+        """Take it back, and return at once."""
         if self._handle is not None:
             try:
                 self._handle.cancel()
@@ -90,9 +90,9 @@ class GoalLink:
     _sending = threading.Lock()  # actionlib's goal ids are not made safely from several threads
 
     def __init__(self, name: str, action_spec: Type[genpy.Message]) -> None:
-        """`name` is resolved; connections are made in the background."""
+        """`name` is resolved. Connections are made in the background."""
         self.name = name
-        # Small messages that must not wait for a full packet; the first subscriber of a topic
+        # Small messages that must not wait for a full packet, the first subscriber of a topic
         # decides.
         self._fast = [rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
                       for end, kind in (('/result', type(action_spec().action_result)),
@@ -112,7 +112,7 @@ class GoalLink:
         return bool(heard)
 
     def _heard(self) -> List[Connection]:
-        """The connections that bring news of goals from a server; [] while any topic lacks one."""
+        """The connections that bring news of goals, or [] while any topic lacks one."""
         client = self._client
         news = (client.status_sub, client.result_sub, client.feedback_sub)
         for server in [each.callerid_pub for each in live_connections(client.status_sub)]:
@@ -127,11 +127,11 @@ class GoalLink:
         return []
 
     def alive(self) -> bool:
-        """Whether any server is connected; false within milliseconds of its death."""
+        """Whether any server is connected. It is false within milliseconds of its death."""
         return bool(live_connections(self._client.status_sub))
 
     def send(self, goal: genpy.Message, now_s: float) -> SentGoal:
-        """Send a goal; the caller has seen `ready`."""
+        """Send a goal. The caller has seen `ready`."""
         sent = SentGoal(now_s)
         with self._sending:
             sent.attach(self._client.send_goal(goal, sent.on_transition, sent.on_feedback))
@@ -154,7 +154,7 @@ def lost(event: GoalEvent) -> bool:
 def _reaches(publisher: rospy.Publisher, subscriber: str) -> bool:
     """Whether a living node of that name listens.
 
-    rospy looks only now and then whether one has died; one that was started again under its name
+    rospy looks only now and then whether one has died. One that was started again under its name
     would seem to be there before it listens.
     """
     topic = publisher.impl

@@ -1,7 +1,7 @@
 """Keeps actionlib's SimpleActionClient from losing the end of a goal.
 
 The client sends a goal, and only then notes which goal it is. What the server answers in between
-is dropped ("Got a transition callback on a goal handle that we're not tracking"); where that is the
+is dropped ("Got a transition callback on a goal handle that we're not tracking"). Where that is the
 result, whoever waits for it waits for good. Upstream's SimpleActionState waits so.
 
 With a load of 15 on two cores 9 of 40 scripts with an oracle hung within their first four goals,
@@ -22,7 +22,7 @@ _MARK = '_waits_for_the_handle'
 
 
 def track_goals_from_the_start() -> None:
-    """Let answers to a goal wait until its client has noted it; in this process, from now on.
+    """Let answers to a goal wait until its client has noted it, in this process, from now on.
 
     It does nothing the second time.
     """

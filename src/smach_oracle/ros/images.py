@@ -75,7 +75,7 @@ def cloud_message(points: np.ndarray, header: Header,
                   colours: Optional[np.ndarray] = None) -> PointCloud2:
     """Cloud of points (n, 3) in m, or organised (h, w, 3).
 
-    :param colours: uint8 of the same shape; they become `rgb`.
+    :param colours: uint8 of the same shape. They become `rgb`.
     """
     fields = [(name, '<f4') for name in 'xyz'] + ([('rgb', '<u4')] if colours is not None else [])
     shape = points.shape[:-1]

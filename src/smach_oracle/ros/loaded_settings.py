@@ -1,7 +1,7 @@
 """Settings of the executive from a YAML file, the parameter server and the command line.
 
 The parameter `~oracle` overrides the file, the command line overrides both. Mappings are merged key
-by key, everything else is replaced. `smach_oracle.oracle` checks the values; here every error
+by key, everything else is replaced. `smach_oracle.oracle` checks the values. Here every error
 learns where the key came from.
 """
 import importlib
@@ -49,7 +49,7 @@ class LoadedSettings(Dict[str, Any]):
                 for key, value in theirs.items() if key in mine and mine[key] != value]
 
     def origin(self, key: str) -> str:
-        """Where a dotted key, or else the mapping it should be in, was set; '' where nowhere."""
+        """Where a dotted key, or else the mapping it should be in, was set, or '' where nowhere."""
         while key:
             if key in self._origins:
                 return self._origins[key]
@@ -68,7 +68,7 @@ def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PAR
     """Read and merge the settings.
 
     :param path: a YAML file, or None.
-    :param param: a parameter that holds a mapping; read only where this process is a ROS node.
+    :param param: a parameter that holds a mapping. Read only where this process is a ROS node.
     :param overrides: from the command line.
     :raises SettingsError: naming file and line, or parameter, key, value and what is allowed.
     """
@@ -149,10 +149,10 @@ def read_checkpoint() -> Tuple[Dict[str, Any], str]:
 def resolve_python(name: str) -> object:
     """What `python:module:attribute` names, e.g. `python:my_robot.checks:view_is_clear`.
 
-    A dotted attribute is followed; the class of a state is instantiated without arguments.
+    A dotted attribute is followed. The class of a state is instantiated without arguments.
 
     :raises ValueError: where the form is wrong or the module has no such attribute.
-    :raises ImportError: where the module cannot be imported; whatever else the module raises
+    :raises ImportError: where the module cannot be imported. Whatever else the module raises
         surfaces as it is.
     """
     module, attributes = split_python_name(name)

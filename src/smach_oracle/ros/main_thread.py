@@ -21,7 +21,7 @@ Result = TypeVar('Result')
 
 
 def outside_main_thread(function: Callable[[], Result]) -> Result:
-    """Return what a function returns, or raise what it raises; wait for it.
+    """Return what a function returns, or raise what it raises. Wait for it.
 
     It runs in a thread of its own where the caller is the main thread of a node, and else in the
     caller's: without a node rospy handles no signals.

@@ -24,7 +24,7 @@ CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch forever
 
 
 class MasterCallError(Exception):
-    """The master answered with an error; the text names the call and the reason."""
+    """The master answered with an error. The text names the call and the reason."""
 
 
 class Registrations(NamedTuple):
@@ -69,7 +69,7 @@ class MasterLink:
             return pid, master.lookupNode(self._caller_id, self._caller_id)[0] == 1
 
     def register(self, items: Registrations) -> List[Tuple[str, List[str]]]:
-        """Register everything; harmless for what the master knows already.
+        """Register everything. Harmless for what the master knows already.
 
         Topics that others listen to come last: a node that hears from this one may call its
         services at once.
@@ -120,11 +120,11 @@ class MasterWatch:
 
     @property
     def heard_s(self) -> Optional[float]:
-        """When the master answered last, by the monotonic clock, in s; None before it has."""
+        """When the master answered last, by the monotonic clock, in s, or None before it has."""
         return self._heard_s
 
     def start(self) -> None:
-        """Begin to watch; the thread ends with the process."""
+        """Begin to watch. The thread ends with the process."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -171,7 +171,7 @@ _watch: Optional[MasterWatch] = None
 
 
 def start_master_watch() -> MasterWatch:
-    """Watch the master on behalf of this node; one watch per process, however often called.
+    """Watch the master on behalf of this node, one watch per process, however often called.
 
     :raises rospy.ROSInitException: before rospy.init_node.
     """

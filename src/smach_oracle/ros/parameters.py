@@ -65,7 +65,7 @@ def checked_mapping(key: str, value: object) -> Mapping[str, Any]:
 
 
 def read_or_default(param: str, default: object) -> object:
-    """A parameter, unchecked; the default where it is not set or the master does not answer.
+    """A parameter, unchecked. The default where it is not set or the master does not answer.
 
     A master that does not answer is logged: a robot starts without it.
     """

@@ -1,8 +1,8 @@
 """Publishers of what the executive does and learns: topics `~oracle/events` and `~oracle/rates`.
 
 Both are fed by the machine's own thread and never hold it: an event goes to rospy's send queue,
-which drops its oldest entry where a subscriber is too slow (the gap shows in the sequence numbers);
-rates go out from a thread of their own.
+which drops its oldest entry where a subscriber is too slow (the gap shows in the sequence numbers).
+Rates go out from a thread of their own.
 """
 import threading
 import time
@@ -19,7 +19,7 @@ from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 from .connections import TOPIC_ERRORS, quiet_at_shutdown
 from .event_messages import rates_to_msg, to_msg
 
-QUEUE_SIZE = 1000  # events waiting for one slow subscriber; about 0.3 MB
+QUEUE_SIZE = 1000  # events waiting for one slow subscriber, about 0.3 MB
 RATES_PERIOD_S = 0.2  # at most 5 Hz
 KINDS_THAT_CHANGE_RATES = frozenset([
     EventKind.TRIAL_START, EventKind.TRANSITION, EventKind.FAILURE, EventKind.JUMP,
@@ -69,7 +69,7 @@ class EventPublisher:
         self._publisher = rospy.Publisher(topic, OracleEvent, queue_size=queue_size)
 
     def __call__(self, event: Event) -> None:
-        """Publish; without a subscriber this costs a function call or two."""
+        """Publish. Without a subscriber this costs a function call or two."""
         try:
             if not rospy.is_shutdown() and self._publisher.get_num_connections():
                 self._publisher.publish(to_msg(event))
@@ -152,7 +152,7 @@ class RatesPublisher:
                     self._publish_quietly(reference())
 
     def _wait(self) -> bool:
-        """Until something is to be published; False once closed."""
+        """Until something is to be published. It is False once closed."""
         with self._wake:
             while not self._pending and not self._closed:
                 self._wake.wait()
@@ -171,7 +171,7 @@ class RatesPublisher:
 
 
 class _RatesObserver:
-    """Marks one machine as changed; publishes at once at the end of a trial."""
+    """Marks one machine as changed. It publishes at once at the end of a trial."""
 
     def __init__(self, publisher: RatesPublisher, machine: WatchedMachine) -> None:
         self._publisher = publisher

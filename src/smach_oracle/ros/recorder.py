@@ -51,7 +51,7 @@ class TrialRecorder:
     While the disk works, the machine waits for the recorder where it must (bounded queue). Where
     the disk fails, or hangs for more than `hung_after_s`, events are dropped, counted and reported,
     and the robot goes on. With a node (rospy initialised before), topics are subscribed to and
-    `~record/status` is published; without one, the events alone are recorded.
+    `~record/status` is published. Without one, the events alone are recorded.
     """
 
     def __init__(self, folder: str, topics: Sequence[str] = (), *,
@@ -63,12 +63,12 @@ class TrialRecorder:
 
         :param topics: names of other topics to record, each from when it is first published.
         :param types: message classes of those of them that are known beforehand.
-        :param warn: logs faults; default: rospy's log, or without a node the log
+        :param warn: logs faults. Default: rospy's log, or without a node the log
             `smach_oracle.recorder`.
-        :param say: logs good news; default as for `warn`.
+        :param say: logs good news. Default as for `warn`.
         :param on_status: called with each change of status, in the recorder's threads.
         :param keep: bags of earlier trials over these limits are removed when a trial's bag is
-            closed, each after a line in the log; by default all stay.
+            closed, each after a line in the log. By default all stay.
         :raises OSError: where the folder cannot be made or written: better known before the robot
             moves.
         """
@@ -100,7 +100,7 @@ class TrialRecorder:
         """Record the trials of a machine: an OracleContainer, or any EventSource. Twice is once.
 
         :param snapshots: by topic, what gives a message (or None) to be recorded at the start and
-            at the end of each trial; called in the machine's thread.
+            at the end of each trial. It is called in the machine's thread.
         """
         source = machine if isinstance(machine, EventSource) else machine.events
         if source in self._attached:
@@ -112,7 +112,7 @@ class TrialRecorder:
                          for topic, take in (snapshots or {}).items()}))
 
     def __call__(self, event: Event) -> None:
-        """Record one event; the observer that a machine without snapshots may be given directly."""
+        """Record one event. The observer that a machine without snapshots may be given directly."""
         self._observe(event)
 
     def _observe(self, event: Event) -> None:
@@ -192,8 +192,8 @@ class TrialRecorder:
 
         Idempotent, any thread.
 
-        :returns: whether all was done within `timeout_s`; False where the disk hangs: the bags are
-            mended at the next start.
+        :returns: whether all was done within `timeout_s`. It is False where the disk hangs: the
+            bags are mended at the next start.
         """
         if os.getpid() != self._process:
             return True

@@ -12,7 +12,7 @@ CALL_LIMIT_S = 5.0
 
 
 class ServerGoneError(OracleError):
-    """A server could not be reached, or does not answer; the text names it and the reason."""
+    """A server could not be reached, or does not answer. The text names it and the reason."""
 
 
 class ServiceCall(threading.Thread):
@@ -38,7 +38,7 @@ class ServiceCall(threading.Thread):
             self._error = err
 
     def result(self, limit_s: float) -> genpy.Message:
-        """The response; an error that the call has raised is raised again.
+        """The response. An error that the call has raised is raised again.
 
         :raises ServerGoneError: where the server cannot be reached or does not answer in time.
         """

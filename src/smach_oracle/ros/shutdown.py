@@ -26,10 +26,10 @@ Argument = TypeVar('Argument')
 class ShutdownGuard:
     """Preempts, waits, and ends the process by force where it does not end by itself.
 
-    :param preempt: asks every machine of the process to stop; called in a thread of the guard's
-        own, once.
-    :param close: closes what must not be left open (bags), in at most the seconds given; called in
-        the guard's thread before an end by force.
+    :param preempt: asks every machine of the process to stop. It is called in a thread of the
+        guard's own, once.
+    :param close: closes what must not be left open (bags), in at most the seconds given. It is
+        called in the guard's thread before an end by force.
     """
 
     def __init__(self, preempt: Callable[[], None], close: Callable[[float], None],
@@ -42,10 +42,10 @@ class ShutdownGuard:
         self._wake_sender: Optional[socket.socket] = None  # kept: it is written to by number
 
     def install(self) -> None:
-        """Listen for signals from now on; call it in the main thread.
+        """Listen for signals from now on. Call it in the main thread.
 
         SIGTERM, which would end the process on the spot, becomes SystemExit in the main thread. A
-        handler that is installed later (rospy.init_node's among them) overrides that; the guard
+        handler that is installed later (rospy.init_node's among them) overrides that. The guard
         hears the signal anyway.
         """
         receiver, self._wake_sender = socket.socketpair()
@@ -59,7 +59,7 @@ class ShutdownGuard:
     def arm(self, exit_code: int) -> None:
         """Preempt now and end the process by force after the limit.
 
-        Only the first call takes effect; any thread.
+        Only the first call takes effect. Any thread may use it.
         """
         if self._armed.acquire(blocking=False):
             started = time.monotonic()
@@ -85,7 +85,7 @@ class ShutdownGuard:
 def exit_on_sigterm(number: int, frame: Optional[FrameType]) -> None:
     """SIGTERM's handler in a process that is not a ROS node: unwind the main thread.
 
-    rospy's handler calls the one before it; then it is rospy that ends the process, and this one
+    rospy's handler calls the one before it. Then it is rospy that ends the process, and this one
     keeps quiet.
     """
     if signal.getsignal(number) is exit_on_sigterm:

@@ -1,6 +1,6 @@
 """Encodes userdata for other processes.
 
-Plain data becomes JSON; messages and lists of them become serialised ROS messages.
+Plain data becomes JSON. Messages and lists of them become serialised ROS messages.
 
     encode(key, value) -> UserdataItem     encode_all(mapping) -> [UserdataItem]
     decode(item) -> value                  decode_all(items) -> {key: value}
@@ -34,11 +34,11 @@ _MESSAGE_TYPE = re.compile(r'[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z')
 
 
 class UserdataCodecError(OracleError, ValueError):
-    """A malformed item; the text names the key."""
+    """A malformed item. The text names the key."""
 
 
 def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
-    """One value for the wire; never raises for a value: what cannot be sent becomes UNSENT.
+    """One value for the wire. It never raises for a value: what cannot be sent becomes UNSENT.
 
     :raises UserdataCodecError: if the key is not a string.
     """
@@ -56,7 +56,7 @@ def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> Userda
 
 
 def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> List[UserdataItem]:
-    """Every key of a mapping, in the order of the keys; `limit_bytes` holds for each value.
+    """Every key of a mapping, in the order of the keys. `limit_bytes` holds for each value.
 
     A key that is no string (SMACH does not mind) is named, and its value UNSENT.
     """
@@ -104,7 +104,7 @@ def check(item: UserdataItem) -> None:
 
 
 def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict[str, Any]:
-    """All items as a dictionary; with `skip_unsent` without those that were not sent.
+    """All items as a dictionary, with `skip_unsent` without those that were not sent.
 
     :raises UserdataCodecError: as `decode` does, and if a key comes twice.
     """
@@ -119,7 +119,7 @@ def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict
 
 
 def _message_list(value: object) -> Optional[Sequence[genpy.Message]]:
-    """The messages in a list of one type, such as the objects of a detection; else None."""
+    """The messages in a list of one type, such as the objects of a detection, else None."""
     if not isinstance(value, (list, tuple)) or not value or not isinstance(value[0], genpy.Message):
         return None
     return value if all(type(item) is type(value[0]) for item in value) else None

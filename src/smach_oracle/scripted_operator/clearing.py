@@ -17,7 +17,7 @@ Spot = Tuple[float, float]
 
 
 def gap_between(one: SeenThing, other: SeenThing) -> float:
-    """m, in the plane, between two things as they are seen; inf where nobody can tell."""
+    """m, in the plane, between two things as they are seen, or inf where nobody can tell."""
     if one.box is None or other.box is None:
         return float('inf')
     away = float(np.hypot(*(one.box.centre - other.box.centre)[:2]))
@@ -42,7 +42,7 @@ def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
 
 
 def free_spot(scene: SeenScene, arm: str, kept: List[np.ndarray], thing: str) -> Optional[Spot]:
-    """Where on the table an arm can put a thing, with room around; the nearest to the robot.
+    """Where on the table an arm can put a thing, with room around, the nearest to the robot.
 
     :param kept: (3,) m, places that should stay free.
     """
@@ -58,7 +58,7 @@ def free_spot(scene: SeenScene, arm: str, kept: List[np.ndarray], thing: str) ->
 
 def move_aside(attempt: Attempt, target: Target, about: np.ndarray,
                kept: List[np.ndarray]) -> str:
-    """Take a thing and put it where there is room; its name.
+    """Take a thing and put it where there is room. Return its name.
 
     :param kept: (3,) m, places that should stay free.
     :raises ManoeuvreError: where it cannot be moved, or is lost.

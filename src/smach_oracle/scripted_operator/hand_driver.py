@@ -28,7 +28,9 @@ class DrivenHand(Protocol):
         """4x4, base_footprint from the tool, now."""
 
     def move(self, twist: np.ndarray, turn_freely: bool = False) -> str:
-        """One period at a twist (6,) (m/s, rad/s, axes of base_footprint); what limited it, or ''.
+        """One period at a twist (6,) (m/s, rad/s, axes of base_footprint).
+
+        Return what limited it, or ''.
 
         `turn_freely`: only its linear part counts.
         """
@@ -38,7 +40,7 @@ class DrivenHand(Protocol):
 
 
 class StuckError(Exception):
-    """The hand does not get there; the text says how far it got and what stopped it."""
+    """The hand does not get there. The text says how far it got and what stopped it."""
 
 
 class HandDriver:

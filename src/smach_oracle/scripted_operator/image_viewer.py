@@ -57,7 +57,7 @@ class ImageViewer:
         """What is recognised in a published image.
 
         :param size: its width and height, px.
-        :param names: what is looked for; (): all things that a hand could take.
+        :param names: what is looked for. () means all things that a hand could take.
         :raises ViewError: where nobody answers, or the image is not known.
         """
         try:
@@ -75,7 +75,7 @@ class ImageViewer:
         ]
 
     def wanted_at(self, stamp: rospy.Time, size: Tuple[int, int]) -> List[SeenThing]:
-        """The thing that the task is about in a published image, as an outline alone; or [].
+        """The thing that the task is about in a published image, as an outline alone, or [].
 
         :raises ViewError: as `outlines`.
         """

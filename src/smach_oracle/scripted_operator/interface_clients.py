@@ -33,12 +33,12 @@ class FinishClient:
         self._give_up = rospy.ServiceProxy(interface + '/give_up', GiveUpInterface)
 
     def finish(self, outcome: str, text: str) -> str:
-        """Supersede the state; why not, or ''."""
+        """Supersede the state. Return why not, or ''."""
         answer = self._finish(outcome=outcome, text=text)
         return '' if answer.ok else answer.message
 
     def give_up(self, text: str) -> None:
-        """End it without a result; does nothing where it has ended already."""
+        """End it without a result. It does nothing where it has ended already."""
         self._give_up(text=text)
 
 
@@ -81,7 +81,7 @@ class PerceptionClient:
 
 
 def until(call: Callable[[], T], holds: Callable[[T], bool], limit_s: float) -> T:
-    """Call until the answer holds, at most so long in wall time; returns the last answer."""
+    """Call until the answer holds, at most so long in wall time, and return the last answer."""
     until_s = time.monotonic() + limit_s
     answer = call()
     while not holds(answer) and time.monotonic() < until_s and not rospy.is_shutdown():

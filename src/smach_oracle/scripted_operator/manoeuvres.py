@@ -51,7 +51,7 @@ class Watcher(Protocol):
 
 
 class ManoeuvreError(Exception):
-    """It did not work; the text says what came of it."""
+    """It did not work. The text says what came of it."""
 
 
 class Attempt(NamedTuple):
@@ -233,7 +233,7 @@ def put_down(attempt: Attempt, place: np.ndarray, surface: Optional[float]) -> N
 
     :param place: (3,) m, where its centre should be, in base_footprint. It comes to stand on
         what is below.
-    :param surface: m, how high that is; None: as far as the hand gets.
+    :param surface: m, how high that is. None means as far as the hand gets.
     :raises ManoeuvreError: where it does not stand there in the end.
     :raises StuckError: where the hand does not get there.
     """
@@ -322,7 +322,7 @@ def _heading(point: np.ndarray, arm: str) -> float:
 
 
 def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
-    """Look whether a thing stands at its place; what is not seen is taken to stand there."""
+    """Look whether a thing stands at its place. What is not seen is taken to stand there."""
     thing = attempt.watcher.look_at(place).named(name)
     if thing is None or thing.box is None:
         return

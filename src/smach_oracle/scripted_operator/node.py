@@ -146,7 +146,7 @@ class ScriptedOperator:
                       time.monotonic() - begun_s)
 
     def _begin(self, listed: ListedQuestion) -> None:
-        """Count the question; a new trial is begun with an empty memory."""
+        """Count the question. A new trial is begun with an empty memory."""
         goal = listed.goal
         if (goal.robot, goal.trial_id) != self._trial:
             self._trial = (goal.robot, goal.trial_id)

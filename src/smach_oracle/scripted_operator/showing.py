@@ -24,7 +24,7 @@ class MarkedResult(NamedTuple):
 
     ok: bool
     message: str
-    mask: Optional[np.ndarray]  # (h, w) bool, as it is shown to people; None: there is none
+    mask: Optional[np.ndarray]  # (h, w) bool, as it is shown to people. None means there is none
 
 
 SegmentCall = Callable[[Region, Sequence[OperatorStroke]], MarkedResult]

@@ -13,7 +13,7 @@ from smach_oracle.msg import TeleopCommand, TeleopState
 
 from .hand_driver import GripResult, StuckError
 
-# wall time in which a command must be carried out; a gripper may take many periods
+# wall time in which a command must be carried out. A gripper may take many periods
 _ANSWER_S = 90.0
 
 
@@ -22,7 +22,7 @@ class GoalEndedError(Exception):
 
 
 class TeleoperationClient:
-    """The topics of the manipulation interface; hands of both arms share it."""
+    """The topics of the manipulation interface. Hands of both arms share it."""
 
     def __init__(self, interface: str, operator: str) -> None:
         """`interface`: name of the node, e.g. manipulation_interface."""
@@ -36,7 +36,7 @@ class TeleoperationClient:
                                             queue_size=100, tcp_nodelay=True)
 
     def wait_for_goal(self, query_id: str, limit_s: float) -> bool:
-        """Wait until the interface works on a question; whether it does.
+        """Wait until the interface works on a question. Return whether it does.
 
         :raises GoalEndedError: where the node ends.
         """
@@ -86,10 +86,10 @@ class TeleoperationClient:
 
 
 class TopicHand:
-    """A DrivenHand of one arm; see hand_driver.py."""
+    """A DrivenHand of one arm. See hand_driver.py."""
 
     def __init__(self, client: TeleoperationClient, arm: str, base: str, period: float) -> None:
-        """`base`: the robot's base frame; `period`: s, of the interface.
+        """`base`: the robot's base frame. `period`: s, of the interface.
 
         :raises StuckError: as TeleoperationClient.send does.
         :raises GoalEndedError: likewise.

@@ -61,7 +61,7 @@ class _Registered(NamedTuple):
 
 
 class Codecs:
-    """Codecs by type. `register` adds one; those that came later win.
+    """Codecs by type. `register` adds one. Those that came later win.
 
     Of a value, `encode` of the codec makes plain data, bytes, or anything else that is storable.
     `decode` is handed the same again.
@@ -166,7 +166,7 @@ class _Writer:
         self.parts: Dict[bytes, bytes] = {}
 
     def part(self, data: bytes) -> bytes:
-        """Keep bytes apart; return their digest."""
+        """Keep bytes apart, and return their digest."""
         if len(data) > MOST:
             raise NotStorable('it has {} MB, and {} are allowed'.format(len(data) >> 20,
                                                                        MOST >> 20))
@@ -235,7 +235,7 @@ def _name_of(kind: type) -> str:
 
 
 def _class_named(name: str, wanted: Callable[[type], bool]) -> type:
-    """Return a class of the program that runs; nothing is imported for it."""
+    """Return a class of the program that runs. Nothing is imported for it."""
     module, _, path = name.partition(':')
     found: Any = sys.modules.get(module)
     for part in path.split('.'):
@@ -294,12 +294,12 @@ _TAGS: Dict[str, Callable[[Any], Any]] = {
     '$complex': lambda parts: complex(*parts),
     '$ordered': lambda items: OrderedDict((key, value) for key, value in items),
 }
-OFFERED = Codecs()  # by other rooms; what the user registers goes before
+OFFERED = Codecs()  # by other rooms. What the user registers goes before
 CODECS = Codecs(OFFERED)
 
 
 def register_codec(of: Type[Any], encode: Encode, decode: Decode, name: str = '') -> None:
-    """Store values of a type in every store of this program; see `Codecs.register`.
+    """Store values of a type in every store of this program. See `Codecs.register`.
 
     :raises TypeError: where `of` is no type, or one of the functions cannot be called.
     """

@@ -2,7 +2,7 @@
 
 
 class StoreError(Exception):
-    """A store cannot be opened, read or written; the text says which and why."""
+    """A store cannot be opened, read or written. The text says which and why."""
 
 
 class StoreDamaged(StoreError):

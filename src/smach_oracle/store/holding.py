@@ -18,7 +18,7 @@ class MachineLock:
     """The lock of one machine of a store."""
 
     def __init__(self, path: str, machine: str) -> None:
-        """`path`: of the store; `machine`: name of the top machine."""
+        """`path`: of the store. `machine`: name of the top machine."""
         self._path, self._machine = path, machine
         digest = hashlib.blake2b(machine.encode('utf-8', 'replace'), digest_size=6).hexdigest()
         self._file = '{}-lock-{}'.format(os.path.abspath(path), digest)
@@ -55,7 +55,7 @@ class MachineLock:
             self._descriptor = None
 
     def is_held_elsewhere(self) -> bool:
-        """Whether another process holds it now; makes and changes no file.
+        """Whether another process holds it now. It makes and changes no file.
 
         :raises StoreError: where the file cannot be read.
         """
@@ -74,7 +74,7 @@ class MachineLock:
 
 
 def _locked(descriptor: int, kind: int, wait_s: float = 0.0) -> bool:
-    """Lock a file if that can be done in time; return whether it is locked."""
+    """Lock a file if that can be done in time, and return whether it is locked."""
     until_s = time.monotonic() + wait_s
     while True:
         try:

@@ -24,7 +24,7 @@ class Renaming:
     """
 
     def __init__(self, machine: str, names: Mapping[str, str], containers: Collection[str]) -> None:
-        """`machine`: name of the top one; `containers`: paths of all of before, '' of the top."""
+        """`machine`: name of the top one. `containers`: paths of all of before, '' of the top."""
         self._machine, self._names, self._containers = machine, dict(names), containers
 
     def __call__(self, fact: StoredFact) -> StoredFact:
@@ -64,7 +64,7 @@ class Renaming:
         return [place.label, MOVED, self._whole('/'.join(filter(None, place))), at]
 
     def _jumped_to(self, value: object) -> object:
-        """Return the path of a place to which a jump was under way; anything else as it is."""
+        """Return the path of a place to which a jump was under way. Anything else as it is."""
         if isinstance(value, str) and value.startswith(self._machine + '/'):
             return self._whole(self._path(self._below(value)))
         return value

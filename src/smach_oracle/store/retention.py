@@ -19,16 +19,16 @@ class Dropped(NamedTuple):
 
 
 class Retention:
-    """What is kept of one store; nothing is changed before `drop`."""
+    """What is kept of one store. Nothing is changed before `drop`."""
 
     def __init__(self, store: StoreFile, days: float = 0.0, size: float = 0.0) -> None:
-        """`days`: since a trial ended; `size`: bytes of the store. 0: no limit."""
+        """`days`: since a trial ended. `size`: bytes of the store. 0: no limit."""
         self._store, self._days, self._size = store, days, size
         self.going: List[Dropped] = []
         self.kept: List[Dropped] = []
 
     def plan(self, now: float) -> None:
-        """Choose what goes; `now`: s since the epoch.
+        """Choose what goes. `now`: s since the epoch.
 
         :raises StoreError: where the store cannot be read, or another program writes all the time.
         """
@@ -59,7 +59,7 @@ class Retention:
         return ''
 
     def drop(self) -> None:
-        """Take out what goes, and what nothing refers to any more; compact the file.
+        """Take out what goes, and what nothing refers to any more. Compact the file.
 
         A machine that a program holds by now keeps its trials.
 

@@ -5,7 +5,7 @@ from .codecs import Encoded
 
 
 class Fact(NamedTuple):
-    """One thing that has a new value: `name` of the container at `path`; None: it is gone."""
+    """One thing that has a new value: `name` of the container at `path`. None means it is gone."""
 
     path: str
     name: str
@@ -29,7 +29,7 @@ class NewMoment(NamedTuple):
 
 
 class StoredTrial(NamedTuple):
-    """One trial of a machine; `moments` is the number of its moments."""
+    """One trial of a machine. `moments` is the number of its moments."""
 
     number: int  # in the store
     machine: str
@@ -54,7 +54,7 @@ class StoredMoment(NamedTuple):
 
 
 class StoredValue(NamedTuple):
-    """A value as it is stored; both are None where the fact is gone."""
+    """A value as it is stored. Both are None where the fact is gone."""
 
     text: Optional[str]
     whole: Optional[bytes]

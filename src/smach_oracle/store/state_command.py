@@ -16,7 +16,7 @@ WRONG = 2  # exit code
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
-    """Run the command; return its exit code."""
+    """Run the command, and return its exit code."""
     given = _parser().parse_args(arguments)
     try:
         given.work(given)

@@ -35,16 +35,16 @@ class Standing(NamedTuple):
     """Where one container stands."""
 
     path: str
-    label: str  # of the state; of a container that has ended, its outcome
+    label: str  # of the state. Of a container that has ended, its outcome
     phase: str
     text: str  # what it failed with
 
 
 class StoppedTrial:
-    """One trial of a store; what is changed is a new moment, and those before it stay."""
+    """One trial of a store. What is changed is a new moment, and those before it stay."""
 
     def __init__(self, store: StoreFile, trial: StoredTrial, until: Optional[int] = None) -> None:
-        """`until`: the moment that is looked at; by default the last one."""
+        """`until`: the moment that is looked at. By default the last one."""
         self._store, self.trial = store, trial
         self._facts: Dict[Tuple[str, str], StoredValue] = {}
         self.latest = 0  # number of the moment that is looked at
@@ -127,7 +127,7 @@ class StoppedTrial:
     def edit(self, key: str, json_text: str, path: str, who: str) -> None:
         """Give a userdata key of a container another value.
 
-        :param json_text: plain JSON; what it means for the script is the user's business.
+        :param json_text: plain JSON. What it means for the script is the user's business.
         :param path: of the container.
         :raises StoreError: for what is no JSON, a container that is not stored, a trial that has
             ended, has gone on since it was looked at, or whose machine a process holds, and where
@@ -218,9 +218,9 @@ def trial_to_change(path: str, number: Optional[int] = None,
                     seen: Optional[int] = None) -> Iterator[StoppedTrial]:
     """Yield a trial of the store at `path`, for one change.
 
-    :param number: of the trial; by default the latest one that has not ended.
-    :param seen: the latest moment that who changes it has seen; by default what is there now.
-    :raises StoreError: where there is no such store or trial, or the store is damaged; and what
+    :param number: of the trial, by default the latest one that has not ended.
+    :param seen: the latest moment that who changes it has seen, by default what is there now.
+    :raises StoreError: where there is no such store or trial, or the store is damaged, and what
         the body raises.
     """
     StoreFile(path, read_only=True).close()  # a store is not made by looking for it
@@ -237,7 +237,7 @@ def trial_to_change(path: str, number: Optional[int] = None,
 
 
 def chosen_trial(store: StoreFile, number: Optional[int]) -> StoredTrial:
-    """Return a trial by its number; None: the latest one that has not ended, else the latest.
+    """Return a trial by its number. None means the latest one that has not ended, else the latest.
 
     :raises StoreError: where there is no such trial.
     """

@@ -12,7 +12,7 @@ from .store_file import NewTrial, StoreFile
 Warn = Callable[[str], None]
 RETRY_S = 1.0  # between two tries at a disk that fails
 CLOSE_S = 5.0
-MOST_BEHIND = 1000  # moments kept apart; more are merged into one
+MOST_BEHIND = 1000  # moments kept apart. More are merged into one
 
 
 def no_stop() -> bool:
@@ -38,7 +38,7 @@ def running_writers() -> 'List[StoreWriter]':
 class StoreWriter:
     """Commits the moments of one trial, in their order.
 
-    A moment that is not on the disk within `wait_s` s is said to be late, once; until the disk has
+    A moment that is not on the disk within `wait_s` s is said to be late, once. Until the disk has
     caught up nobody waits for it. All is written then, and that is said, too.
     """
 
@@ -65,7 +65,7 @@ class StoreWriter:
 
     @property
     def error(self) -> str:
-        """Why moments are missing on the disk; '' where it is just slow."""
+        """Why moments are missing on the disk, or '' where it is just slow."""
         return self._error
 
     @property
@@ -79,9 +79,9 @@ class StoreWriter:
         return self._is_behind
 
     def commit(self, moment: NewMoment, must_stop: Callable[[], bool] = no_stop) -> bool:
-        """Commit a moment; return whether it is on the disk now.
+        """Commit a moment, and return whether it is on the disk now.
 
-        `must_stop`: asked while it waits, and at once; where it is true nobody waits any longer.
+        `must_stop`: asked while it waits, and at once. Where it is true nobody waits any longer.
         """
         with self._ready:
             self._given += 1
@@ -109,9 +109,9 @@ class StoreWriter:
         return False
 
     def close(self, ending: Optional[Ending] = None, timeout_s: float = CLOSE_S) -> bool:
-        """Write what waits, and end; return whether all is written.
+        """Write what waits, and end. Return whether all is written.
 
-        `ending`: of the trial; None: it has not ended and can be resumed.
+        `ending`: of the trial. None means it has not ended and can be resumed.
         """
         with self._ready:
             self._end = ending
@@ -154,7 +154,7 @@ class StoreWriter:
                 self._warn('{}: all is stored again'.format(self._store.path))
 
     def _write(self, batch: List[NewMoment]) -> str:
-        """Write moments, and the end once it has come; return what went wrong, '' for nothing."""
+        """Write moments, and the end once it has come. Return what went wrong, '' for nothing."""
         try:
             if isinstance(self._trial, NewTrial):
                 self._trial = self._store.begin_trial(self._trial)
@@ -168,6 +168,6 @@ class StoreWriter:
 
 
 def merged(moments: List[NewMoment]) -> NewMoment:
-    """Return one moment that leaves the store as all of these do; those between are lost."""
+    """Return one moment that leaves the store as all of these do. Those between are lost."""
     latest = {(fact.path, fact.name): fact for moment in moments for fact in moment.facts}
     return moments[-1]._replace(facts=tuple(latest.values()), after=moments[0].after)

@@ -52,11 +52,11 @@ class Bench:
                  ros: bool = False) -> None:
         """Put a machine on the bench.
 
-        :param faults: of every trial; see `fail`, `crash`, `hang` and `overrun`.
-        :param expert: who is asked; see the function `expert`. None: the expert that the machine
+        :param faults: of every trial. See `fail`, `crash`, `hang` and `overrun`.
+        :param expert: who is asked. See the function `expert`. None: the expert that the machine
             has, else nobody answers, and no time passes. With `ros`: who answers over ROS.
-        :param settings: of the oracle, with `preconditions`, as `OracleContainer.wrap` takes them;
-            those of a machine that is wrapped already come back at the end. A `rates_file` is left
+        :param settings: of the oracle, with `preconditions`, as `OracleContainer.wrap` takes them.
+            Those of a machine that is wrapped already come back at the end. A `rates_file` is left
             alone.
         :param limit_s: seconds of wall time after which a trial is an error.
         :param ros: attach the machine to its ROS node: events, introspection, `~expert_query`.
@@ -133,7 +133,7 @@ class Bench:
         :param parent: what `execute` is given: the userdata of who executes the machine.
         :raises FaultError: for a fault that fits no state.
         :raises ScriptError: where a question did not go with the script of the expert.
-        :raises TrialLimitError: where the trial did not end in time; it was preempted then.
+        :raises TrialLimitError: where the trial did not end in time. It was preempted then.
         :raises TrialError: where the machine still runs.
         """
         __tracebackhide__ = True
@@ -199,7 +199,7 @@ class Bench:
 
 
 class _TrialNotes:
-    """What is seen of one trial, in the order in which it happens; threads may note at once."""
+    """What is seen of one trial, in the order in which it happens. Threads may note at once."""
 
     def __init__(self, machine: smach.StateMachine, failing: FailingNames) -> None:
         self.questions: List[Question] = []

@@ -10,12 +10,12 @@ from smach_oracle.oracle.errors import OracleError
 
 
 class FaultError(OracleError, ValueError):
-    """A fault, or a soak, does not fit the machine; the text says what there is."""
+    """A fault, or a soak, does not fit the machine. The text says what there is."""
 
 
 class ScriptError(AssertionError):
-    """A question does not go with the script of the expert; the text shows both."""
+    """A question does not go with the script of the expert. The text shows both."""
 
 
 class TrialLimitError(AssertionError):
-    """A trial did not end in time; the text shows how far it came."""
+    """A trial did not end in time. The text shows how far it came."""

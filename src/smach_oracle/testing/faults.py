@@ -18,15 +18,15 @@ class FaultKind(str, Enum):
 
 
 class Fault(NamedTuple):
-    """One fault of one state; `fail`, `crash`, `hang` and `overrun` make it."""
+    """One fault of one state. `fail`, `crash`, `hang` and `overrun` make it."""
 
     state: str  # LABEL or PATH/LABEL
     kind: FaultKind
     visits: Tuple[int, ...] = ()  # (): every visit
     probability: float = 1.0  # at each of these visits
     seed: int = 0  # of the probability
-    outcome: str = ''  # OUTCOME; '': the one that is named like a failure
-    outputs: Optional[Mapping[str, Any]] = None  # OUTCOME; by the state's own key names
+    outcome: str = ''  # OUTCOME. '' means the one that is named like a failure
+    outputs: Optional[Mapping[str, Any]] = None  # OUTCOME. By the state's own key names
     error: Optional[BaseException] = None  # EXCEPTION
     ignores_preempt: bool = False  # HANG
     seconds: float = 0.0  # OVERRUN; wall time
@@ -60,8 +60,9 @@ def fail(state: str, *, visit: Visits = None, outcome: str = '',
     """Let a state end in an outcome without doing anything.
 
     :param state: LABEL or PATH/LABEL, the path relative to the top machine.
-    :param visit: the number of a visit, from 1, or several; None: every visit.
-    :param outcome: one that the state has registered; '': the one that is named like a failure.
+    :param visit: the number of a visit, from 1, or several. None means every visit.
+    :param outcome: one that the state has registered. '' means the one that is named like a
+        failure.
     :param outputs: written to the userdata, by the state's own key names.
     :param probability: that it happens at each of these visits, drawn with `seed`.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
@@ -72,7 +73,7 @@ def fail(state: str, *, visit: Visits = None, outcome: str = '',
 
 def crash(state: str, *, visit: Visits = None, error: Optional[BaseException] = None,
           probability: float = 1.0, seed: int = 0) -> Fault:
-    """Let a state raise an exception (default: a RuntimeError); for the rest see `fail`.
+    """Let a state raise an exception (default: a RuntimeError). For the rest see `fail`.
 
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
@@ -83,7 +84,7 @@ def crash(state: str, *, visit: Visits = None, error: Optional[BaseException] = 
 
 def hang(state: str, *, visit: Visits = None, for_good: bool = False, probability: float = 1.0,
          seed: int = 0) -> Fault:
-    """Let a state wait until it is preempted; for the rest see `fail`.
+    """Let a state wait until it is preempted. For the rest see `fail`.
 
     :param for_good: it ignores a preempt too. The end of the trial lets it go.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
@@ -94,7 +95,7 @@ def hang(state: str, *, visit: Visits = None, for_good: bool = False, probabilit
 
 def overrun(state: str, seconds: float, *, visit: Visits = None, probability: float = 1.0,
             seed: int = 0) -> Fault:
-    """Let a state take so many seconds of wall time longer; for the rest see `fail`.
+    """Let a state take so many seconds of wall time longer. For the rest see `fail`.
 
     It waits first, and does its work then. A preempt ends the wait, and the state does nothing.
 

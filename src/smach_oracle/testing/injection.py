@@ -42,7 +42,7 @@ class ArmedFault:
         return self.fault._replace(outcome=self._outcome).does()
 
     def happens_at(self, visit: int) -> bool:
-        """Whether it happens at this visit; to be asked once for each."""
+        """Whether it happens at this visit, to be asked once for each."""
         if self.fault.visits and visit not in self.fault.visits:
             return False
         return (self.fault.probability >= 1.0
@@ -71,7 +71,10 @@ class ArmedFault:
 
 def _wait(state: smach.State, lifted: threading.Event, end_s: Optional[float],
           heeds_preempt: bool) -> bool:
-    """Wait until `end_s` (monotonic; None: without end); False where something ended it before."""
+    """Wait until `end_s` (monotonic, None means without end).
+
+    Return False where something ended it before.
+    """
     while not lifted.is_set() and not smach.is_shutdown():
         if heeds_preempt and state.preempt_requested():
             return False
@@ -95,7 +98,7 @@ class Injection:
 
     def __init__(self, machine: smach.StateMachine, faults: Iterable[Fault] = (),
                  report: Report = _tell_nobody, failing: Optional[FailingNames] = None) -> None:
-        """Find the places of the faults; nothing is changed yet.
+        """Find the places of the faults. Nothing is changed yet.
 
         :raises FaultError: where a state is not there, or has not registered an outcome.
         """
@@ -196,7 +199,7 @@ def faults(machine: smach.StateMachine, given: Iterable[Fault]) -> Iterator[Inje
     Visits are counted from the beginning of the block. The machine is restored at its end, and a
     state that hangs is let go.
 
-    :raises FaultError: where a state is not there, or has not registered an outcome; nothing has
+    :raises FaultError: where a state is not there, or has not registered an outcome. Nothing has
         been changed then.
     """
     injection = Injection(machine, given)

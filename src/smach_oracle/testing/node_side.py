@@ -1,4 +1,4 @@
-"""The ROS side of a bench; imported where ROS is asked for, and nowhere else."""
+"""The ROS side of a bench. Imported where ROS is asked for, and nowhere else."""
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.ros.attachment import attachments

@@ -12,12 +12,12 @@ from .trial_text import ProbedStep, TrialStep, jump_from, jump_to, lines_of, pla
 class TrialEvidence(NamedTuple):
     """What was seen of one trial."""
 
-    outcome: Optional[str]  # of the machine; None: it has none
+    outcome: Optional[str]  # of the machine. None means it has none
     error: Optional[BaseException]  # what left the machine
     steps: Sequence[TrialStep]
     questions: Sequence[Question] = ()
     unused_faults: Sequence[Fault] = ()  # they were to happen, and did not
-    states: Sequence[str] = ()  # all of the machine, PATH/LABEL; (): not known
+    states: Sequence[str] = ()  # all of the machine, PATH/LABEL. () means not known
     failing: FailingNames = FailingNames()
 
 
@@ -39,7 +39,10 @@ class ObservedTrial:
     # -- what happened
 
     def visits(self) -> List[str]:
-        """Return the states that were entered, PATH/LABEL, in order; ends in between not told."""
+        """Return the states that were entered, PATH/LABEL, in order.
+
+        Ends in between are left out.
+        """
         return [self._path(step) for step in self._seen.steps if _is_entry(step)]
 
     def failures(self) -> List[str]:

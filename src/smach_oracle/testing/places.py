@@ -53,9 +53,9 @@ def _children(container: smach.Container) -> Dict[str, smach.State]:
 
 
 def find_place(places: List[StatePlace], name: str, what: str) -> StatePlace:
-    """Return the place that a LABEL or PATH/LABEL names; `what` asks, for the error.
+    """Return the place that a LABEL or PATH/LABEL names. `what` asks, for the error.
 
-    The path is relative to the top machine; its own name may stand before it.
+    The path is relative to the top machine. Its own name may stand before it.
 
     :raises FaultError: where there is no such state, or where there are several.
     """

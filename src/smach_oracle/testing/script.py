@@ -18,10 +18,10 @@ BY = 'script'
 
 
 class ScriptedAnswer(NamedTuple):
-    """What the script says to one question; `goto` and the like make it."""
+    """What the script says to one question. `goto` and the like make it."""
 
     answer: Optional[Answer]  # None: nobody answers
-    about: str = ''  # the state, LABEL or PATH/LABEL, that the question must be about; '': any
+    about: str = ''  # the state, LABEL or PATH/LABEL, that the question must be about. '' means any
     done: Optional[Answer] = None  # what the interface hands over
 
     def __str__(self) -> str:
@@ -57,10 +57,10 @@ def supersede(outcome: str, *, outputs: Optional[Mapping[str, Any]] = None, abou
 
 def give_up(outcome: str = '', *, container: str = '', about: str = '',
             why: str = '') -> ScriptedAnswer:
-    """End the container with this outcome; '': as the failure would have ended it.
+    """End the container with this outcome. '' means as the failure would have ended it.
 
     :param container: a level above that ends so, LABEL or PATH/LABEL, or the name of the top
-        machine; '': the failed state's own. A level above needs an outcome.
+        machine. '' means the failed state's own. A level above needs an outcome.
     :param about: the failed state, LABEL or PATH/LABEL, that is expected in the question.
     """
     return ScriptedAnswer(Answer(AnswerKind.GIVE_UP, outcome=outcome, container=container, by=BY,
@@ -91,7 +91,7 @@ Reply = Union[Said, Callable[[Question], Said]]
 
 
 class AnswerScript(Expert):
-    """Answers one question after another; `expert` makes it.
+    """Answers one question after another. `expert` makes it.
 
     A question that is not expected, and an answer that does not fit, are noted in `problem`, and
     the question has no answer. `check` then raises.
@@ -117,7 +117,7 @@ class AnswerScript(Expert):
         return 0 if self._repeats else len(self._replies) - self._used
 
     def check(self, shown: object = '') -> None:
-        """Do nothing where every question went with the script; `shown` is added to the error.
+        """Do nothing where every question went with the script. `shown` is added to the error.
 
         :raises ScriptError: with the question and the script.
         """

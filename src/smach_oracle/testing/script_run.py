@@ -18,7 +18,7 @@ class ScriptRun:
 
     def __init__(self, trials: Sequence[ObservedTrial], exit_code: int) -> None:
         self.trials = tuple(trials)
-        self.exit_code = exit_code  # as of a process; 0 where the script was left after its trials
+        self.exit_code = exit_code  # as of a process. 0: the script was left after its trials
 
     @property
     def trial(self) -> ObservedTrial:
@@ -33,7 +33,7 @@ class ScriptRun:
 
 
 class _EnoughTrials(BaseException):
-    """Leaves the script from within; never leaves this module."""
+    """Leaves the script from within. It never leaves this module."""
 
 
 def run_script(path: str, args: Sequence[str] = (), *, faults: Iterable[Fault] = (),
@@ -44,10 +44,10 @@ def run_script(path: str, args: Sequence[str] = (), *, faults: Iterable[Fault] =
     Each top-level `execute` of a machine is a trial. The script gets the outcome, or the error.
     What the script itself raises comes through.
 
-    :param faults: of each trial; every machine that the script executes must have their states.
-    :param expert: who is asked; a script of answers begins again in each trial.
+    :param faults: of each trial. Every machine that the script executes must have their states.
+    :param expert: who is asked. A script of answers begins again in each trial.
     :param settings: of the oracle, where the script has not wrapped the machine itself.
-    :param most_trials: leave the script after so many trials; 0: let it come to its end.
+    :param most_trials: leave the script after so many trials. 0 means let it come to its end.
     :param limit_s: seconds of wall time after which a trial is an error.
     :param ros: attach the machines to the ROS node of the script, as `Bench` does.
     :raises FaultError: for a fault that fits no state.
@@ -98,7 +98,7 @@ class _ScriptTrials:
 
     def execute(self, machine: smach.StateMachine, parent: Optional[smach.UserData]
                 ) -> Optional[str]:
-        """Run one trial; return the outcome, or raise what the machine raised."""
+        """Run one trial, and return the outcome, or raise what the machine raised."""
         __tracebackhide__ = True
         self.under_way = True
         try:

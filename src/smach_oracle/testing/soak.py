@@ -24,13 +24,13 @@ KINDS = (FaultKind.OUTCOME, FaultKind.EXCEPTION)
 
 
 class SoakPlan(NamedTuple):
-    """What a soak does; each of its trials follows from this and its number."""
+    """What a soak does. Each of its trials follows from this and its number."""
 
     machine: MachineOrFactory
     seed: int = 0
     kinds: Tuple[FaultKind, ...] = KINDS
-    states: Tuple[str, ...] = ()  # LABEL or PATH/LABEL; (): all that hold no others
-    most_in_row: Optional[int] = 3  # visits in a row at which a fault happens, at most; None: all
+    states: Tuple[str, ...] = ()  # LABEL or PATH/LABEL. () means all that hold no others
+    most_in_row: Optional[int] = 3  # visits in a row at which a fault happens, at most. None: all
     overrun_s: float = 1.0
     expert: Optional[Expert] = None
     settings: SettingsLike = None
@@ -50,11 +50,11 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     function that builds the machine is called for each trial, so its states keep nothing.
 
     :param machine: a machine, or a function that builds one.
-    :param kinds: of faults; HANG is of use for states with a time limit alone.
-    :param states: which fail, LABEL or PATH/LABEL; default: all that hold no states themselves.
-    :param most_in_row: a fault happens at 1 to so many visits in a row; None: at every visit.
+    :param kinds: of faults. HANG is of use for states with a time limit alone.
+    :param states: which fail, LABEL or PATH/LABEL. Default: all that hold no states themselves.
+    :param most_in_row: a fault happens at 1 to so many visits in a row. None means at every visit.
     :param overrun_s: seconds of wall time that an OVERRUN takes.
-    :param expert: who answers, such as `expert(function)`; None: as with `Bench`.
+    :param expert: who answers, such as `expert(function)`. None means as with `Bench`.
     :param limit_s: seconds of wall time after which a trial counts as not recovered.
     :raises FaultError: for a state that is not there, where nothing can fail, and for a number
         below 1.
@@ -77,7 +77,7 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
                most_in_row: Optional[int] = 3, overrun_s: float = 1.0,
                expert: Optional[Expert] = None, settings: SettingsLike = None,
                preconditions: PreconditionLists = None, limit_s: float = LIMIT_S) -> ObservedTrial:
-    """Run one trial of a soak alone, by its number from 1; the arguments are those of `soak`.
+    """Run one trial of a soak alone, by its number from 1. The arguments are those of `soak`.
 
     :raises FaultError: for a state that is not there, where nothing can fail, and for a number
         below 1.
@@ -108,7 +108,7 @@ def _kinds(given: Iterable[FaultKind]) -> Tuple[FaultKind, ...]:
 
 
 def _names(given: Iterable[Name]) -> Tuple[Name, ...]:
-    """Return what was given as a list; a single text is one name, and not its letters."""
+    """Return what was given as a list. A single text is one name, and not its letters."""
     return (given,) if isinstance(given, str) else tuple(given)
 
 

@@ -14,7 +14,7 @@ class SoakTrial(NamedTuple):
     state: str  # PATH/LABEL
     kind: str  # of the fault, such as "outcome 'aborted'"
     fault: Fault
-    happened: bool  # the fault; False: the trial did not come to it
+    happened: bool  # the fault. False means the trial did not come to it
     recovered: bool  # the trial ended well
     asked: bool  # the expert
     ending: str  # in words
@@ -44,7 +44,7 @@ class SoakRow(NamedTuple):
 
 
 class SoakReport:
-    """What a soak found; `str` gives it as text."""
+    """What a soak found. `str` gives it as text."""
 
     def __init__(self, seed: int, trials: Sequence[SoakTrial], not_visited: Sequence[str],
                  again: Callable[[int], ObservedTrial]) -> None:
@@ -70,7 +70,7 @@ class SoakReport:
         return [row for row in self.rows if row.recovered == row.trials]
 
     def again(self, number: int) -> ObservedTrial:
-        """Run one trial again, alone; it raises what `soak_trial` raises.
+        """Run one trial again, alone. It raises what `soak_trial` raises.
 
         :raises ValueError: for a number that the soak has not.
         """

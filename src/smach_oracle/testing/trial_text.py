@@ -45,7 +45,7 @@ def jump_to(event: Event) -> str:
 
 
 def lines_of(steps: Sequence[TrialStep]) -> List[str]:
-    """Return the lines; those in the middle are left out where there are very many."""
+    """Return the lines. Those in the middle are left out where there are very many."""
     begin = steps[0].wall_time if steps else 0.0
     told = [(step, _place(step), _text(steps, index)) for index, step in enumerate(steps)]
     width = min(30, max([len(place) for _, place, text in told if text] + [0]))

@@ -1,6 +1,6 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
-FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it; no bag is
+FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
 needed. OUT gets main.svg, persistence.svg, memory.svg, continuous.svg, each with a PNG, and
 tables.md, as far as there are rows of them.
 """
@@ -38,7 +38,7 @@ def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
 
 
 def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path]:
-    """Draw what there is, and write the tables; returns the paths.
+    """Draw what there is, and write the tables. Return the paths.
 
     :raises OSError: where a file cannot be written.
     """
@@ -58,7 +58,7 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command, and return its exit code."""
     parser = argparse.ArgumentParser(prog='draw_results', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folder', metavar='FOLDER', type=path_of)

@@ -74,7 +74,7 @@ def _draw_needed(axes: Any, rows: Sequence[TrialRow]) -> None:
 
 
 def _draw_rates(axes: Any, rows: Sequence[TrialRow]) -> None:
-    """Draw the rates of the states that failed most; a small shift keeps equal ones apart."""
+    """Draw the rates of the states that failed most. A small shift keeps equal ones apart."""
     series = learned_rates(rows)
     ranked = sorted(series, key=lambda state: (-sum(rate for _, rate in series[state]), state))
     for number, state in enumerate(ranked[:MOST_STATES]):
@@ -90,7 +90,7 @@ def _draw_rates(axes: Any, rows: Sequence[TrialRow]) -> None:
 def learned_rates(rows: Sequence[TrialRow]) -> Dict[str, List[Tuple[float, float]]]:
     """Return the failure rate of each state after each trial, as (hour, rate).
 
-    It is that of the window of the latest results; where the estimator has none, of all.
+    It is that of the window of the latest results. Where the estimator has none, of all.
     """
     series: Dict[str, List[Tuple[float, float]]] = {}
     for row in rows:

@@ -71,7 +71,7 @@ def legend_above(figure: Figure, axes: Any) -> None:
 
 
 def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:
-    """Draw a figure to STEM.svg and STEM.png; the same rows give the same files.
+    """Draw a figure to STEM.svg and STEM.png. The same rows give the same files.
 
     :raises OSError: where a file cannot be written.
     """

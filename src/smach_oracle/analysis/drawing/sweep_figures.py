@@ -32,7 +32,7 @@ def draw_memory(rows: Sequence[TrialRow]) -> Figure:
 
 
 def memory_of(row: TrialRow) -> Optional[float]:
-    """Return the memory that a variant is named by; None: by none."""
+    """Return the memory that a variant is named by. None means by none."""
     named = MEMORY.fullmatch(row.variant)
     return float(named.group(2)) if named else None
 
@@ -46,7 +46,7 @@ def policy_of(row: TrialRow) -> str:
 def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],
           series_of: Callable[[TrialRow], str], x_of: Callable[[TrialRow], Optional[float]],
           label: str, aside: Callable[[float, float], float], logarithmic: bool) -> Figure:
-    """Draw shares with their intervals; series stand a little beside each other."""
+    """Draw shares with their intervals. Series stand a little beside each other."""
     tasks = tasks_of(rows)
     figure, made = panels([title_of(task) for task in tasks], HEIGHT_IN, rows=2, margins=dict(
         bottom=0.10, top=0.89, hspace=0.12))
@@ -81,7 +81,7 @@ def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],
 def _points(rows: Sequence[TrialRow], series_of: Callable[[TrialRow], str],
             x_of: Callable[[TrialRow], Optional[float]]
             ) -> Dict[Tuple[str, float], List[TrialRow]]:
-    """Return the rows of each point, by series and x; rows without an x are left out."""
+    """Return the rows of each point, by series and x. Rows without an x are left out."""
     points: Dict[Tuple[str, float], List[TrialRow]] = {}
     for row in rows:
         x = x_of(row)

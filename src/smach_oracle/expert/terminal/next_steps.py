@@ -19,7 +19,7 @@ class NextSteps:
     """Listens from before the answer is sent, so that nothing of what follows is missed."""
 
     def __init__(self, robot: str, trial_id: str) -> None:
-        """`robot`: the node's name; its events are on <robot>/oracle/events."""
+        """`robot`: the node's name. Its events are on <robot>/oracle/events."""
         self._trial_id = trial_id
         self._events: 'queue.Queue[OracleEvent]' = queue.Queue(1000)
         self._listener = RobotTopic(robot, '/oracle/events', OracleEvent, self._take)

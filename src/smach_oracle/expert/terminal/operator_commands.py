@@ -82,7 +82,7 @@ OPERATOR_WORDS = [(word, each.meaning) for word, each in _WORDS.items()] + [
 
 
 class _UsageError(Exception):
-    """What was typed is no whole command; never leaves this module."""
+    """What was typed is no whole command. It never leaves this module."""
 
 
 def robots_of_master() -> Sequence[str]:
@@ -108,7 +108,7 @@ class OperatorCommands:
         self._robots = robots
 
     def carry_out(self, line: str) -> Optional[Told]:
-        """Do what a line commands; return what is to be shown, None where it commands nothing."""
+        """Carry a line out, and return the text to show, or None where it commands nothing."""
         name, *words = line.split() or ['']
         if name != 'status' and name not in _WORDS:
             return None

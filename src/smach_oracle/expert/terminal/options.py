@@ -14,9 +14,9 @@ class AnswerOption(NamedTuple):
     key: str  # 1, 2, ...: go to; s1, ...: supersede; g, g1, ...: give up; i1, ...: interface
     words: str  # the same in words, e.g. 'goto PICK'
     kind: int  # as in ExpertDecision.msg
-    name: str  # of the state, outcome or interface; '' for giving up as the failure would have
+    name: str  # of the state, outcome or interface, or '' for giving up as the failure would have
     blocked: str = ''  # why it cannot be chosen now
-    container: str = ''  # of the state, or that ends with the outcome; '': that of the failed state
+    container: str = ''  # of the state, or the one that ends. '': that of the failed state
 
     def decision(self) -> ExpertDecision:
         """A decision without outputs or reason."""
@@ -75,7 +75,7 @@ def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
 
     By its key, its words, a name that only one has, or `s`, `i` where there is one of them.
 
-    :raises AnswerError: where there is none, several, or it is blocked; the text says what is
+    :raises AnswerError: where there is none, several, or it is blocked. The text says what is
         allowed.
     """
     typed = ' '.join(text.split())

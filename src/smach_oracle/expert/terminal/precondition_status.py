@@ -18,7 +18,7 @@ class PreconditionStatusListener:
     """Listens for as long as the question is shown: the robot checks while somebody listens."""
 
     def __init__(self, robot: str, query_id: str) -> None:
-        """`robot`: the node's name; it publishes <robot>/oracle/preconditions."""
+        """`robot`: the node's name. It publishes <robot>/oracle/preconditions."""
         self._query_id = query_id
         self._newest: Optional[PreconditionChecks] = None
         self._heard_s = 0.0
@@ -31,7 +31,7 @@ class PreconditionStatusListener:
             self._heard_s, self._newest = time.monotonic(), message
 
     def lines(self) -> List[Line]:
-        """One for each precondition; none where the robot publishes nothing, or there are none."""
+        """One for each precondition. None where the robot publishes nothing, or there are none."""
         newest, since_s = self._newest, time.monotonic() - self._heard_s
         return [_line(check, since_s) for check in newest.checks] if newest is not None else []
 

@@ -32,7 +32,7 @@ class QuitTerminal(Exception):
 
 
 class PromptInterrupted(Exception):
-    """The prompt ended because what it asked about is over; the text gives the reason."""
+    """The prompt ended because what it asked about is over. The text gives the reason."""
 
 
 class Prompts:

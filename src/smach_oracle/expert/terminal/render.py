@@ -67,7 +67,7 @@ def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
 
 
 def history(visits: Sequence[VisitedState]) -> Text:
-    """The chain of visited states, latest last; the oldest are left out of a long one."""
+    """The chain of visited states, latest last. The oldest are left out of a long one."""
     text = Text('… → ' if len(visits) > _SHOWN_VISITS else '', 'dim')
     for index, visit in enumerate(visits[-_SHOWN_VISITS:]):
         sign, style = _VISITS.get(visit.result, ('?', ''))

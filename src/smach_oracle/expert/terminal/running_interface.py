@@ -74,7 +74,7 @@ class RunningInterface:
         return clean(lines[-1]) if lines else ''
 
     def follow_hand(self) -> None:
-        """Follow the state of a hand, as soon as there is one; asks the master."""
+        """Follow the state of a hand, as soon as there is one. It asks the master."""
         if self._state_subscriber is not None:
             return
         try:

@@ -39,7 +39,7 @@ _RETURN_S = 20.0  # how long a server may take to come back, and its robots to a
 
 
 class Terminal:
-    """A conversation with one expert; claims are given back however it ends."""
+    """A conversation with one expert. Claims are given back however it ends."""
 
     def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
                  next_steps: Callable[[str, str], NextSteps] = NextSteps,
@@ -99,7 +99,7 @@ class Terminal:
             self._operate(line)
 
     def _operate(self, line: str) -> bool:
-        """Do what an operator commands; whether it was that."""
+        """Do what an operator commands. Return whether it was that."""
         told = self._operator.carry_out(line)
         for text, style in told or ():
             self._say(text, style)
@@ -168,7 +168,7 @@ class Terminal:
             self._say('{}; t takes it over.'.format(response.message), 'yellow')
 
     def _answered(self, listed: ListedQuestion, steps: NextSteps) -> bool:
-        """Ask for one line and act on it; whether that has settled the question."""
+        """Ask for one line and act on it. Return whether that has settled the question."""
         available = options(listed.goal)
         line = self._ask(listed, '\nanswer: ',
                          [(option.key, option.words) for option in available] + _COMMANDS
@@ -183,7 +183,7 @@ class Terminal:
         return False
 
     def _command(self, listed: ListedQuestion, line: str) -> bool:
-        """Do what is no answer; whether it was that."""
+        """Do what is no answer. Return whether it was that."""
         _quit_on(line)
         if line == 'l':
             raise LeaveQuestion
@@ -199,7 +199,7 @@ class Terminal:
         return line in ('', 't', 'p', 'r') or self._operate(line)
 
     def _decide(self, listed: ListedQuestion, option: AnswerOption) -> Optional[ExpertDecision]:
-        """The decision with its outputs and reason; None where Ctrl-C went back."""
+        """The decision with its outputs and reason, or None where Ctrl-C went back."""
         self._say('→ {}'.format(option.words), 'bold')
         try:
             return self._complete(listed, option)
@@ -262,7 +262,7 @@ class Terminal:
                                  lambda: self._why_to_stop(listed), choices, validator)
 
     def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
-        """Why to stop working on a question; None as long as it is ours to answer."""
+        """Why to stop working on a question, or None as long as it is ours to answer."""
         if not self._front_end.connected(listed.server):
             return self._gone_for_good('{} is gone.'.format(listed.server))
         now = self._front_end.find(listed.key)
@@ -336,7 +336,7 @@ def main() -> None:
     console = Console()
     try:
         wait_for_master(console)
-        # a name of its own each; Ctrl-C is ours; the log stays off the screen (its file has it)
+        # a name of its own each. Ctrl-C is ours. The log stays off the screen (its file has it)
         rospy.init_node('expert_terminal', anonymous=True, disable_signals=True,
                         log_level=rospy.FATAL)
     except KeyboardInterrupt:

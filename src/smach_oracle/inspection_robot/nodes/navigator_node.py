@@ -27,7 +27,7 @@ MOTORS_LIMIT_S = 2.0  # that it waits for motors that are off
 
 
 class DriveError(Exception):
-    """The drive has failed; the text says why."""
+    """The drive has failed. The text says why."""
 
 
 class Navigator:
@@ -110,7 +110,7 @@ class Navigator:
             self._server.set_preempted(MoveBaseResult(), 'preempted')
 
     def _drive_to(self, target: PoseStamped) -> bool:
-        """Whether it has arrived; False: it was preempted.
+        """Whether it has arrived. False means it was preempted.
 
         :raises DriveError: where it does not get there.
         :raises RouteError: where there is no way.

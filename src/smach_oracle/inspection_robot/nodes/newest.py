@@ -27,7 +27,7 @@ class NewestMessage:
                           and self.message.header.stamp > stamp, limit_s)
 
     def any(self, limit_s: float) -> Optional[Any]:
-        """The newest message; None where there is none within so much wall time (s)."""
+        """The newest message, or None where there is none within so much wall time (s)."""
         return self._wait(lambda: self.message is not None, limit_s)
 
     def stop(self) -> None:

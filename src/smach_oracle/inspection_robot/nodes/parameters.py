@@ -7,7 +7,7 @@ import rospy
 
 
 class ParameterError(ValueError):
-    """A parameter that cannot be used; the text says what is allowed."""
+    """A parameter that cannot be used. The text says what is allowed."""
 
 
 def parameters_of(description: str) -> None:

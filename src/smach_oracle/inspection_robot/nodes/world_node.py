@@ -28,7 +28,7 @@ REPORT = re.compile(r'panel (\d+): (\d+(?:\.\d+)?) bar')
 
 
 class InspectionWorldNode:
-    """Serves one world after the other; `run` lets their time pass."""
+    """Serves one world after the other. `run` lets their time pass."""
 
     def __init__(self) -> None:
         """:raises ParameterError: for a parameter that cannot be used."""

@@ -17,7 +17,7 @@ SOFT = 0.05  # m: what lies off by more counts less and less
 
 
 class LocalisationError(Exception):
-    """The scan fits nowhere; the text says how well it does."""
+    """The scan fits nowhere. The text says how well it does."""
 
 
 def _wall_distances(points: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ class Localiser:
         :param believed: the search goes SEARCH_M and SEARCH_RAD around it.
         :param ranges: (n,) m along each ray.
         :param angles: (n,) rad of the rays, to the left from straight ahead.
-        :param longest: m; what is as far as that is no wall.
+        :param longest: m. What is as far as that is no wall.
         :raises LocalisationError: where too few points lie on walls.
         """
         seen = np.isfinite(ranges) & (ranges < longest)

@@ -16,7 +16,7 @@ LEAST_NEEDLE = 0.35  # share of the needle's pixels that must be seen
 
 
 class ReadingError(Exception):
-    """The gauge cannot be read; the text says why."""
+    """The gauge cannot be read. The text says why."""
 
 
 class GaugeReading(NamedTuple):

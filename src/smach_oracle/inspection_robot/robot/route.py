@@ -15,11 +15,11 @@ Point = Tuple[float, float]
 
 
 class RouteError(Exception):
-    """There is no way; the text says from where to where."""
+    """There is no way. The text says from where to where."""
 
 
 class RoutePlanner:
-    """Plans on a grid of the hall; what stands in the hall and is not on the plan it ignores."""
+    """Plans on a grid of the hall. What stands in the hall and is not on the plan it ignores."""
 
     def __init__(self) -> None:
         shape = (int(SIZE[0] / CELL), int(SIZE[1] / CELL))
@@ -76,7 +76,7 @@ class RoutePlanner:
 
     @staticmethod
     def _straightened(points: List[Point]) -> List[Point]:
-        """Fewer legs: each as long as the walls let it be; without the start."""
+        """Fewer legs: each as long as the walls let it be. Without the start."""
         legs, here = [], 0
         while here < len(points) - 1:
             there = next((end for end in range(len(points) - 1, here + 1, -1)

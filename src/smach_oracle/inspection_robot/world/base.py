@@ -56,7 +56,7 @@ class WheeledBase:
         self._silent_s = 0.0
 
     def command(self, v: float, w: float) -> None:
-        """Set the speed (m/s) and the turn rate (rad/s); what is too fast is cut."""
+        """Set the speed (m/s) and the turn rate (rad/s). What is too fast is cut."""
         self._wanted = Twist(min(max(v, -MAX_SPEED), MAX_SPEED), min(max(w, -MAX_TURN), MAX_TURN))
         self._silent_s = 0.0
 
@@ -67,7 +67,7 @@ class WheeledBase:
                                               self.pose[1] - wet.y) < wet.radius
 
     def step(self, dt_s: float, people: Sequence[Tuple[float, float, float]] = ()) -> None:
-        """Let time pass (s). `people`: x, y and radius in m; it cannot drive through them."""
+        """Let time pass (s). `people`: x, y and radius in m. It cannot drive through them."""
         self._silent_s += dt_s
         running = self.powered and self._silent_s < COMMAND_LIMIT_S
         wanted = self._wanted if running else Twist()

@@ -32,7 +32,7 @@ class Glare(NamedTuple):
 
 
 class Sag(NamedTuple):
-    """The battery's voltage breaks down; the base takes the power from its motors meanwhile."""
+    """The battery's voltage breaks down. The base takes the power from its motors meanwhile."""
 
     begins_s: float  # of the trial
     ends_s: float
@@ -53,7 +53,8 @@ class TrialScene(NamedTuple):
 def draw(seed: int, only: Optional[Sequence[str]] = None) -> TrialScene:
     """The world of a seed.
 
-    :param only: the causes that are there for certain, and no others; None: each by its chance.
+    :param only: the causes that are there for certain, and no others. None means each by its
+        chance.
     :raises ValueError: for a cause that is not among CHANCE.
     """
     unknown = sorted(set(only or ()) - set(CHANCE))

@@ -29,7 +29,7 @@ def painted(number: int, reading: float) -> np.ndarray:
 
 def _line(image: np.ndarray, reading: float, inner: float, outer: float, colour: tuple,
           width: int) -> None:
-    """A line along the radius at a reading; both ends in shares of a side from the middle."""
+    """A line along the radius at a reading. Both ends in shares of a side from the middle."""
     angle = ZERO_ANGLE - SWEEP * reading / GAUGE_RANGE
     ends = [(int(SIDE * (DIAL[0] + share * math.cos(angle))),
              int(SIDE * (DIAL[1] - share * math.sin(angle)))) for share in (inner, outer)]

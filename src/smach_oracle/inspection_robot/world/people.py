@@ -14,7 +14,7 @@ class Errand(NamedTuple):
     """Where a person goes, one place after the other, once they set out."""
 
     begins_s: float  # of the trial
-    places: Tuple[Tuple[float, float], ...]  # m; the first is where they wait before it
+    places: Tuple[Tuple[float, float], ...]  # m. The first is where they wait before it
     stands_s: Tuple[float, ...]  # how long they stand at each place
 
 

@@ -60,7 +60,7 @@ def _distance(pose: Pose, place: Sequence[float]) -> float:
 
 
 def _hall(walls: np.ndarray) -> np.ndarray:
-    """Floor, walls and ceiling; walls are darker far away, and at every joint of their slabs."""
+    """Floor, walls and ceiling. Walls are darker far away, and at every joint of their slabs."""
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     image[:] = (118, 112, 104)
     image[:HEIGHT // 2] = (206, 208, 212)
@@ -107,7 +107,7 @@ def _hang(image: np.ndarray, pose: Pose, panel: GaugePanel, front: np.ndarray,
 
 
 def _stand(image: np.ndarray, near: np.ndarray, walls: np.ndarray) -> None:
-    """Paint a person; `near`: m along the optical axis in each column, inf beside them."""
+    """Paint a person. `near`: m along the optical axis in each column, inf beside them."""
     seen = near < walls
     safe = np.where(seen, np.maximum(near, 0.1), 1.0)
     for low, high, colour in ((0.0, 0.85, _LEGS), (0.85, 1.45, _SHIRT), (1.45, BODY_HEIGHT, _SKIN)):

@@ -26,7 +26,7 @@ class ArmNames(NamedTuple):
     tool: str  # link that commands move
     command: str  # topic for trajectory_msgs/JointTrajectory
     gripper: str  # control_msgs/GripperCommand action
-    # rad, one for each joint: where the arm is at ease; none: the middle of its ranges
+    # rad, one for each joint: where the arm is at ease. None means the middle of its ranges
     posture: Sequence[float] = ()
 
     @classmethod
@@ -67,17 +67,20 @@ class JointListener:
             return dict(self._positions), self._stamp
 
     def silent_s(self, names: Sequence[str]) -> float:
-        """Wall time (s) for which one of these joints has been silent; inf: one never was heard."""
+        """Wall time (s) for which one of these joints has been silent.
+
+        Infinity means one never was heard.
+        """
         with self._changed:
             return time.monotonic() - min(self._heard_s.get(name, -math.inf) for name in names)
 
     def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time,
                         period_s: float, limit_s: float) -> bool:
-        """Wait until joints are reported a period after `since`; whether they were.
+        """Wait until joints are reported a period after `since`. Return whether they were.
 
         Where `before` is given, they must be elsewhere than that.
 
-        A world that stands still while nobody commands it repeats its positions to the last bit; a
+        A world that stands still while nobody commands it repeats its positions to the last bit. A
         later report of others comes from after the command.
         """
         after = since + rospy.Duration(0.9 * period_s)
@@ -89,7 +92,7 @@ class JointListener:
             return self._changed.wait_for(passed, limit_s)
 
     def catch_up(self, stamp: rospy.Time, limit_s: float) -> bool:
-        """Wait until the joints of `stamp` or later are known; whether they are."""
+        """Wait until the joints of `stamp` or later are known. Return whether they are."""
         with self._changed:
             return self._changed.wait_for(lambda: self._stamp >= stamp, limit_s)
 
@@ -130,7 +133,7 @@ class GripperPort:
     def move(self, position: float, effort: float) -> None:
         """Begin to move to `position` m between the tips, with at most `effort` N.
 
-        The same once more, while it is on its way there, changes nothing; anything else comes in
+        The same once more, while it is on its way there, changes nothing. Anything else comes in
         its place.
         """
         if self.moving and self._wanted == (position, effort):
@@ -147,7 +150,7 @@ class GripperPort:
             sent.cancel()
 
     def poll(self, timeout_s: float) -> bool:
-        """Take notice of a motion's end; whether it has just ended."""
+        """Take notice of a motion's end. Return whether it has just ended."""
         if self._sent is None:
             return False
         event = self._sent.poll(timeout_s)

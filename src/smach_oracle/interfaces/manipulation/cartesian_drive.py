@@ -1,7 +1,7 @@
 """From the velocity of a tool to the velocities of the arm's joints, within all limits.
 
-Damped least squares; a limit slows all joints alike, so that the tool keeps its direction and only
-gets slower. ROS-free. Lengths in m, angles in rad, times in s; twists are (6,): linear, then
+Damped least squares. A limit slows all joints alike, so that the tool keeps its direction and only
+gets slower. ROS-free. Lengths in m, angles in rad, times in s. Twists are (6,): linear, then
 angular, along the axes of the chain's base, about the tool's origin. The teleoperation of the
 paper, section V-A.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 # m between the finger tips of an open gripper, unless a front end is set otherwise: a PR2's
 GRIPPER_OPEN = 0.085
-# rad; a joint with less room than this before its limit takes no part in a motion towards it
+# rad. A joint with less room than this before its limit takes no part in a motion towards it
 _ROOM = 1e-4
 _EASE_GAIN = 2.0  # 1/s, towards the arm's posture
 _EASE_SPEED = 0.8  # rad/s
@@ -22,8 +22,8 @@ class ArmKinematics(Protocol):
     """A serial chain, such as geometry.chain.JointChain."""
 
     names: List[str]  # of the joints
-    lower: np.ndarray  # rad; -inf for continuous joints
-    upper: np.ndarray  # rad; inf for continuous joints
+    lower: np.ndarray  # rad, or -inf for continuous joints
+    upper: np.ndarray  # rad, or inf for continuous joints
     velocity: np.ndarray  # rad/s, inf where there is none
 
     def forward(self, joints: np.ndarray) -> np.ndarray:
@@ -36,9 +36,9 @@ class ArmKinematics(Protocol):
 class Clearance(NamedTuple):
     """The nearest thing that the arm could hit."""
 
-    distance: float  # m; negative where they overlap
+    distance: float  # m. Negative where they overlap
     between: str  # what is near what, for people
-    # a thing of the world may be touched on purpose, if slowly; the robot's own body may not
+    # a thing of the world may be touched on purpose, if slowly. The robot's own body may not
     touchable: bool
 
 
@@ -58,7 +58,7 @@ class DriveLimits(NamedTuple):
     joint_margin: float = 0.02  # rad kept from the joints' position limits
     singular_below: float = 0.06  # singular values of the Jacobian below this are damped
     damping: float = 0.08  # at a singularity
-    # share of the twist that may be lost to a joint at its limit; beyond it, nothing moves
+    # share of the twist that may be lost to a joint at its limit. Beyond it, nothing moves
     off_course: float = 0.35
     slow_below: float = 0.08  # m of clearance
     stop_below: float = 0.01  # m of clearance
@@ -96,7 +96,7 @@ class CartesianDrive:
         """
         :param near: returns, for joint positions (n,), the nearest things that the arm could hit,
             one of a kind at most.
-        :param posture: (n,) rad, to which the arm goes where the tool may turn freely; by default
+        :param posture: (n,) rad, to which the arm goes where the tool may turn freely, by default
             the middle of the ranges.
         """
         self.arm = arm
@@ -115,10 +115,10 @@ class CartesianDrive:
              turn_freely: bool = False) -> DriveStep:
         """Where the joints (n,) go within one period for the tool to move by `twist` (6,).
 
-        :param turn_freely: only the linear part counts; meanwhile, also where it is zero, tool and
+        :param turn_freely: only the linear part counts. Meanwhile, also where it is zero, tool and
             elbow turn as brings the arm to its posture.
         :raises ValueError: for joints, a twist or a period that is not finite or has the wrong
-            shape; a period of 0.
+            shape, a period of 0.
         """
         joints, twist = _checked(joints, twist, period, len(self.arm.names))
         if turn_freely:
@@ -148,7 +148,7 @@ class CartesianDrive:
 
     def _joint_velocities(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray
                           ) -> Tuple[np.ndarray, str, float]:
-        """Velocities for the twist; joints at their limits rest as long as the others can do it.
+        """Velocities for the twist. Joints at their limits rest as long as the others can do it.
 
         :returns: velocities (n,), the limit met or '', and the share of the twist that is left
             along its direction.
@@ -189,7 +189,7 @@ class CartesianDrive:
     def _spare(self, joints: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """Velocities (n,) for the motion that the tool does not notice.
 
-        They lead away from limits that are near; where the tool may turn freely, to the arm's
+        They lead away from limits that are near. Where the tool may turn freely, to the arm's
         posture.
         """
         offset = (joints - self._middle) / self._half_range

@@ -19,14 +19,14 @@ PYBULLET = 'pybullet==3.2.7'
 # pairs of links that are as near in more than this share of all postures are left out
 _ALWAYS_NEAR = 0.5
 _SAMPLES = 40
-# m; deeper than a robot can be in itself: its convex shapes are larger than the links
+# m. Deeper than a robot can be in itself: its convex shapes are larger than the links
 _OVERLAP = -0.02
 
 Pair = Tuple[int, int]  # links, by PyBullet's indices
 
 
 class ClearanceError(ValueError):
-    """The robot's model cannot be used; the text says why."""
+    """The robot's model cannot be used. The text says why."""
 
 
 def load_pybullet() -> ModuleType:
@@ -80,7 +80,7 @@ class ClearanceModel:
         self._boxes: List[Tuple[int, str]] = []
 
     def set_joints(self, positions: Mapping[str, float]) -> None:
-        """Where the joints are (rad or m); names that the model does not have are left out."""
+        """Where the joints are (rad or m). Names that the model does not have are left out."""
         known = [(self._joints[name], [position]) for name, position in positions.items()
                  if name in self._joints]
         if known:

@@ -6,7 +6,7 @@ from typing import Deque, List, NamedTuple
 
 from smach_oracle.msg import TeleopCommand
 
-_MOST = 100  # commands that wait; the oldest are lost
+_MOST = 100  # commands that wait. The oldest are lost
 
 
 class ArrivedCommand(NamedTuple):
@@ -33,7 +33,7 @@ class CommandInbox:
             self._filled.notify()
 
     def take_all(self, timeout_s: float) -> List[ArrivedCommand]:
-        """All that have come, the oldest first; none where none comes within the time."""
+        """All that have come, the oldest first. None where none comes within the time."""
         with self._filled:
             self._filled.wait_for(lambda: self._waiting, timeout_s)
             found = list(self._waiting)

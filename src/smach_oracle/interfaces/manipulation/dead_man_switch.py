@@ -1,6 +1,6 @@
 """Who drives, and whether they still do: a dead-man's switch with a watchdog.
 
-Pure; times are monotonic, in s.
+Pure. Times are monotonic, in s.
 """
 import math
 
@@ -14,7 +14,7 @@ class DeadManSwitch:
     def __init__(self, watchdog_s: float, lease_s: float = 0.0) -> None:
         """
         :param watchdog_s: it is held for so long after each command.
-        :param lease_s: others may take it after so long where that is sooner; the holder goes on
+        :param lease_s: others may take it after so long where that is sooner. The holder goes on
             where nobody has.
         """
         self._watchdog_s = watchdog_s
@@ -33,7 +33,7 @@ class DeadManSwitch:
         return now_s >= self._leased_until_s
 
     def press(self, operator: str, now_s: float) -> str:
-        """Hold it, or keep holding it; why not, or ''."""
+        """Hold it, or keep holding it. Return why not, or ''."""
         holder = self.holder(now_s)
         if holder and holder != operator and not self.lapsed(now_s):
             return '{} drives; one at a time'.format(holder)
@@ -46,7 +46,7 @@ class DeadManSwitch:
         return ''
 
     def release(self, operator: str) -> None:
-        """The operator has let go; others keep hold."""
+        """The operator has let go. Others keep hold."""
         self.refuse(operator)
         if operator == self._dropped:
             self._dropped = ''
@@ -57,7 +57,7 @@ class DeadManSwitch:
             self._until_s = -math.inf
 
     def press_for_nothing(self, operator: str, now_s: float) -> None:
-        """Pressed while there is nothing to hold it for; the next goal is not held by it either."""
+        """Pressed while there is nothing to hold it for. The next goal is not held by it either."""
         self.refuse(operator)
         if math.isfinite(self._watchdog_s):  # without one, silence means nothing
             self._dropped, self._silent_until_s = operator, now_s + _LET_GO_S

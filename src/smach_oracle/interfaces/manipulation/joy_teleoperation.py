@@ -91,7 +91,7 @@ RELEASED = JoystickCommand(False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), None)
 
 def joystick_command(settings: JoySettings, axes: Sequence[float],
                      buttons: Sequence[int]) -> JoystickCommand:
-    """The command of a joystick's message; an axis that is missing or not finite moves nothing."""
+    """The command of a joystick's message. An axis that is missing or not finite moves nothing."""
     if not _pressed(buttons, settings.dead_man):
         return RELEASED
     speeds = []
@@ -151,7 +151,7 @@ class JoyTeleoperation:
         ]
 
     def run(self) -> None:
-        """Until the node goes down; in wall time, as a joystick is."""
+        """Until the node goes down, in wall time, as a joystick is."""
         was_held = False
         while not rospy.is_shutdown():
             with self._lock:

@@ -1,7 +1,7 @@
 """The manipulation interface: a person drives the robot's arms in place of a failed state.
 
 A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState), `~finish` and
-`~give_up`; for any robot with a robot_description, joint_states, arms that take joint trajectories
+`~give_up`, for any robot with a robot_description, joint_states, arms that take joint trajectories
 and grippers of control_msgs.
 """
 import threading
@@ -34,7 +34,7 @@ _GRIPPER_S = 60.0  # the same, for a motion of the gripper
 
 
 class TeleoperationServer:
-    """Hosts the interface; one thread carries out the commands, one after the other.
+    """Hosts the interface. One thread carries out the commands, one after the other.
 
     :raises SettingsError: for a setting or a robot description that cannot be used.
     """
@@ -46,7 +46,7 @@ class TeleoperationServer:
         self._arms = arms
         self._surroundings = surroundings
         self._last_arm = next(iter(arms))  # the one moved last
-        # in lock-step nothing moves between commands; a slow sender must not change what its
+        # in lock-step nothing moves between commands. A slow sender must not change what its
         # commands do, but one that is dead does not keep the others out
         self._dead_man = (DeadManSwitch(float('inf'), settings.lease_s) if settings.lock_step
                           else DeadManSwitch(settings.watchdog_s))
@@ -149,7 +149,7 @@ class TeleoperationServer:
         return self._dead_man.holder(time.monotonic()) if self._goal.goal is not None else ''
 
     def _take(self, arrived: ArrivedCommand) -> None:
-        """Carry out a command, or refuse it; a bad one of the driver stops the arm."""
+        """Carry out a command, or refuse it. A bad one of the driver stops the arm."""
         command = arrived.command
         self._seq, self._sender = command.seq, command.operator
         self._refused = self._why_not(arrived)
@@ -213,7 +213,7 @@ class TeleoperationServer:
         self._last_arm = command.arm
         arm = self._arms[command.arm]
         motion = (command.gripper, command.gripper_effort or self._settings.gripper_effort)
-        # a front end may repeat it for as long as it is held, so that none is lost; what is done is
+        # a front end may repeat it for as long as it is held, so that none is lost. What is done is
         # not done again
         if command.move_gripper and (self._settings.lock_step or motion != self._gripped):
             arm.gripper.move(*motion)

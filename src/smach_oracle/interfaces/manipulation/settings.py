@@ -24,7 +24,7 @@ from .surroundings import Surroundings
 from .teleoperated_arm import DescribedRobot, TeleoperatedArm
 
 NO_SNAPSHOT = 'none'
-# of the tool, when the gripper last closed on something; else where it is now
+# of the tool, when the gripper last closed on something, else where it is now
 GRASP_POSE = 'grasp_pose'
 TOOL_POSE = 'tool_pose'  # of the tool, now
 _WORLD_HZ = 60.0  # control periods in a second of a world in lock-step
@@ -36,12 +36,12 @@ _NEVER_ZERO = ('linear', 'angular', 'joint_share')  # of the limits: what is div
 class StateTeleoperation(NamedTuple):
     """What the interface does about one state."""
 
-    arm: str = ''  # which one the person begins with; '': the one driven last
+    arm: str = ''  # which one the person begins with. '' means the one driven last
     outputs: Mapping[str, str] = {}  # output key: one of _OUTPUTS
 
 
 class TeleoperationSettings(NamedTuple):
-    """The node's settings; launch/manipulation_interface.yaml explains each."""
+    """The node's settings. launch/manipulation_interface.yaml explains each."""
 
     arms: Dict[str, ArmNames]
     base: str

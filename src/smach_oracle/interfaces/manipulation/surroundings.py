@@ -39,7 +39,7 @@ class Surroundings:
         arm.watch(self._model.arm(arm.chain, self._within))
 
     def replace(self, message: CollisionBoxes) -> None:
-        """Take over a new map; warn of one in a frame that the robot does not have."""
+        """Take over a new map. Warn of one in a frame that the robot does not have."""
         try:
             boxes = self._boxes(message)
         except ValueError as err:

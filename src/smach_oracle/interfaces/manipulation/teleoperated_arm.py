@@ -105,7 +105,7 @@ class TeleoperatedArm:
                 or (self.gripper.why_not() if command.move_gripper else ''))
 
     def _unknown(self, more: Sequence[str], frozen: bool) -> str:
-        """Why the positions of the arm's joints, or of `more`, are not known; '' where they are."""
+        """Why positions of the arm's joints, or of `more`, are not known, '' where they are."""
         needed = joints_between(self._tree, self._robot.base, self._names.tool)[::-1]
         needed += [name for name in more if name not in needed]
         positions, _ = self._robot.listener.now()
@@ -155,7 +155,7 @@ class TeleoperatedArm:
         return step, self._robot.listener.wait_for_period(moved, since, period_s, limit_s)
 
     def catch_up(self, stamp: rospy.Time, limit_s: float) -> bool:
-        """Wait until the joints of `stamp` or later are known; whether they are."""
+        """Wait until the joints of `stamp` or later are known. Return whether they are."""
         return self._robot.listener.catch_up(stamp, limit_s)
 
     def measured(self, positions: Mapping[str, float]) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""A person marks the object in the camera image; GrabCut cuts it out."""
+"""A person marks the object in the camera image. GrabCut cuts it out."""

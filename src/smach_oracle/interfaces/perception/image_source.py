@@ -33,7 +33,7 @@ CameraMessages = Mapping[str, Union[Image, CameraInfo]]
 
 
 class ImageSourceError(Exception):
-    """No image can be had; the text says what is missing."""
+    """No image can be had. The text says what is missing."""
 
 
 class TakenImage(NamedTuple):
@@ -49,9 +49,9 @@ class ImageSource:
     def __init__(self, rgb: str, depth: str, camera_info: str, base_frame: str,
                  snapshot: str = NO_SNAPSHOT, limit_s: float = 20.0) -> None:
         """
-        :param rgb: topics; depth must be registered to colour.
-        :param base_frame: the frame of all poses that are handed out; its z axis points up.
-        :param snapshot: service (Snapshot) that publishes an image and returns its stamp; `none`:
+        :param rgb: topics. Depth must be registered to colour.
+        :param base_frame: the frame of all poses that are handed out. Its z axis points up.
+        :param snapshot: service (Snapshot) that publishes an image and returns its stamp. `none`:
             take the next one.
         :param limit_s: wall time that an image may take.
         """
@@ -104,7 +104,7 @@ class ImageSource:
         return None
 
     def _snap(self, limit_s: float) -> Optional[rospy.Time]:
-        """The stamp of the image to wait for; None: any."""
+        """The stamp of the image to wait for. None means any."""
         if self._snapshot is None:
             return None
         try:
@@ -140,7 +140,7 @@ class _CameraSubscriptions:
         self._transforms.unregister()
 
     def connected(self) -> bool:
-        """Whether every topic has a publisher; waits until new ones send to this node."""
+        """Whether every topic has a publisher. It waits until new ones send to this node."""
         trees = [
             each for tree in (self._transforms.tf_sub, self._transforms.tf_static_sub)
             for each in live_connections(tree)
@@ -171,7 +171,7 @@ class _CameraSubscriptions:
                     for each, depth in pairs if abs((depth - each).to_sec()) <= slack_s]
 
     def pose(self, base_frame: str, header: Header) -> Optional[np.ndarray]:
-        """4x4: the base from the camera at the moment of a header; None while it is not known."""
+        """4x4: the base from the camera at the moment of a header, None while not known."""
         try:
             found = self._buffer.lookup_transform_core(base_frame, header.frame_id.lstrip('/'),
                                                        header.stamp).transform

@@ -22,13 +22,13 @@ MARGIN = 0.01  # m from the surface's edge
 
 
 class MarkedSceneError(Exception):
-    """The surface cannot be made out; the text says why."""
+    """The surface cannot be made out. The text says why."""
 
 
 class MarkedScene(NamedTuple):
     """In the frame of the base."""
 
-    surface: UprightBox  # what is seen of it; its height is 0
+    surface: UprightBox  # what is seen of it. Its height is 0
     others: List[UprightBox]  # other things on it, nearest to the base first
 
 

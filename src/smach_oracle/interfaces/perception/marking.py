@@ -79,7 +79,7 @@ class ObjectMarking:
     def image_in_use(self, stamp: rospy.Time) -> TakenImage:
         """The image in use.
 
-        :param stamp: of the image that was drawn on; zero for whichever is in use.
+        :param stamp: of the image that was drawn on. Zero for whichever is in use.
         :raises ImageSourceError: where there is none, or it is another one.
         """
         self._taken.wait()
@@ -94,7 +94,7 @@ class ObjectMarking:
         return taken
 
     def mark(self, taken: TakenImage, region: np.ndarray, strokes: List[Stroke]) -> ObjectInImage:
-        """Cut an object out of the image in use; `outputs` then hands it over.
+        """Cut an object out of the image in use. `outputs` then hands it over.
 
         :param region: (n, 2) px, corners of a polygon.
         :raises SegmentationError: where that gives no object.
@@ -116,7 +116,7 @@ class ObjectMarking:
     def outputs(self, outcome: str, given: Collection[str] = ()) -> Mapping[str, OutputMessage]:
         """The outputs that the template lists for this outcome.
 
-        :param given: output keys that the person gives; nothing need be marked where they are all.
+        :param given: output keys that the person gives. Nothing need be marked where they are all.
         :raises InterfaceGoalError: where nothing is marked, or the image did not show enough for
             an output.
         """
@@ -151,7 +151,7 @@ class ObjectMarking:
 
 
 def output_messages(marked: ObjectInImage) -> Dict[str, OutputMessage]:
-    """Messages for the names in OUTPUT_PARTS; those of the scene only where it is known."""
+    """Messages for the names in OUTPUT_PARTS. Those of the scene only where it is known."""
     segmented = marked.segmented
     pose, size = box_messages(segmented.box, marked.header)
     cloud = cloud_message(segmented.points, marked.header, segmented.colours)

@@ -1,7 +1,7 @@
 """From a drawing on a camera image to the object: GrabCut gives a mask, depth place and size.
 
-Works on any image that has colour, depth, intrinsics and the camera's pose; knows no ROS. The same
-image and drawing give the same object. The segmentation interface of the paper, section V-A.
+Works on any image that has colour, depth, intrinsics and the camera's pose. It knows no ROS. The
+same image and drawing give the same object. The segmentation interface of the paper, section V-A.
 """
 from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -19,7 +19,7 @@ LEAST_MASK = 40  # px
 LEAST_SHARE = 0.03  # of the region's area that a mask must have
 LEAST_DEPTH = 30  # pixels of the mask with a depth
 LEAST_DEPTH_SHARE = 0.15
-# px that GrabCut sees; a larger crop is scaled down, so that the answer stays quick
+# px that GrabCut sees. A larger crop is scaled down, so that the answer stays quick
 WORK_AREA = 26000
 ITERATIONS = 4
 STROKE_WIDTH = 5.0  # px
@@ -27,13 +27,13 @@ ON_SURFACE = 0.008  # m: a point no further from the surface belongs to that, no
 
 _NO_RECTANGLE = (0, 0, 0, 0)  # of GrabCut, which begins from a mask
 
-Corners = Tuple[int, int, int, int]  # left, top, right, bottom; the last two excluded
+Corners = Tuple[int, int, int, int]  # left, top, right, bottom. The last two excluded
 
 
 class SegmentationError(Exception):
-    """What was drawn gives no object; the text says why and what may help.
+    """What was drawn gives no object. The text says why and what may help.
 
-    `mask`: (h, w) bool, where GrabCut found one; what came after it failed then.
+    `mask`: (h, w) bool, where GrabCut found one, what came after it failed then.
     """
 
     def __init__(self, text: str, mask: Optional[np.ndarray] = None) -> None:
@@ -56,7 +56,7 @@ class SegmentedObject(NamedTuple):
     box: UprightBox  # in the frame of the base
     points: np.ndarray  # (n, 3) m, in the frame of the base
     colours: np.ndarray  # (n, 3) uint8
-    surface: Optional[Plane]  # what it stands on; None where the image does not show it
+    surface: Optional[Plane]  # what it stands on, or None where the image does not show it
 
 
 def rectangle(left: float, top: float, width: float, height: float) -> np.ndarray:

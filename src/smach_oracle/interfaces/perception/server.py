@@ -1,7 +1,7 @@
 """The perception interface: a person marks the object that a failed detection did not find.
 
 A SharedAutonomy action beside `~image` and `~cloud` (the image in use), `~segment`, `~use_frame`,
-`~finish` and `~give_up`; for any robot with a camera that gives colour and registered depth, and a
+`~finish` and `~give_up`, for any robot with a camera that gives colour and registered depth, and a
 tf tree from it to the base.
 """
 import time

@@ -91,7 +91,7 @@ def choices_of(question: AskedQuestion) -> AnswerChoices:
 def checked_type(given: object) -> Answer:
     """Return what an expert's port has given, where it is an answer and its fields can be read.
 
-    :raises AnswerError: where it is not; the text says which type is wrong.
+    :raises AnswerError: where it is not. The text says which type is wrong.
     """
     if not isinstance(given, Answer):
         raise AnswerError('it is {}, not an Answer'.format(_type_of(given)))
@@ -138,7 +138,7 @@ def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
     """Check an answer that is `addressed`, and the keys of its outputs.
 
-    :raises AnswerError: where it does not fit; the text says what would.
+    :raises AnswerError: where it does not fit. The text says what would.
     """
     _CHECKS[answer.kind](answer, choices)
     check_output_keys(choices.failed_state, answer.outputs or (), choices.output_keys)

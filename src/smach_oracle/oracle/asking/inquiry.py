@@ -20,14 +20,14 @@ _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
 class Asker(Protocol):
     """The recovery that asks: what an inquiry needs of it."""
 
-    tried: List[str]  # what was tried already, in words; runs of interfaces are added
+    tried: List[str]  # what was tried already, in words. Runs of interfaces are added
     question_cancelled: threading.Event  # the question is to be taken back
 
     def stopped(self) -> bool:
         """Whether something ends the recovery, such as a preempt or a shutdown."""
 
     def make_question(self, deadline_s: float) -> Question:
-        """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
+        """Return a new question about the failure. `deadline_s`: seconds left, 0 without end."""
 
     def say_that_it_waits(self, question: Question) -> None:
         """Log that the machine waits for an answer."""
@@ -77,11 +77,11 @@ class _StopWatch:
 
 
 class _NoAnswer(Exception):
-    """Nobody answers this question any more; never leaves this module."""
+    """Nobody answers this question any more. It never leaves this module."""
 
 
 class Inquiry:
-    """All questions about one failure; they share one deadline, in monotonic time."""
+    """All questions about one failure. They share one deadline, in monotonic time."""
 
     def __init__(self, asker: Asker, expert: Expert, deadline_s: float) -> None:
         """`deadline_s`: 0 waits without end."""

@@ -10,7 +10,7 @@ from ..settings.interfaces import InterfaceOffer
 
 
 class AnswerKind(IntEnum):
-    """What an expert may decide; the numbers are those of ExpertDecision.msg."""
+    """What an expert may decide. The numbers are those of ExpertDecision.msg."""
 
     GOTO = 1
     SUPERSEDE = 2
@@ -29,9 +29,9 @@ class StateChoice(NamedTuple):
     preconditions: Tuple[str, ...]  # names, in the order in which they run
     blocked: str = ''  # why it cannot be entered now, '' where it can
     # states done in this trial that would come again behind it, though they are not repeated by
-    # themselves; its own label: going there repeats it
+    # themselves. Its own label: going there repeats it
     repeats: Tuple[str, ...] = ()
-    container: str = ''  # path of its container; '': that of the failed state
+    container: str = ''  # path of its container. '' means that of the failed state
     # of a Concurrence, and of what lies in one that is entered for it: the labels of its branches,
     # which all run again
     runs_again: Tuple[str, ...] = ()
@@ -41,7 +41,7 @@ class OutcomeChoice(NamedTuple):
     """An outcome with which the failed state may be superseded, and where it leads."""
 
     outcome: str
-    target: str  # a state or a container outcome; of a branch: words for people
+    target: str  # a state or a container outcome, of a branch: words for people
 
 
 class LevelOutcome(NamedTuple):
@@ -59,7 +59,7 @@ class PreconditionStatus(NamedTuple):
 
 
 class PreconditionProbe:
-    """Finds out how the preconditions of a question's choices stand; the oracle implements it."""
+    """Finds out how the preconditions of a question's choices stand. The oracle implements it."""
 
     names: Tuple[Tuple[str, str], ...] = ()  # state and precondition of each
 
@@ -101,7 +101,7 @@ class Question(NamedTuple):
     input_userdata: Mapping[str, Any]
     deadline_s: float  # 0: waits without end
     fallback: str  # what happens at the deadline, in words
-    # how those of the choices stand, as long as it is open; None: nobody can tell
+    # how those of the choices stand, as long as it is open. None means nobody can tell
     preconditions: Optional[PreconditionProbe] = None
     give_up_above: Tuple[LevelOutcome, ...] = ()  # innermost level first
 
@@ -145,7 +145,7 @@ Progress = Callable[[str, str, str], None]
 class Expert:
     """Where questions go.
 
-    ros/ implements it with the ExpertQuery action; tests implement it in a few lines.
+    ros/ implements it with the ExpertQuery action. Tests implement it in a few lines.
     """
 
     def ask(self, question: Question, cancelled: threading.Event,
@@ -154,8 +154,8 @@ class Expert:
 
         It is called in its own thread. It must return soon (tens of milliseconds) after `cancelled`
         is set. A second later it is abandoned, and its answer is dropped. An
-        INTERFACE answer is handed back as it is; `run_interface` is then called. Deadlines are
-        monotonic wall time. May raise AnswerError for an answer that cannot be used; the question
+        INTERFACE answer is handed back as it is. `run_interface` is then called. Deadlines are
+        monotonic wall time. May raise AnswerError for an answer that cannot be used. The question
         is then put again.
         """
         raise NotImplementedError
@@ -173,5 +173,5 @@ class Expert:
 
 
 def names(items: Iterable[object]) -> str:
-    """A list for an error text; outcomes and labels need not be strings."""
+    """A list for an error text. Outcomes and labels need not be strings."""
     return ', '.join(sorted(map(str, items))) or '(none)'

@@ -28,7 +28,7 @@ from .stand_in import StandIn, real
 
 
 class _Resumed(NamedTuple):
-    """How a container goes on that was under way; see `Border.resume`."""
+    """How a container goes on that was under way. See `Border.resume`."""
 
     keys: Dict[str, Any]
     gone: Tuple[str, ...]
@@ -54,7 +54,7 @@ class Border:
         self._resumed: Optional[_Resumed] = None
 
     def in_words(self) -> str:
-        """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
+        """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
         return ''
 
     def nodes(self) -> List[TreeNode]:
@@ -62,7 +62,10 @@ class Border:
         return [machine._oracle for machine in self.machines.values()]
 
     def enter(self) -> bool:
-        """Put the branches in their places; False where that cannot be, so that it runs bare."""
+        """Put the branches in their places.
+
+        Return False where that cannot be, so that it runs bare.
+        """
         with self._lock:
             nodes = self.nodes()
             if self._is_in_use or not self._runs_in_tree():
@@ -83,8 +86,8 @@ class Border:
                tell: Callable[[Mapping[str, Any]], None]) -> None:
         """Have this userdata at the next execution, once its inputs are copied.
 
-        `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1;
-        0: the first. `tell`: takes the userdata as they are then.
+        `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1.
+        0 means the first. `tell`: takes the userdata as they are then.
         """
         self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
 
@@ -197,12 +200,12 @@ class IteratorBorder(Border):
         self.goes_on = False
 
     def in_words(self) -> str:
-        """Return which item is under way, such as 'item 2 of 4'; '' where none is."""
+        """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
         return self._items.in_words() if self._is_in_use and self._items is not None else ''
 
     @property
     def item_number(self) -> int:
-        """Number of the item under way, from 1; 0: none is."""
+        """Number of the item under way, from 1. 0 means none is."""
         return self._items.number if self._is_in_use and self._items is not None else 0
 
     # -- going on
@@ -212,7 +215,7 @@ class IteratorBorder(Border):
         self._is_asked_to_go_on = go_on
 
     def outcome_before(self) -> Optional[str]:
-        """Return how the execution before has ended; None: by an error, or it was left."""
+        """Return how the execution before has ended. None means by an error, or it was left."""
         return self._ended_with
 
     def note_left(self) -> None:
@@ -333,7 +336,7 @@ class IteratorBorder(Border):
 
 
 def border_of(state: object) -> Optional[Border]:
-    """Return what is kept beside a Concurrence or an Iterator; None for anything else."""
+    """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
     border = getattr(state, '_oracle_border', None)
     return border if isinstance(border, Border) else None
 

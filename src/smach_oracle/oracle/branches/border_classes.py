@@ -96,7 +96,7 @@ def take_border_away(container: smach.Container) -> None:
 
 
 def bordered_class(base: type) -> type:
-    """Return the class of bordered containers of class `base`; the same one each time."""
+    """Return the class of bordered containers of class `base`, the same one each time."""
     made = _MADE.get(base)
     if made is None:
         mixin = _BorderedIterator if issubclass(base, smach.Iterator) else _Bordered

@@ -35,7 +35,7 @@ class Branch:
         return False
 
     def passes_over(self, outcome: str) -> str:
-        """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
+        """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
         return ''
 
 
@@ -107,6 +107,6 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
 
 
 def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:
-    """Return the entries of an outcome map, or of the conditions in it; none of what is no map."""
+    """Return the entries of an outcome map, or of the conditions in it. None of what is no map."""
     items: Optional[Any] = getattr(given, 'items', None)
     return tuple(items()) if callable(items) else ()

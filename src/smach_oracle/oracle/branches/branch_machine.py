@@ -10,7 +10,7 @@ COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a
 
 
 class BranchMachine(smach.StateMachine):
-    """A machine of one state, which stays the user's own object; nobody sees the machine.
+    """A machine of one state, which stays the user's own object. Nobody sees the machine.
 
     It is stepped like any wrapped machine. Its userdata is that of the Concurrence or Iterator
     itself, so that what a branch writes is seen by the others at once. Its outcomes are those of
@@ -41,7 +41,7 @@ class BranchMachine(smach.StateMachine):
 
 
 def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
-    """Execute a branch, through its oracle where it fails; return the outcome of its state.
+    """Execute a branch, through its oracle where it fails, and return the outcome of its state.
 
     `pending_preempt`: whether a preempt is under way already. It raises what the state has raised
     where its oracle gives up.

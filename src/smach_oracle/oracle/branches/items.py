@@ -14,11 +14,11 @@ class TrackedItems:
     """
 
     def __init__(self, given: Items, tell: Tell) -> None:
-        """`given`: an iterable, or a callable that returns one; `tell` takes words for the log."""
+        """`given`: an iterable, or a callable that returns one. `tell` takes words for the log."""
         self.given = given
         self.goes_on = False
         self.begins_with = 1  # number of the item that is the first where it begins again
-        self.number = 0  # of the item under way, from 1; 0: none
+        self.number = 0  # of the item under way, from 1. 0 means none
         self.is_finished = True  # the item under way
         self.is_exhausted = False
         self._tell = tell
@@ -33,7 +33,7 @@ class TrackedItems:
         return bool(self.number) and not self.is_exhausted
 
     def in_words(self) -> str:
-        """Return 'item 2 of 4', without the count where nobody knows it; '' before the first."""
+        """Return 'item 2 of 4', without the count where nobody knows it, or '' before the first."""
         if not self.number:
             return ''
         count = self._count

@@ -9,7 +9,7 @@ from .branch_machine import run_branch
 
 
 class StandIn:
-    """Executes a branch through its oracle; in all else it is the user's state.
+    """Executes a branch through its oracle. In all else it is the user's state.
 
     Its own place is in the container's tables alone, and only while that executes. Whoever asks the
     container for its children gets the user's states.
@@ -25,7 +25,7 @@ class StandIn:
         self._is_under_way = False
 
     def execute(self, userdata: smach.UserData) -> object:
-        """Execute the state, and recover where it fails; return its outcome."""
+        """Execute the state, and recover where it fails. Return its outcome."""
         self._note_outcome(None)
         outcome = self._execute(userdata)
         self._note_outcome(outcome)

@@ -64,14 +64,14 @@ class Checkpointer:
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
-        # paths and keys of what is named; of a trial that goes on its first part has done so
+        # paths and keys of what is named. Of a trial that goes on its first part has done so
         self._told = set() if before is None else {
             (path, key) for path, told in before.containers.items() for key in told.missing}
         self._named = WeakIds()  # values that are named
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
 
     def __call__(self, event: Event) -> None:
-        """Take one event; see EventSource."""
+        """Take one event. See EventSource."""
         if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
             self._begin_trial()
         node = self._node_of(event)

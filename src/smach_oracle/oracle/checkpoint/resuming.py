@@ -76,7 +76,7 @@ def _end_goals(top: TreeNode, resumption: Resumption) -> None:
 
 
 class EntryPoint:
-    """Where one container goes on; it is used up when that begins to execute."""
+    """Where one container goes on. It is used up when that begins to execute."""
 
     def __init__(self, stored: StoredContainer, down: Sequence[Place] = ()) -> None:
         """`down`: the states in which the containers below begin, where it is sent to one."""
@@ -132,7 +132,10 @@ def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
 
 
 def go_on(top: TreeNode, resumption: Resumption) -> None:
-    """Set every container of the tree to where it was; to be called once the trial has begun."""
+    """Set every container of the tree to where it was.
+
+    It is to be called once the trial has begun.
+    """
     nodes = list(nodes_of(top.machine))
     latest = 0
     for node in nodes:
@@ -167,7 +170,7 @@ def _begin_at(top: TreeNode, resumption: Resumption) -> None:
 
 
 def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
-    """Have what was learned and counted of a state; return the number of its latest visit."""
+    """Have what was learned and counted of a state, and return the number of its latest visit."""
     record.restore(told['learned'])
     record.go_on(told['counts'], told['longest_s'])
     mark = node.records.marks.of(record.label)
@@ -249,7 +252,7 @@ class _Setting:
             told.phase for key, told in tree.containers.items() if key.startswith(path + '/'))
 
     def _set(self, node: TreeNode) -> bool:
-        """Set a container in a state that was under way; see `activate`."""
+        """Set a container in a state that was under way. See `activate`."""
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():
@@ -328,7 +331,7 @@ class _Setting:
                           self._resumption.asks)
 
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
-        """Return the containers directly in a state; None where it can only go on as a whole."""
+        """Return the containers directly in a state, or None where it can only go on as a whole."""
         inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
         state = node.machine._states.get(label)
         return inside if inside and _is_wrapped_through(state) else None

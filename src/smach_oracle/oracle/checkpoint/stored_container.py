@@ -9,8 +9,8 @@ from ..records.visits import Visit
 class StoredContainer:
     """One container as it was.
 
-    `at`: label (or, where it has ended, its outcome), phase, and what belongs to that; empty where
-    it has not begun in the present visit of the state that holds it. `keys`: userdata.
+    `at`: label (or, where it has ended, its outcome), phase, and what belongs to that, or empty
+    where it has not begun in the present visit of the state that holds it. `keys`: userdata.
     `missing`: why a key that was there is not. `gone`: keys that were deleted. `visits`: of its
     latest execution, oldest first. `snapshots`: userdata with which its states began, by label.
     `asked`: label and id of the open question. `item`: of an Iterator, the number of the one under

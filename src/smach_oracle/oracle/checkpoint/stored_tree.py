@@ -155,7 +155,7 @@ class _Reading:
         return found
 
     def _value(self, key: str, value: StoredValue) -> Any:
-        """Return a value; the same object where a container hands it to those below."""
+        """Return a value, the same object where a container hands it to those below."""
         known = self._decoded
         if (key, value) not in known:
             known[key, value] = self._codecs.decode(value.text, value.whole, self._store.part)

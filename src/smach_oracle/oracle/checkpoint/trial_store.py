@@ -107,7 +107,7 @@ class TrialStore:
 
     def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
                     earlier: int = 0) -> Resumption:
-        """Return how a trial goes on; `tree`: what its last moment says."""
+        """Return how a trial goes on. `tree`: what its last moment says."""
         moments = self._store.moments(trial.number)
         # what runs elsewhere, and what was asked, has not become undone
         kept = {name: value for name, value in tree.whole.items()
@@ -152,7 +152,7 @@ class TrialStore:
                 fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
 
     def _or_let_go(self, read: Callable[[], _Read]) -> _Read:
-        """Return what is read of the store; let go of it where that fails."""
+        """Return what is read of the store. Let go of it where that fails."""
         try:
             with understood(self._store.path):
                 return read()

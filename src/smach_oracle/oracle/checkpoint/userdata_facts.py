@@ -30,7 +30,7 @@ class WeakIds:
         self._seen: Dict[int, 'weakref.ref[Any]'] = {}
 
     def add(self, value: object) -> bool:
-        """Note an object; return whether it is new."""
+        """Note an object, and return whether it is new."""
         seen = self._seen.get(id(value))
         if seen is not None and seen() is value:
             return False
@@ -61,7 +61,7 @@ class UserdataFacts:
     def changed(self, data: Dict[str, Any], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
         """Yield the facts that are new.
 
-        `data`: the userdata. `reached`: keys whose values may have changed inside; None: all.
+        `data`: the userdata. `reached`: keys whose values may have changed inside. None means all.
         """
         known = self._known
         for key, value in list(data.items()):
@@ -114,9 +114,9 @@ def _told(key: object) -> str:
 
 
 def _print_of(value: object) -> Optional[bytes]:
-    """Return bytes that differ where plain data differ; None for anything else."""
+    """Return bytes that differ where plain data differ, or None for anything else."""
     try:
-        return marshal.dumps(cast(Any, value), _WITHOUT_REFERENCES)  # to compare; never loaded
+        return marshal.dumps(cast(Any, value), _WITHOUT_REFERENCES)  # to compare, never loaded
     except ValueError:
         return None
 

@@ -27,7 +27,7 @@ class Engine(Protocol):
 class Jump(NamedTuple):
     """A state to which a container goes at its next state boundary.
 
-    `container`: path of the container of the state; '': it is the one that goes.
+    `container`: path of the container of the state. '' means it is the one that goes.
     """
 
     state: str
@@ -66,7 +66,7 @@ class Control:
     # -- of the machines
 
     def begin_trial(self) -> None:
-        """A pause, breakpoints and levels stay from the trial before; jumps do not."""
+        """A pause, breakpoints and levels stay from the trial before. Jumps do not."""
         with self._changed:
             self._jumps.clear()
             self._moving.clear()
@@ -87,7 +87,7 @@ class Control:
             engine.attentive = self.is_set or engine.stays_attentive
 
     def leave(self, engine: Engine, path: str) -> Optional[Jump]:
-        """Forget a machine whose execution is over; return the jump that it has not made."""
+        """Forget a machine whose execution is over, and return the jump that it has not made."""
         with self._changed:
             self._engines.pop(id(engine), None)
             self._note_arrived(path)
@@ -123,7 +123,7 @@ class Control:
         return False
 
     def begin(self, hold: Hold) -> None:
-        """Show that a container waits; the operator may let it go from now on."""
+        """Show that a container waits. The operator may let it go from now on."""
         with self._changed:
             self._judge_level(hold)  # it may have been set since it was looked up
             self._holds.append(hold)
@@ -135,9 +135,9 @@ class Control:
             self._holds.remove(hold)
 
     def wait(self, hold: Hold, ended_by: EndedBy) -> LetGo:
-        """Wait until a hold that has begun is let go; return by what.
+        """Wait until a hold that has begun is let go, and return by what.
 
-        :param ended_by: what else ends the wait, such as a preempt; asked 20 times a second.
+        :param ended_by: what else ends the wait, such as a preempt. It is asked 20 times a second.
         """
         while True:
             let_go = ended_by()  # a user's machine has a say in it: not under the lock
@@ -162,7 +162,7 @@ class Control:
         return LetGo.CONFIRMED if hold.confirmed else LetGo.RESUMED
 
     def level_of(self, place: HeldPlace, default: str) -> str:
-        """Return the autonomy of a state; `default`: by its settings."""
+        """Return the autonomy of a state. `default`: by its settings."""
         with self._changed:
             return self._level_of(place, default)
 
@@ -215,7 +215,7 @@ class Control:
                 self._stopping = False
 
     def resume(self) -> Tuple[Hold, ...]:
-        """Lift the pause; return what waited because of it, or was sent from where it waited."""
+        """Lift the pause. Return what waited because of it, or was sent from where it waited."""
         with self._changed:
             held, moving = self._held(''), dict(self._moving) if self.paused else {}
             self.paused, self.paused_by = False, ''
@@ -231,7 +231,7 @@ class Control:
     def step(self, path: str = '') -> Tuple[Hold, ...]:
         """Let what waits enter one state each, also what waits for a confirmation.
 
-        :param path: of the container; '': every one.
+        :param path: of the container. '' means every one.
         :returns: what goes on.
         """
         with self._changed:
@@ -243,9 +243,9 @@ class Control:
             return held
 
     def confirm(self, path: str = '') -> Tuple[Hold, ...]:
-        """Confirm the states before which containers wait for that; return those.
+        """Confirm the states before which containers wait for that, and return those.
 
-        :param path: of the container; '': every one.
+        :param path: of the container. '' means every one.
         """
         with self._changed:
             self._settle()
@@ -292,7 +292,7 @@ class Control:
             self._note_change()
 
     def remove_breakpoint(self, pattern: PathPattern) -> bool:
-        """Take a breakpoint away; return whether there was one. A pause by it stays."""
+        """Take a breakpoint away, and return whether there was one. A pause by it stays."""
         with self._changed:
             was_set = self._breakpoints.pop(pattern.text, None) is not None
             self._note_change()

@@ -35,7 +35,7 @@ class HeldPlace(NamedTuple):
 
 
 class Hold:
-    """One wait; `Control` alone writes to it."""
+    """One wait. `Control` alone writes to it."""
 
     __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent',
                  'asks', 'autonomy', 'key')

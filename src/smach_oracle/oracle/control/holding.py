@@ -28,7 +28,7 @@ class Wait(NamedTuple):
 
 
 def wait_until_let_go(control: Control, hold: Hold, wait: Wait) -> LetGo:
-    """Wait until the hold is let go; return by what."""
+    """Wait until the hold is let go, and return by what."""
     control.begin(hold)
     since_s = time.monotonic()
     let_go = None

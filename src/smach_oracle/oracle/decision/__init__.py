@@ -1,1 +1,2 @@
-"""From a situation to a decision: failure rates and policies (paper, IV). Pure; no smach."""
+"""From a situation to a decision: failure rates and policies (paper, IV). Pure, and without smach.
+"""

@@ -1,6 +1,6 @@
 """How often a state fails, learned with a limited memory (paper, IV-A, IV-C). Pure.
 
-The estimate starts as the designer's prior; every result pushes one share of the prior out, and
+The estimate starts as the designer's prior. Every result pushes one share of the prior out, and
 once the memory is full only the latest results count. Two estimators share one face: a window and
 an exponentially weighted mean.
 """
@@ -15,7 +15,7 @@ _ROUNDING = 1e-9  # a rate that equals a threshold except for binary rounding ha
 
 
 class FailureClass(IntEnum):
-    """Class of a state by its failure rate; the numbers are those of OracleEvent.msg."""
+    """Class of a state by its failure rate. The numbers are those of OracleEvent.msg."""
 
     NO_CLASS = 0
     LOW = 1
@@ -52,7 +52,7 @@ class FailureRate:
     kind = 'window'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results; `prior`: failure rate, 0 to 1.
+        """`memory`: results. `prior`: failure rate, 0 to 1.
 
         :raises SettingsError: for a memory or prior that is not allowed.
         """
@@ -65,7 +65,7 @@ class FailureRate:
         self._failed: Deque[int] = deque()  # which of them were failures, of the last memory + 1
 
     def add(self, failed: bool) -> None:
-        """Learn one result; O(1)."""
+        """Learn one result, in O(1)."""
         if failed:
             self._forget(self._results - self.memory)
             self._failed.append(self._results)
@@ -75,13 +75,13 @@ class FailureRate:
             self.add_successes(1)
 
     def add_successes(self, count: int) -> None:
-        """Learn `count` successes in a row; O(1), as each failure is forgotten once."""
+        """Learn `count` successes in a row. O(1), as each failure is forgotten once."""
         self._results += count
         self.successes += count
         self._forget(self._results - self.memory - 1)
 
     def take_back_failure(self) -> None:
-        """Unlearn the latest result, which must have been a failure; O(1)."""
+        """Unlearn the latest result, which must have been a failure, in O(1)."""
         self._failed.pop()
         self._results -= 1
         self.failures -= 1
@@ -102,7 +102,7 @@ class FailureRate:
 
     @property
     def recent(self) -> Tuple[int, int]:
-        """How many failures there are among how many latest results; O(1)."""
+        """How many failures there are among how many latest results, in O(1)."""
         failures = len(self._failed)
         if failures and self._failed[0] < self._results - self.memory:
             failures -= 1
@@ -151,7 +151,7 @@ class ExponentialFailureRate:
     kind = 'exponential'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results; `prior`: failure rate, 0 to 1.
+        """`memory`: results. `prior`: failure rate, 0 to 1.
 
         :raises SettingsError: for a memory or prior that is not allowed.
         """
@@ -163,7 +163,7 @@ class ExponentialFailureRate:
         self._rate = self._before = self.prior
 
     def add(self, failed: bool) -> None:
-        """Learn one result; O(1)."""
+        """Learn one result, in O(1)."""
         self._before = self._rate
         self._rate += (float(failed) - self._rate) / self.memory
         if failed:
@@ -172,7 +172,7 @@ class ExponentialFailureRate:
             self.successes += 1
 
     def add_successes(self, count: int) -> None:
-        """Learn `count` successes in a row; O(1)."""
+        """Learn `count` successes in a row, in O(1)."""
         self._rate *= (1.0 - 1.0 / self.memory) ** count
         self.successes += count
 
@@ -199,7 +199,7 @@ class ExponentialFailureRate:
         }
 
     def restore(self, learned: Mapping[str, Any]) -> None:
-        """Take over a `snapshot`; one of the other estimator gives the totals alone.
+        """Take over a `snapshot`. One of the other estimator gives the totals alone.
 
         :raises ValueError: where it is no snapshot.
         """

@@ -1,6 +1,6 @@
 """From a situation to a decision: Algorithm 1 and its alternatives (paper, IV-C). Pure.
 
-doc/policies.md holds each policy as a table, cell by cell; the tests read those tables.
+doc/policies.md holds each policy as a table, cell by cell. The tests read those tables.
 """
 from typing import Dict, Mapping
 
@@ -73,7 +73,7 @@ NO_PARAMETERS: Mapping[str, float] = {}
 def policy_named(name: str, parameters: Mapping[str, float] = NO_PARAMETERS) -> Policy:
     """Return the policy of this name.
 
-    :param parameters: where they are not the defaults; they have been checked.
+    :param parameters: where they are not the defaults. They have been checked.
     :raises SettingsError: where there is none of this name.
     """
     if name not in POLICIES:

@@ -18,7 +18,7 @@ class DecisionFacts(NamedTuple):
     target: str = ''  # of a revisit or a step back
     met: Sequence[str] = ()  # preconditions that were made to hold
     not_met: str = ''  # the one that could not
-    spent: int = -1  # recoveries of this trial, where they are all spent; else -1
+    spent: int = -1  # recoveries of this trial, where they are all spent, else -1
     blocked: str = ''  # why the policy's own choice is not possible
     held_back: str = ''  # why the state was not executed, where it has not failed
     asked: str = ''  # who is asked, and how long: "an expert, 300 s"
@@ -50,7 +50,7 @@ def going_would_repeat(state: str, target: str, repeated: Sequence[str]) -> str:
 def still_running_sentence(state: str, ran_s: float, longest_s: Optional[float]) -> str:
     """Return what a person is told of a state that takes much longer than ever before.
 
-    `longest_s`: of its visits that have ended; None: not known.
+    `longest_s`: of its visits that have ended. None means not known.
     """
     return '{} still runs after {}. It has no time limit, so it is not abandoned.'.format(
         state, ran_in_words(ran_s, longest_s))

@@ -1,7 +1,7 @@
 """What a policy is asked, and what it may answer (paper, IV-C). Pure.
 
-A policy is asked three things, in this order: is this a continuous failure; must the preconditions
-be run; and, once they have run, what now. Where a step back leads is the policy's business too.
+A policy is asked three things, in this order: is this a continuous failure. Must the preconditions
+be run, and, once they have run, what now. Where a step back leads is the policy's business too.
 """
 from enum import Enum
 from typing import Mapping, NamedTuple, Optional, Tuple
@@ -10,7 +10,7 @@ from .failure_rate import FailureClass
 
 
 class Action(str, Enum):
-    """What the oracle does; the values are those of DECISION events."""
+    """What the oracle does. The values are those of DECISION events."""
 
     REVISIT = 'revisit'  # enter the failed state again
     STEP_BACK = 'step_back'  # enter the state that the policy steps back to
@@ -59,7 +59,7 @@ class Situation(NamedTuple):
 
 
 class Policy:
-    """Base of the policies; they hold no state.
+    """Base of the policies. They hold no state.
 
     `asks`: whether it may ask. Where it may not, the container ends wherever else an expert would
     be asked. `parameters`: what may be set, with the defaults.
@@ -87,11 +87,11 @@ class Policy:
         raise NotImplementedError
 
     def may_do(self, situation: Situation) -> Tuple[Action, ...]:
-        """Return all that `decide` may return; more than one action where that is drawn."""
+        """Return all that `decide` may return. More than one action where that is drawn."""
         return (self.decide(situation),)
 
     def why(self, situation: Situation) -> str:
-        """Say why it gives up or asks, as a clause; '' where its cell says it all."""
+        """Say why it gives up or asks, as a clause, or '' where its cell says it all."""
         return ''
 
     def wait_s(self, situation: Situation) -> float:

@@ -17,13 +17,13 @@ from .transitions import terminate
 
 
 class Stop(NamedTuple):
-    """The state is not executed now; `outcome`: of the container, None where it goes on."""
+    """The state is not executed now. `outcome`: of the container, None where it goes on."""
 
     outcome: Optional[str] = None
 
 
 def pass_boundary(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
-    """Do before a state what an operator has asked for; None where the state is executed now.
+    """Do before a state what an operator has asked for. None: the state is executed now.
 
     :param was_preempted: whether there was a preempt request, which the last state may have obeyed.
     """
@@ -109,7 +109,7 @@ def _ended_by(node: TreeNode) -> Optional[LetGo]:
 
 
 def _end_preempted(node: TreeNode) -> Optional[Stop]:
-    """End the container at once, preempted; None where it has no outcome for that.
+    """End the container at once, preempted. Return None where it has no outcome for that.
 
     Then its state is executed under the request, as without an oracle.
     """

@@ -31,7 +31,7 @@ class Departure:
         self._repeated = set(repeated_on(verdict.way)) if verdict.way is not None else set()
 
     def why_not(self) -> str:
-        """Say what prevents it at its arrival that did not when it was decided; '' if nothing.
+        """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
 
         What was preempted may have gone on for a while.
         """
@@ -54,7 +54,9 @@ class Departure:
 
 
 def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
-    """Leave the containers between a failure and the level that goes on; whether they are left.
+    """Leave the containers between a failure and the level that goes on.
+
+    Return whether they are left.
 
     They are not where another departure came before, such as that of a concurrent branch. That one
     leaves the containers in between, too.
@@ -97,7 +99,7 @@ def _leave_way(left: List[TreeNode]) -> None:
     some time later, and once in an execution. Until then an Iterator on the way would go on with
     its next item.
 
-    :param left: innermost first; that of the failure ends by itself.
+    :param left: innermost first. That of the failure ends by itself.
     """
     around = [link.below for node in reversed(left) for link in links_to(node)]
     for container in around[:-1]:
@@ -109,7 +111,7 @@ def _leave_way(left: List[TreeNode]) -> None:
 
 
 def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
-    """Return the containers from that of a failure up to below a level; none if it is no level."""
+    """Return the containers from that of a failure up to below a level. None if it is no level."""
     left = [node]
     for level in levels_above(node):
         if level is arrives_at:
@@ -119,7 +121,7 @@ def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
 
 
 def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
-    """Have containers left by a departure; return from where on another one has come before.
+    """Have containers left by a departure, and return from where on another one has come before.
 
     Those below are then left by that other one.
     """

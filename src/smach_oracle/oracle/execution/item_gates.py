@@ -1,6 +1,6 @@
 """Lets an operator hold an Iterator between two items.
 
-An Iterator is under no oracle. It calls its transition callbacks between items, on both engines; a
+An Iterator is under no oracle. It calls its transition callbacks between items, on both engines. A
 machine that it contains is held at its own boundaries.
 """
 from typing import Any, Iterator, Tuple
@@ -18,7 +18,7 @@ class ItemGate:
     """A transition callback of an Iterator that waits where an operator holds the tree."""
 
     def __init__(self, node: TreeNode, below: Labels, container: Any) -> None:
-        """`node`: of the wrapped container around it; `below`: the labels that lead to it."""
+        """`node`: of the wrapped container around it. `below`: the labels that lead to it."""
         self.node = node
         self._below = below
         self._container = container

@@ -25,7 +25,7 @@ class OracleState(smach.State):
         self._verdict: Optional[Verdict] = None
 
     def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
-        """Have these outcomes and no others; return the transitions, each to its own name."""
+        """Have these outcomes and no others, and return the transitions, each to its own name."""
         self._outcomes = set(labels)
         return {label: label for label in labels}
 
@@ -42,7 +42,7 @@ class OracleState(smach.State):
     def execute(self, ud: smach.UserData) -> str:
         """Recover from the failure handed to `begin`.
 
-        :returns: where the machine goes, '' where it raises; it follows the verdict itself.
+        :returns: where the machine goes, '' where it raises. It follows the verdict itself.
         :raises TrialError: where no failure was handed over.
         """
         recovery = self._recovery

@@ -44,7 +44,7 @@ class OracleVisit:
         self._failure = failure
 
     def run(self, context: FailureContext, continuous: bool) -> Optional[str]:
-        """Recover; return the container's outcome, or None where the machine goes on.
+        """Recover, and return the container's outcome, or None where the machine goes on.
 
         Where the oracle gives up, it raises what the machine would raise without one.
         """

@@ -15,7 +15,7 @@ from .transitions import go_to
 class Prospect(NamedTuple):
     """What comes of sending a machine to a place: the checks of an expert's jump."""
 
-    why_not: str  # it cannot be entered now; '' where it can
+    why_not: str  # it cannot be entered now, or '' where it can
     missing: Tuple[str, ...] = ()  # input keys that it would not find
     repeats: Tuple[str, ...] = ()  # guarded states (`on_retry`) that may be repeated
 
@@ -54,10 +54,10 @@ def _prospect_on(way: Way, written: Tuple[str, ...]) -> Prospect:
 
 
 def make_jump(node: TreeNode, jump: Jump) -> bool:
-    """Make the jump that was asked for; return whether it was made.
+    """Make the jump that was asked for, and return whether it was made.
 
     To be called at a state boundary, with the machine's lock held where the engine holds it. What
-    has come in between may prevent it; a warning tells so.
+    has come in between may prevent it. A warning tells so.
     """
     label = str(node.machine._current_label)
     place = place_at(node, jump.container, jump.state)

@@ -14,7 +14,7 @@ from ..settings.preconditions import PreconditionSpec
 def check_state_names(top: TreeNode) -> None:
     """Check that the states for which something is set are somewhere in the tree.
 
-    :raises SettingsError: where one is not; it is logged instead where the node is not strict.
+    :raises SettingsError: where one is not. It is logged instead where the node is not strict.
     """
     known = _known_names(top)
     for key, name in _named_states(top):
@@ -26,7 +26,7 @@ def check_state_names(top: TreeNode) -> None:
 def check_nested(top: TreeNode) -> None:
     """Check that each path or pattern of `nested` stands for something.
 
-    :raises SettingsError: where one does not; it is logged instead where the node is not strict.
+    :raises SettingsError: where one does not. It is logged instead where the node is not strict.
     """
     if isinstance(top.nested, bool):
         return
@@ -59,7 +59,7 @@ def check_preconditions(node: TreeNode) -> None:
 
     These are others of its container by label, and states of other containers by path.
 
-    :raises SettingsError: where one does not; it is logged instead where the node is not strict.
+    :raises SettingsError: where one does not. It is logged instead where the node is not strict.
     """
     for label in node.labels():
         for spec in _preconditions_of(node, label):

@@ -21,7 +21,7 @@ def keep_start(node: TreeNode) -> None:
 
 
 def restore_start(node: TreeNode) -> None:
-    """Put the userdata of a machine, and of those in it, back to that of the start; count it."""
+    """Put the userdata of a machine, and of those in it, back to that of the start. Count it."""
     restarts = node.tree.restarts
     restarts.count += 1
     for each in nodes_of(node.machine):

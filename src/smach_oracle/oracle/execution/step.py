@@ -103,7 +103,7 @@ class Step:
         self._record = record
 
     def execute(self, state: smach.State, userdata: smach.Remapper) -> object:
-        """Execute the state, watched; return its outcome, an Overrun, or that it is held back.
+        """Execute the state, watched, and return its outcome, an Overrun, or that it is held back.
 
         It raises what the state raises. With a time limit it gets a view of its own, which is shut
         when the state overruns, in place of `userdata`.
@@ -256,7 +256,7 @@ class Step:
         return ResumedVisit(node, record, failure, before).run(self._context(), False)
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
-        """Go on after a failure while the robot was not well; `why`: see `why_unwell_after`."""
+        """Go on after a failure while the robot was not well. `why`: see `why_unwell_after`."""
         node, record = self._node, self._record
         if node.is_left_behind():
             stop_left_behind(node)
@@ -275,12 +275,12 @@ class Step:
         return failure_context(self._node, self._record)
 
     def _failed(self, failure: Failure, why_unwell: str = '') -> Optional[str]:
-        """Count the failure and recover from it; `why_unwell`: the robot is not well."""
+        """Count the failure and recover from it. `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         state = self._machine._states[record.label]
         if (node.tree.recover and failure.kind is not FailureKind.TIME_LIMIT
                 and isinstance(state, smach.Container)):
-            # a Concurrence that has failed has preempted its branches; one that overran still runs
+            # a Concurrence that has failed has preempted its branches. One that overran still runs
             recall_preempts(state)
         context = self._context()
         node.records.note_failure(record)
@@ -310,7 +310,7 @@ class Step:
         return self._end_unrecovered(ending, failure)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:
-        """Go as an expert has answered while the state still ran; what it ended with is nothing."""
+        """Go as an expert has answered while the state still ran. What it ended with is nothing."""
         node, record, answer = self._node, self._record, taken.answer
         recall_preempts(self._machine._states[record.label])
         if taken.error is not None:
@@ -357,7 +357,7 @@ class Step:
 
     def _advance(self, outcome: str, route: Route, learn: bool = False,
                  facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:
-        """Make the transition that the author drew; `learn`: take the short way next time.
+        """Make the transition that the author drew. `learn`: take the short way next time.
 
         `facts`: further fields of the event.
         """

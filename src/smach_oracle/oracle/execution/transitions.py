@@ -19,14 +19,14 @@ def message_of(source: str, outcome: str, target: str) -> str:
 
 
 def stop_left_behind(node: TreeNode) -> None:
-    """End the execution without an outcome; nobody waits for one."""
+    """End the execution without an outcome. Nobody waits for one."""
     log = smach.logwarn if node.tree.early_end.why is None else smach.loginfo
     log('{}: stops, as {}'.format(node.path, node.why_left_behind()))
     node.machine._is_running = False
 
 
 def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
-    """End the container; a preempt that its last state has serviced is serviced."""
+    """End the container. A preempt that its last state has serviced is serviced."""
     machine = node.machine
     last = machine._current_state
     if machine._preempt_requested and last is not None and not last.preempt_requested() and (

@@ -24,7 +24,7 @@ from .wrapping import adopt, bring_up_to_date
 
 
 def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
-    """Execute a container; where no container above it runs, this is a trial."""
+    """Execute a container. Where no container above it runs, this is a trial."""
     node = machine._oracle
     if not node.has_running_ancestor():
         node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early

@@ -43,7 +43,7 @@ class UnwellVisit(OracleVisit):
     """The way of a failure that is not counted into the meta state, and back to its state."""
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure, why: str) -> None:
-        """`why`: the robot is not well; '' where a preempt or a shutdown is under way."""
+        """`why`: the robot is not well, or '' where a preempt or a shutdown is under way."""
         super().__init__(node, record, failure)
         self._why = why
         state = node.machine._states[record.label]

@@ -11,7 +11,7 @@ _STATIC = ('add', 'add_auto')
 
 
 def wrapped_class(oracle_class: type, base: type) -> type:
-    """Return the class of machines of class `base` under `oracle_class`; the same one each time."""
+    """Return the class of machines of class `base` under `oracle_class`, the same one each time."""
     made = _MADE.get((oracle_class, base))
     if made is None:
         namespace: Dict[str, Any] = {

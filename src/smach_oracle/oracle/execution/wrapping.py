@@ -19,12 +19,12 @@ from .wrapped_classes import change_class, two_classes
 
 def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: Nested,
                  name: str, strict: bool) -> WrappedMachine:
-    """Wrap a machine and what is nested in it; see OracleContainer.wrap.
+    """Wrap a machine and what is nested in it. See OracleContainer.wrap.
 
     A machine that is wrapped already keeps its tree, and takes over from `tree` what is new.
 
     :raises SettingsError: for what is no machine or cannot be wrapped, and for settings that do not
-        fit it; a bare machine then stays bare.
+        fit it. A bare machine then stays bare.
     """
     if not isinstance(given, smach.StateMachine):
         raise SettingsError('machine', given, 'a smach.StateMachine')

@@ -17,7 +17,7 @@ class AlarmClock:
         self._thread: Optional[threading.Thread] = None
 
     def ring_in(self, seconds: float, ring: Ring) -> None:
-        """Call `ring` once, when the time has come; it must return soon.
+        """Call `ring` once, when the time has come. It must return soon.
 
         What it raises is logged.
         """
@@ -56,7 +56,7 @@ class AlarmClock:
 
 
 def _call(ring: Ring) -> None:
-    """Call it; the others that wait are called anyway."""
+    """Call it. The others that wait are called anyway."""
     try:
         ring()
     except Exception as err:

@@ -47,7 +47,7 @@ class ContainerRecords:
             self._to_come[label] = dict(learned)
 
     def begin_trial(self) -> None:
-        """Forget what belongs to a trial; the rates stay."""
+        """Forget what belongs to a trial. The rates stay."""
         self.history.begin_trial()
         self.marks.begin_trial()
         for record in self.by_label.values():
@@ -82,7 +82,7 @@ class ContainerRecords:
         self.oracle_edges[target] = self.oracle_edges.get(target, 0) + 1
 
     def failure_context(self, record: StateRecord, initial: str) -> FailureContext:
-        """Return what the visits say about a failure of a state; changes nothing."""
+        """Return what the visits say about a failure of a state. It changes nothing."""
         return self.history.failure_context(record.label, initial, record.totals[0])
 
     def note_failure(self, record: StateRecord) -> None:

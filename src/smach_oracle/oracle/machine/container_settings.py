@@ -14,7 +14,7 @@ class ContainerSettings:
         self.use(settings)
 
     def use(self, settings: Settings) -> None:
-        """Put settings of the whole machine into force; those given with `add()` stay."""
+        """Put settings of the whole machine into force. Those given with `add()` stay."""
         self.of_machine = settings
         self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
         self.failing = FailingNames(settings.failing_outcomes)

@@ -35,7 +35,7 @@ class EngineProbe:
     def look(self, machine: Machine) -> None:
         """Find out how this engine steps.
 
-        Some engines hold the lock around a step, with a plain lock all do; others leave it to the
+        Some engines hold the lock around a step, with a plain lock all do. Others leave it to the
         step.
         """
         self.stepped = True

@@ -11,7 +11,7 @@ FUNCTION_LIMIT_S = 2.0
 
 
 class HealthPort(Protocol):
-    """Knows one thing, or several, that must hold. Called from any thread; does not wait."""
+    """Knows one thing, or several, that must hold. Called from any thread. It does not wait."""
 
     def why_unwell(self) -> str:
         """Return what is wrong, '' where all is well."""
@@ -31,7 +31,7 @@ class HealthFunctionPort:
         self._since_s = 0.0
 
     def why_unwell(self, stopped: Callable[[], bool] = lambda: False) -> str:
-        """Return what is wrong, '' where all is well; also where `stopped()` ends the asking."""
+        """Return what is wrong, '' where all is well, also where `stopped()` ends the asking."""
         call = self._call
         if call is None or call.done.is_set():
             self._since_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""Whether the robot is well, asked for a whole tree of machines; the one notice that it is not."""
+"""Whether the robot is well, asked for a whole tree of machines. The one notice that it is not."""
 import threading
 import time
 from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
@@ -35,7 +35,7 @@ class Teller(Protocol):
 
 
 class _UnwellPhase:
-    """From the first container that waits to the last; `tell` is the first's."""
+    """From the first container that waits to the last. `tell` is the first's."""
 
     def __init__(self, teller: Teller, state: str, why: str) -> None:
         self.teller = teller
@@ -52,7 +52,7 @@ class HealthWatch:
     """The health of one tree. Safe to use from several threads.
 
     `given`: the function that was given to the machine. `listen`: makes a port for topics and
-    diagnostics; None where this process listens to none.
+    diagnostics, or None where this process listens to none.
     """
 
     def __init__(self, given: Optional[HealthFunction] = None) -> None:
@@ -73,7 +73,10 @@ class HealthWatch:
         return bool(self._functions) or self._listening is not None
 
     def use(self, conditions: Tuple[HealthCondition, ...], settle_s: float) -> None:
-        """Ask these from now on. Called before each trial; costs nothing where nothing is new."""
+        """Ask these from now on.
+
+        Called before each trial. It costs nothing where nothing is new.
+        """
         self._settle_s = settle_s
         made_of = (conditions, self.given, self.listen)
         if made_of == self._made_of:
@@ -95,7 +98,7 @@ class HealthWatch:
         return self.listen(heard) if heard and self.listen is not None else None
 
     def why_unwell(self, stopped: Stopped) -> str:
-        """Ask once; return all that is wrong, '' where all is well or `stopped()`."""
+        """Ask once, and return all that is wrong, '' where all is well or `stopped()`."""
         # one thread asks at a time, and the others have their look a little later
         while not self._asking.acquire(timeout=0.05):
             if stopped():
@@ -126,9 +129,9 @@ class HealthWatch:
                         pause: Pause) -> bool:
         """Wait until the robot has been well for the settle time.
 
-        The first who waits gives the notice, for the whole tree; it is ended once.
+        The first who waits gives the notice, for the whole tree. It is ended once.
 
-        :param what: happened to `state`, or is about to; the log says it.
+        :param what: happened to `state`, or is about to. The log says it.
         :param why: the robot is not well.
         :returns: False where `stopped()` has ended the wait.
         """
@@ -160,7 +163,7 @@ class HealthWatch:
         return phase
 
     def _has_settled(self, phase: _UnwellPhase, stopped: Stopped) -> bool:
-        """Look once; whether the phase is over, by this look or another's."""
+        """Look once. Return whether the phase is over, by this look or another's."""
         why = '' if phase.over else self.why_unwell(stopped)
         with self._lock:
             if phase.over or (not why and stopped()):

@@ -41,7 +41,7 @@ class LimitedRun:
 
     @contextlib.contextmanager
     def stands_still(self) -> Iterator[None]:
-        """Let its time stand still; several may do so at once."""
+        """Let its time stand still. Several may do so at once."""
         with self._lock:
             self._note()
             self._questions += 1
@@ -87,7 +87,7 @@ def runs_of_thread() -> Tuple[LimitedRun, ...]:
 
 
 def enter(run: LimitedRun) -> None:
-    """Be inside `run` from now on; to be called in a context of its own."""
+    """Be inside `run` from now on. It is to be called in a context of its own."""
     _AROUND.set(_AROUND.get() + (run,))
 
 

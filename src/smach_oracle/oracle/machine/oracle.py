@@ -78,7 +78,7 @@ class Oracle:
 
     @property
     def events(self) -> EventSource:
-        """The events of the whole tree; append to `events.observers` to be told."""
+        """The events of the whole tree. Append to `events.observers` to be told."""
         return self._node.events
 
     @property
@@ -101,7 +101,7 @@ class Oracle:
 
     @property
     def health(self) -> Optional[HealthFunction]:
-        """Says whether the robot is well, beside the setting `healthy`; from the next trial on."""
+        """Says whether the robot is well, beside the setting `healthy`, from the next trial on."""
         return self._node.tree.health.given
 
     @health.setter

@@ -45,7 +45,7 @@ class Machine(Protocol):
     _preempt_requested: bool
     _preempted_label: Optional[str]
     _preempted_state: Optional[smach.State]
-    _is_preempt_passed_on: bool  # our engine's alone; upstream's never reads it
+    _is_preempt_passed_on: bool  # our engine's alone. Upstream's never reads it
 
     @property
     def _state_transitioning_lock(self) -> StepLock:
@@ -73,4 +73,4 @@ class Machine(Protocol):
         """Tell the termination callbacks."""
 
     def _set_current_state(self, state_label: Optional[str]) -> None:
-        """Make a state the current one; None: none."""
+        """Make a state the current one. None means none."""

@@ -31,7 +31,7 @@ def begin_watching(node: TreeNode) -> None:
 
 
 def note_visit(node: TreeNode, record: StateRecord) -> str:
-    """Note that the machine has come to a state; return why it is not executed, '' where it is."""
+    """Note that the machine has come to a state. Return why it is not executed, or ''."""
     mark = node.records.marks.of(record.label)
     mark.reached = node.tree.next_visit()
     on_retry = record.settings.on_retry
@@ -52,7 +52,7 @@ def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a state.
 
     They are those that were executed since it came to `target` last, itself among them, and the
-    spent ones to which the author's transitions lead from there; but not what only a precondition
+    spent ones to which the author's transitions lead from there, but not what only a precondition
     has done, until the machine has come to it once. If the machine has not been at the target in
     this trial, they are all to which the author's transitions lead.
     """
@@ -103,7 +103,7 @@ def note_superseded(node: TreeNode, label: str) -> None:
 
 
 def why_closed(node: TreeNode, label: str) -> str:
-    """Return why a state cannot be entered now, whoever wants it; '' where it can."""
+    """Return why a state cannot be entered now, whoever wants it, or '' where it can."""
     blocked = node.tree.workers.blocked(node.machine._states[label])
     if blocked or not node.tree.numbers_visits:
         return blocked

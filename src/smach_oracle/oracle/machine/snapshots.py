@@ -8,7 +8,7 @@ def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
                   warn: Callable[[str], None]) -> Dict[str, Any]:
     """Return the userdata as it is now.
 
-    It holds references; `deep_copy_keys` are copied through and through.
+    It holds references. `deep_copy_keys` are copied through and through.
     """
     snapshot = dict(data)
     for key in deep_copy_keys:
@@ -47,7 +47,7 @@ def copied(value: object) -> object:
 
 
 def fingerprint(value: object) -> Optional[bytes]:
-    """Return bytes that differ where the value differs; None where that cannot be told."""
+    """Return bytes that differ where the value differs, or None where that cannot be told."""
     try:
         return pickle.dumps(value)  # written to compare, never loaded
     except Exception:  # unpicklable: only an assignment can be told

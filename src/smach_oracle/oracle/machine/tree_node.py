@@ -36,7 +36,7 @@ class WrappedMachine(Machine, Protocol):
         """Ask it to stop."""
 
     def _update_once(self) -> Optional[str]:
-        """Execute the current state and go on; return the container's outcome, None before it."""
+        """Execute the current state and go on. Return the container's outcome, None before it."""
 
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
@@ -70,7 +70,7 @@ class BranchPort(Protocol):
         """Whether an outcome leads to the next item."""
 
     def passes_over(self, outcome: str) -> str:
-        """Say what is passed over where this failing outcome is foreseen; '' for nothing."""
+        """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
 
 
 class DeparturePort(Protocol):
@@ -123,7 +123,7 @@ class TreeNode:
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
         # where a verdict from below or here ends the present state
         self.departure: Optional[DeparturePort] = None
-        self.entry = ''  # the state in which the next execution begins; '': its initial one
+        self.entry = ''  # the state in which the next execution begins. '' means its initial one
         self.resuming: Optional[EntryPort] = None  # at the next execution
         # outcome of the next execution, which was over before the program was stopped
         self.ended_before: Optional[str] = None
@@ -202,7 +202,10 @@ class TreeNode:
             self.branch is not None or len(self.below) > 1 or self.parent.runs_beside_others())
 
     def look_around(self) -> bool:
-        """Find out inside which executions this one is about to begin; whether it still may."""
+        """Find out inside which executions this one is about to begin.
+
+        Return whether it still may.
+        """
         self.runs_around = self._find_runs_around()
         for run in self.runs_around:
             run.hold(self.engine)
@@ -250,7 +253,7 @@ class TreeNode:
         settings = self.in_force.of_state(self.relative_path, label)
         if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
             return settings
-        # beside a branch is no state that could be run for it; a path names one elsewhere
+        # beside a branch is no state that could be run for it. A path names one elsewhere
         return replace(settings, preconditions=tuple(
             spec for spec in settings.preconditions
             if all('/' in label for label in spec.labels())))
@@ -284,7 +287,7 @@ class TreeNode:
     # -- what goes on
 
     def begin_precondition(self, state: smach.State) -> bool:
-        """Note that a state is executed as a precondition; False where it is so already."""
+        """Note that a state is executed as a precondition. Return False where it is so already."""
         with self.tree.departures_lock:
             is_free = not any(each is state for each in self.as_preconditions)
             if is_free:
@@ -314,7 +317,7 @@ class TreeNode:
             self.emit(EventKind.PREEMPT, state=self.machine._current_label or '')
 
     def begin_trial(self, trial_id: str) -> None:
-        """Forget what belongs to a trial; the rates stay."""
+        """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
         self.resuming = self.ended_before = self.asked_next = None  # of one that ended early
         self.records.begin_trial()

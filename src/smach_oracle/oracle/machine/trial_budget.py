@@ -36,7 +36,7 @@ class TrialBudget:
                     monotonic() - self._begun_s - self._stood_s]
 
     def go_on(self, spent: Optional[Sequence[float]]) -> None:
-        """Go on after `begin` with what was spent before; None: nothing."""
+        """Go on after `begin` with what was spent before. None means nothing."""
         if spent:
             with self._lock:
                 self._recoveries, self._questions = int(spent[0]), int(spent[1])
@@ -44,7 +44,7 @@ class TrialBudget:
 
     @contextlib.contextmanager
     def stands_still(self) -> Iterator[None]:
-        """Let the minutes stand still; several may do so at once."""
+        """Let the minutes stand still. Several may do so at once."""
         with self._lock:
             self._note()
             self._standing += 1
@@ -71,7 +71,7 @@ class TrialBudget:
             '1 minute is' if minutes == '1' else minutes + ' minutes are')
 
     def left_s(self) -> Optional[float]:
-        """Return how many seconds are left, 0.0 where none are; None: they are not limited."""
+        """Return how many seconds are left, 0.0 where none are. None means they are not limited."""
         minutes = self._limits.minutes
         if minutes is None:
             return None
@@ -82,7 +82,7 @@ class TrialBudget:
     def within(self, deadline_s: float) -> Tuple[float, bool]:
         """Return a deadline that is not beyond the minutes, and whether they cut it.
 
-        :param deadline_s: s from now; 0: none.
+        :param deadline_s: s from now. 0 means none.
         """
         left_s = self.left_s()
         if left_s is None or 0 < deadline_s <= left_s:

@@ -17,7 +17,7 @@ def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
 
 
 def write_constants(userdata: smach.UserData, constants: Mapping[str, Any]) -> None:
-    """Write a state's constants before it runs, as the engine does; they stay."""
+    """Write a state's constants before it runs, as the engine does. They stay."""
     for key, value in constants.items():
         userdata[key] = value
 
@@ -89,7 +89,7 @@ def _has_plain_keys(state: smach.State) -> bool:
 def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tuple[str, ...]:
     """Return the input keys of a state that are not among the `available` keys.
 
-    They are named as the state names them; `available` are keys of the container.
+    They are named as the state names them. `available` are keys of the container.
     """
     present = set(available).union(constants_of(machine, label))
     remapping = machine._remappings.get(label) or {}

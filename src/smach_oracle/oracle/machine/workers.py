@@ -1,7 +1,7 @@
 """Runs what may have to be left behind in a thread of its own.
 
-A state with a time limit: on overrun the gate on its userdata is shut and the state is preempted;
-after a grace period it is abandoned. A function: it cannot be preempted, and is abandoned at once.
+A state with a time limit: on overrun the gate on its userdata is shut and the state is preempted.
+After a grace period it is abandoned. A function: it cannot be preempted, and is abandoned at once.
 While an abandoned thread lives, what it runs is blocked: nobody enters it again.
 """
 import functools
@@ -23,7 +23,7 @@ _STOPPED = 'still runs since a preempt or a shutdown'
 
 
 class LimitedResult(NamedTuple):
-    """How a state or a function went in its thread; one of the first three is told."""
+    """How a state or a function went in its thread. One of the first three is told."""
 
     outcome: object = None
     error: Optional[BaseException] = None
@@ -105,7 +105,7 @@ class Workers:
     def call(self, function: Callable[[smach.UserData], object], userdata: smach.UserData,
              gate: UserdataGate, limit_s: Optional[float], grace_s: float,
              stopped: Callable[[], bool]) -> LimitedResult:
-        """Call `function` until its time limit (s, monotonic; None: none) or until `stopped()`.
+        """Call `function` until its time limit (s, monotonic, None: no limit) or until `stopped()`.
 
         It has `grace_s` more to end by itself, in which it writes nothing any more, and is left
         behind then. `gate` is what `userdata` writes through. What the function raises is told in
@@ -134,7 +134,10 @@ class Workers:
 
     def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
                      gate: UserdataGate, grace_s: float) -> bool:
-        """Preempt a state and abandon it after its grace period; False where that was needed."""
+        """Preempt a state and abandon it after its grace period.
+
+        Return False where that was needed.
+        """
         gate.shut()
         try:
             state.request_preempt()
@@ -152,7 +155,7 @@ class Workers:
         return not abandoned
 
     def _abandon(self, target: object, call: BackgroundCall, gate: UserdataGate, why: str) -> bool:
-        """Leave a thread to itself; False where it has ended after all."""
+        """Leave a thread to itself. Return False where it has ended after all."""
         if not call.leave():
             return False
         gate.shut()
@@ -174,7 +177,7 @@ def _execute_inside(run: LimitedRun, state: smach.State, userdata: smach.Remappe
 
 
 def wait(event: threading.Event, seconds: float) -> bool:
-    """Wait for `event`, however long; monotonic time."""
+    """Wait for `event`, however long, monotonic time."""
     end = time.monotonic() + seconds
     while not event.wait(min(max(0.0, end - time.monotonic()), threading.TIMEOUT_MAX)):
         if time.monotonic() >= end:

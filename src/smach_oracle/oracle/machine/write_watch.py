@@ -1,4 +1,4 @@
-"""Which keys of a container's userdata were written, whoever wrote them; and taking that back."""
+"""Which keys of a container's userdata were written, whoever wrote them, and taking that back."""
 from typing import Any, Dict, Iterable, NamedTuple, Optional, Set
 
 from .protocols import Machine
@@ -22,9 +22,9 @@ class WriteWatch:
 
     It compares the moment when it is made with that of `written`.
 
-    Writes through the gate are recorded; writes past it (a precondition that holds the machine
-    itself) show as another object under the key; changes in place show for `deep_copy_keys`, by a
-    fingerprint.
+    Writes through the gate are recorded. Writes past it (a precondition that holds the machine
+    itself) show as another object under the key. Changes in place show for `deep_copy_keys`, by
+    a fingerprint.
     """
 
     def __init__(self, machine: Machine, deep_copy_keys: Iterable[str]) -> None:
@@ -47,7 +47,7 @@ class WriteWatch:
         return UserdataMark(data, copies, {key: fingerprint(data[key]) for key in copies})
 
     def take_back(self, begun: UserdataMark) -> None:
-        """Make the userdata what it was; it no longer counts as written.
+        """Make the userdata what it was. It no longer counts as written.
 
         Objects that were changed inside stay changed, except the deep-copied keys.
         """

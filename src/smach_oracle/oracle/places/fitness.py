@@ -10,7 +10,7 @@ from .place import Place, place_named
 
 
 def why_unfit(node: TreeNode, label: str, name: str) -> str:
-    """Say why a name cannot be a precondition of a state; '' where it can.
+    """Say why a name cannot be a precondition of a state, or '' where it can.
 
     A name without '/' is a label of the state's own container, any other one a path.
     """

@@ -19,7 +19,7 @@ class Place(NamedTuple):
 
 
 def places_of(node: TreeNode) -> Iterator[Place]:
-    """Yield the places of the tree; those of the container itself come first."""
+    """Yield the places of the tree. Those of the container itself come first."""
     for each in nodes_of_tree(node):
         for label in each.labels():
             yield Place(each, label)

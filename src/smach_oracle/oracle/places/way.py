@@ -14,7 +14,7 @@ class Way(NamedTuple):
 
     `left`: the containers that are left, innermost first. `meets`: the innermost container that
     holds both. `down`: its own state that is entered, then the states in which the containers below
-    it begin; the last one is the place.
+    it begin. The last one is the place.
     """
 
     left: Tuple[TreeNode, ...]
@@ -28,7 +28,10 @@ class Way(NamedTuple):
 
 
 def way_to(node: TreeNode, place: Place) -> Optional[Way]:
-    """Return the way from a container that is being executed to a place; None: there is none."""
+    """Return the way from a container that is being executed to a place.
+
+    None means there is none.
+    """
     levels = [node, *levels_above(node)]
     down: List[Place] = [place]
     while not any(down[0].node is level for level in levels):
@@ -44,7 +47,7 @@ def way_to(node: TreeNode, place: Place) -> Optional[Way]:
 
 
 def why_closed_on(way: Way) -> str:
-    """Return why a place cannot be entered now, or what lies on the way down; '' where it can."""
+    """Return why a place, or one on the way down, cannot be entered now, '' where it can."""
     for place in way.down:
         why = why_closed(place.node, place.label)
         if why:
@@ -53,7 +56,7 @@ def why_closed_on(way: Way) -> str:
 
 
 def closed_in_words(way: Way, name: str) -> str:
-    """Say that a place of this name, or what lies on the way down, is closed; '' where it is not.
+    """Say that a place of this name, or one on the way down, is closed, or ''.
 
     It is a clause.
     """

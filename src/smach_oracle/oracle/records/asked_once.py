@@ -1,4 +1,4 @@
-"""A question that comes before the next state of some containers. Pure; no smach."""
+"""A question that comes before the next state of some containers. Pure, and without smach."""
 from typing import List, Optional, Sequence
 
 from .events import FailureKind
@@ -16,7 +16,7 @@ class AskedOnce:
         self._passes: List[StateRecord] = list(passes)
 
     def take(self, record: StateRecord) -> Optional[Unfinished]:
-        """Return what stands in place of the coming visit of a state; None for nothing."""
+        """Return what stands in place of the coming visit of a state, or None for nothing."""
         if not self._why:
             return None
         if record in self._passes:

@@ -1,6 +1,6 @@
 """Whether a trial ends before its machine has come to an end, and goes on later from its store.
 
-Pure; no smach.
+Pure, and without smach.
 """
 import contextlib
 import threading
@@ -23,7 +23,7 @@ class EarlyEnd:
         self._lock = threading.Lock()
 
     def begin_trial(self, is_stored: bool) -> None:
-        """Begin a trial; `is_stored`: it has a store from which it can go on."""
+        """Begin a trial. `is_stored`: it has a store from which it can go on."""
         with self._lock:
             self.why, self._is_stored = None, is_stored
 
@@ -56,7 +56,7 @@ class EarlyEnd:
                 self._end_at_shutdown()
 
     def end_at_shutdown(self, is_shutdown: bool) -> bool:
-        """End a stored trial early where the process goes down; return whether it has so ended.
+        """End a stored trial early where the process goes down, and return whether it has so ended.
 
         `is_shutdown`: what SMACH says of it.
         """

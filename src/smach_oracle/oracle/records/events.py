@@ -16,7 +16,7 @@ NO_OUTCOME = 'ended without an outcome: inconsistent, or shut down'
 
 
 class EventKind(IntEnum):
-    """Kinds of step; the numbers are those of OracleEvent.msg."""
+    """Kinds of step. The numbers are those of OracleEvent.msg."""
 
     TRIAL_START = 1
     TRIAL_END = 2
@@ -52,7 +52,7 @@ class EventKind(IntEnum):
 
 
 class FailureKind(IntEnum):
-    """How a state failed; the numbers are those of OracleEvent.msg."""
+    """How a state failed. The numbers are those of OracleEvent.msg."""
 
     NOT_A_FAILURE = 0
     FAILING_OUTCOME = 1
@@ -67,7 +67,7 @@ class FailureKind(IntEnum):
 
 
 class Event(NamedTuple):
-    """One step of a trial; the fields are those of OracleEvent.msg."""
+    """One step of a trial. The fields are those of OracleEvent.msg."""
 
     kind: EventKind
     trial_id: str
@@ -115,7 +115,7 @@ class EventSource:
 
     @property
     def last_seq(self) -> int:
-        """Number of the last event; -1 before the first."""
+        """Number of the last event, or -1 before the first."""
         return self._seq - 1
 
     def go_on_behind(self, seq: int) -> None:
@@ -125,9 +125,9 @@ class EventSource:
 
     def emit(self, kind: EventKind, path: str, of_trial: Optional[str] = None,
              **fields: Any) -> None:
-        """Tell every observer; costs nothing to speak of where there is none.
+        """Tell every observer. It costs nothing to speak of where there is none.
 
-        What comes after the end of its trial (`of_trial`; None: the present one) is not told.
+        What comes after the end of its trial (`of_trial`, None means the present one) is not told.
         """
         if not self.observers:
             return

@@ -1,7 +1,7 @@
 """Facts about a trial that events carry in their `data`: who decided, why the trial ended.
 
-Bags that were recorded before events carried them tell the same by the words of a text; those words
-are known here and nowhere else. Pure; no smach.
+Bags that were recorded before events carried them tell the same by the words of a text. Those words
+are known here and nowhere else. Pure, and without smach.
 """
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Tuple
@@ -45,7 +45,7 @@ class TrialEnd(str, Enum):
     OUTCOME = 'outcome'
     ERROR = 'error'  # an exception left the machine
     STOPPED = 'stopped'  # Ctrl-C or SystemExit
-    SHUTDOWN = 'shutdown'  # while states ran; the machine has no outcome
+    SHUTDOWN = 'shutdown'  # while states ran. The machine has no outcome
     INCONSISTENT = 'inconsistent'  # no state was entered
     KEPT = 'kept'  # nobody has said how a stored trial goes on: it is asked again
 
@@ -69,7 +69,7 @@ def told_in_words(data: Any) -> Dict[str, str]:
 def ended_by(event: Event, entered_a_state: bool) -> TrialEnd:
     """Return why a trial ended, by its TRIAL_END event.
 
-    :param entered_a_state: whether the trial has a STATE_START; needed for old bags alone.
+    :param entered_a_state: whether the trial has a STATE_START. Needed for old bags alone.
     """
     stated = _stated(event, ENDED_BY)
     if stated in [each.value for each in TrialEnd]:

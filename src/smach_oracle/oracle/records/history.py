@@ -1,4 +1,4 @@
-"""The chain of visited states of one container (paper, section IV-C). Pure; no smach.
+"""The chain of visited states of one container (paper, section IV-C). Pure, and without smach.
 
 Every query is O(1), and memory is bounded.
 
@@ -17,7 +17,8 @@ from .visits import Visit, VisitResult
 class _Streak(NamedTuple):
     """The failures of one state, one after the other, without a success in between.
 
-    `anchor`: the state that a step back leads to while it keeps failing; None: the initial state.
+    `anchor`: the state that a step back leads to while it keeps failing. None means the initial
+    state.
     """
 
     state: Optional[str]
@@ -63,7 +64,7 @@ class History:
     def begin_execution(self) -> None:
         """Forget the chain.
 
-        A container may run several times in a trial; its failures of the trial still count. A state
+        A container may run several times in a trial. Its failures of the trial still count. A state
         that goes on failing gets a new goal for its steps back, from the new chain.
         """
         self.visits.clear()
@@ -89,7 +90,7 @@ class History:
 
     @property
     def visits_of_execution(self) -> int:
-        """Number of visits of this execution, where they are counted; else of those kept."""
+        """Number of visits of this execution, where they are counted, else of those kept."""
         return (self.visits.added if isinstance(self.visits, _CountedVisits)
                 else len(self.visits))
 
@@ -103,7 +104,7 @@ class History:
             self.succeeded = visit.state
 
     def failure_context(self, state: str, initial: str, successes: int) -> FailureContext:
-        """Return what the visits say about a failure of `state`; changes nothing.
+        """Return what the visits say about a failure of `state`. It changes nothing.
 
         :param initial: the container's initial state.
         :param successes: number of successes of `state` in all.

@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 
 class StateRateRow(NamedTuple):
-    """What was learned of one state; the fields are those of StateRate.msg."""
+    """What was learned of one state. The fields are those of StateRate.msg."""
 
     path: str
     state: str
@@ -16,7 +16,7 @@ class StateRateRow(NamedTuple):
 
 
 class TransitionRow(NamedTuple):
-    """How often one edge was taken; the fields are those of TransitionCount.msg."""
+    """How often one edge was taken. The fields are those of TransitionCount.msg."""
 
     path: str
     state: str

@@ -50,7 +50,7 @@ def learned_by(containers: Iterable[Learner]) -> Dict[str, Dict[str, Any]]:
 def write_rates(path: str, learners: Iterable[Learner]) -> None:
     """Write what was learned to `path`, atomically and durably.
 
-    :raises OSError: where it cannot be written; the old file is
+    :raises OSError: where it cannot be written. The old file is
     then untouched.
     """
     write_learned(path, learned_by(learners))
@@ -59,7 +59,7 @@ def write_rates(path: str, learners: Iterable[Learner]) -> None:
 def write_learned(path: str, containers: Mapping[str, Any]) -> None:
     """Write what `learned_by` returned, as `write_rates` does.
 
-    :raises OSError: where it cannot be written; the old file is then untouched.
+    :raises OSError: where it cannot be written. The old file is then untouched.
     """
     text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1,
                       sort_keys=True)
@@ -103,7 +103,7 @@ def _sync_folder(folder: str) -> None:
 def read_rates(path: str, learners: Iterable[Learner]) -> None:
     """Take over the rates in `path`.
 
-    A file that is not there is no matter; one that cannot be read is warned of; a damaged one is
+    A file that is not there is no matter. One that cannot be read is warned of. A damaged one is
     set aside as PATH.damaged and warned of, and the states start from their priors.
     """
     try:

@@ -4,10 +4,10 @@ from collections import OrderedDict
 from typing import Callable, Dict, List, Mapping
 
 MustStop = Callable[[], bool]
-# takes servers by goal id, cancels the goals and waits; returns those of which the end is not known
+# takes servers by goal id, cancels the goals and waits. Returns those of which the end is not known
 EndGoals = Callable[[Mapping[str, str], MustStop], Mapping[str, str]]
 BeforeSending = Callable[[str, str], None]  # takes id and server
-MOST = 1000  # goals; of one that nobody follows the end is never heard
+MOST = 1000  # goals. Of one that nobody follows the end is never heard
 
 
 def _nobody_ends_goals(goals: Mapping[str, str], must_stop: MustStop) -> Mapping[str, str]:
@@ -18,7 +18,7 @@ class RunningGoals:
     """The goals that run. Any thread may call it.
 
     `observers` are told of each goal before it is sent. `end_goals` ends those of a program that
-    was killed; an adapter puts it there.
+    was killed. An adapter puts it there.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What the oracle remembers of one state of a container. Pure; no smach."""
+"""What the oracle remembers of one state of a container. Pure, and without smach."""
 import threading
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
@@ -95,7 +95,7 @@ class StateRecord:
         self.fallbacks = 0
         # of this trial: repeats after failures while the robot was not well, which nobody counts
         self.unwell_repeats = 0
-        # s, of the visits that ended by themselves and were timed; a plain success that nobody
+        # s, of the visits that ended by themselves and were timed, a plain success that nobody
         # observes is not
         self.longest_s: Optional[float] = None
         self.entered_by_oracle = False  # at the coming visit
@@ -146,7 +146,7 @@ class StateRecord:
         self.unfinished, self.special = unfinished, True
 
     def take_question(self) -> str:
-        """Return the id of the question that is open again, once; '' where none is."""
+        """Return the id of the question that is open again, once, or '' where none is."""
         question, self.open_question = self.open_question, ''
         return question
 
@@ -174,7 +174,10 @@ class StateRecord:
         self.special = self._is_special
 
     def _up_to_date(self) -> Estimator:
-        """The estimator, told of the successes by way of edges; to be called with the lock held."""
+        """The estimator, told of the successes by way of edges.
+
+        It is to be called with the lock held.
+        """
         by_edges = self._by_edges()
         if by_edges != self._learned:
             self._estimator.add_successes(by_edges - self._learned)
@@ -281,7 +284,7 @@ class StateRecord:
             self.retire_edge(outcome)
 
     def retire_edge(self, outcome: str) -> None:
-        """Forget an edge whose transition has changed; its counts stay."""
+        """Forget an edge whose transition has changed. Its counts stay."""
         with self._lock:
             edge = self.fast.pop(outcome)
             self._retired += edge.count

@@ -1,14 +1,17 @@
-"""What a trial has done to the states of one container, as far as repeats go. Pure; no smach."""
+"""What a trial has done to the states of one container, as far as repeats go.
+
+Pure, and without smach.
+"""
 from typing import Dict
 
 
 class VisitMark:
     """Of one state in one trial.
 
-    `reached`: number of its latest visit, over the whole tree; 0: none. `executed`: number of the
-    latest visit in which it was executed, and not held back; 0: none. `done`: whether it was
-    executed, by a visit or as a precondition. `spent`: whether the oracle has left for a place from
-    which the machine may come here again: if it is guarded, it is not executed then.
+    `reached`: number of its latest visit, over the whole tree. 0 means none. `executed`: number of
+    the latest visit in which it was executed, and not held back. 0 means none. `done`: whether it
+    was executed, by a visit or as a precondition. `spent`: whether the oracle has left for a place
+    from which the machine may come here again: if it is guarded, it is not executed then.
     """
 
     __slots__ = ('reached', 'executed', 'done', 'spent')
@@ -21,7 +24,7 @@ class VisitMark:
 
 
 class VisitMarks:
-    """The marks of one container, by label; they are kept where a state of the tree is guarded."""
+    """The marks of one container, by label. They are kept where a state of the tree is guarded."""
 
     def __init__(self) -> None:
         self._by_label: Dict[str, VisitMark] = {}

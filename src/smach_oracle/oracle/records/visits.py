@@ -1,10 +1,10 @@
-"""Visits of states, and how each counts. Pure; no smach."""
+"""Visits of states, and how each counts. Pure, and without smach."""
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class VisitResult(IntEnum):
-    """How a visit counts; the numbers are those of VisitedState.msg."""
+    """How a visit counts. The numbers are those of VisitedState.msg."""
 
     SUCCESS = 1
     FAILURE = 2

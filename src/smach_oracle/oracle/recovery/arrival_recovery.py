@@ -12,7 +12,7 @@ class ArrivalRecovery(Recovery):
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
                  context: FailureContext, why_not: str) -> None:
-        """`failure`: of the state that was left; `why_not`: a clause."""
+        """`failure`: of the state that was left. `why_not`: a clause."""
         super().__init__(node, record, failure, context, False)
         self._why_not = why_not
 

@@ -9,7 +9,7 @@ from ..places.way import Way
 
 
 def outcomes_of_branch(node: TreeNode, state: smach.State) -> Tuple[OutcomeChoice, ...]:
-    """Return the outcomes of a branch, and in words where they lead; none where it is no branch.
+    """Return the outcomes of a branch, and in words where they lead. None where it is no branch.
 
     Those that go on with the next item come first.
     """

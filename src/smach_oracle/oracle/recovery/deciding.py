@@ -26,7 +26,7 @@ def _nothing_above() -> str:
 
 
 class Deciding:
-    """One decision of one container's oracle; `tried` says what was done before it.
+    """One decision of one container's oracle. `tried` says what was done before it.
 
     `place`: where it has decided to go, None where it goes nowhere.
 
@@ -104,7 +104,10 @@ class Deciding:
                     tree.trials - 1)
 
     def _place_of(self, action: Action) -> Tuple[str, Optional[Place]]:
-        """Return where a decision leads, by name and as a place; None: there is no such state."""
+        """Return where a decision leads, by name and as a place.
+
+        None means there is no such state.
+        """
         node = self._node
         if action is Action.RESTART:
             top = [node, *levels_above(node)][-1]
@@ -120,7 +123,7 @@ class Deciding:
         return place.label if place.node is self._node else place.path
 
     def _what_prevents(self, way: Way) -> Tuple[Decider, str]:
-        """Spend a recovery on going to a place; or return what prevents it, and why."""
+        """Spend a recovery on going to a place, or return what prevents it, and why."""
         for decider, why_not in ((Decider.ON_RETRY, self.why_repeats_on),
                                  (Decider.POLICY, self._why_not)):
             reason = why_not(way)
@@ -130,11 +133,11 @@ class Deciding:
         return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
 
     def _why_repeats(self, label: str) -> str:
-        """Say what would be repeated if the machine went to a state by itself; '' if nothing."""
+        """Say what would be repeated if the machine went to a state by itself, or '' if nothing."""
         return self.why_repeats_on(Way((), self._node, (Place(self._node, label),)))
 
     def why_repeats_on(self, way: Way) -> str:
-        """Say what would be repeated if the machine went to a place by itself; '' if nothing."""
+        """Say what would be repeated if the machine went to a place by itself, or '' if nothing."""
         repeated, place = repeated_on(way), way.down[-1]
         if not repeated:
             return ''

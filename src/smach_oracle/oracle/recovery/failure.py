@@ -30,7 +30,7 @@ class Failure(NamedTuple):
     kind: FailureKind
     outcome: str  # '' where there is none
     text: str  # exception text, reasons
-    route: Optional[Route]  # where the outcome would have led; None where it raises
+    route: Optional[Route]  # where the outcome would have led, or None where it raises
     # makes what the machine raises if the oracle gives up
     error: Optional[Callable[[], Exception]] = None
     details: str = ''  # the traceback

@@ -154,7 +154,7 @@ class OuterLevel:
 
     def __init__(self, node: TreeNode, below: TreeNode, failure: Failure,
                  stop: RecoveryStop) -> None:
-        """`below`: the level below, which asks; `failure`: as its end would be judged here."""
+        """`below`: the level below, which asks. `failure`: as its end would be judged here."""
         self._node = node
         self._record: StateRecord = node.record(failure.state)
         self._failure = failure
@@ -170,7 +170,7 @@ class OuterLevel:
         self._deciding.cancel()
 
     def decide(self) -> Optional[OuterDecision]:
-        """Return the recovery; None where this level asks too, or has been left meanwhile."""
+        """Return the recovery, or None where this level asks too, or has been left meanwhile."""
         record = self._record
         if way_to(self._below, Place(self._node, record.label)) is None:
             return None

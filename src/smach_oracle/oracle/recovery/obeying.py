@@ -37,7 +37,7 @@ def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
 def way_of(answer: Answer, node: TreeNode) -> Way:
     """Return the way that an answer sends the machine.
 
-    :raises InvalidStateError: where there is none; an answer that was checked has one.
+    :raises InvalidStateError: where there is none. An answer that was checked has one.
     """
     place = place_at(node, answer.container, answer.state)
     way = way_to(node, place) if place is not None else None
@@ -48,5 +48,5 @@ def way_of(answer: Answer, node: TreeNode) -> Way:
 
 
 def _level_of(answer: Answer, node: TreeNode) -> Optional[TreeNode]:
-    """Return the level above that an answer gives up; None where it is the container itself."""
+    """Return the level above that an answer gives up, or None where it is the container itself."""
     return next((level for level in levels_above(node) if level.path == answer.container), None)

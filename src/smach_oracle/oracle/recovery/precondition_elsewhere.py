@@ -16,14 +16,14 @@ from ..settings.settings import ALLOW
 
 
 class NotMet(Exception):
-    """Why a precondition is not met, in words; never leaves this package."""
+    """Why a precondition is not met, in words. It never leaves this package."""
 
 
 class RunElsewhere:
     """One run of a state of another container than that of the failed state."""
 
     def __init__(self, node: TreeNode, place: Place, own: UserdataGate) -> None:
-        """`node`: the failed state's container; `own`: what its userdata is written through.
+        """`node`: the failed state's container. `own`: what its userdata is written through.
 
         :raises NotMet: where the state cannot be run now.
         """

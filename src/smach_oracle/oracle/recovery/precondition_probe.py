@@ -1,7 +1,7 @@
 """How the preconditions of the states that an expert may choose stand now.
 
 Only a callable, and the check of a pair where it is one, can be asked without bringing anything
-about; a state is never run for it. A user's callable may take forever, so it is called in threads
+about. A state is never run for it. A user's callable may take forever, so it is called in threads
 that nobody waits for.
 """
 from typing import List, NamedTuple, Optional
@@ -29,7 +29,7 @@ class _StatePrecondition(NamedTuple):
 class LivePreconditionProbe(PreconditionProbe):
     """The preconditions of one question's choices.
 
-    `status` may be called from any thread; what a callable writes into the userdata is dropped.
+    `status` may be called from any thread. What a callable writes into the userdata is dropped.
     """
 
     def __init__(self, node: TreeNode) -> None:

@@ -36,7 +36,7 @@ class PreconditionRunner:
     """Runs the preconditions of one failure, one after the other.
 
     They read and write the container's userdata through a gate. A state of the tree keeps its own
-    time limit; all else has that of the state whose preconditions they are.
+    time limit. All else has that of the state whose preconditions they are.
 
     `cancel` may be called from any thread, at any time: the state that runs is preempted, a
     function that runs is left behind, nothing more begins.
@@ -94,7 +94,7 @@ class PreconditionRunner:
             self._run_label(spec.target)
 
     def _wait_for_operator(self, node: TreeNode, name: str, label: str = '') -> None:
-        """Wait where an operator holds the tree; `label`: of a state of the container."""
+        """Wait where an operator holds the tree. `label`: of a state of the container."""
         autonomy = node.settings_of(label).autonomy if label else RUN
         wait_for_operator(node, HeldPlace(node.path, name), autonomy, self._stopped)
 

@@ -28,7 +28,7 @@ class Account(NamedTuple):
 
 def make_question(node: TreeNode, record: StateRecord, failure: Failure, account: Account,
                   deadline_s: float) -> Question:
-    """Return a question about a failure. `deadline_s`: seconds left; 0 waits without end."""
+    """Return a question about a failure. `deadline_s`: seconds left. 0 waits without end."""
     machine = node.machine
     state = machine._states[record.label]
     return Question(

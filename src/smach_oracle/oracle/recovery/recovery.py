@@ -73,7 +73,7 @@ class Recovery:
         return self._stop.stopped()
 
     def run(self) -> Verdict:
-        """Decide, and ask where the policy says so; neither where the trial's time is over."""
+        """Decide, and ask where the policy says so. Neither where the trial's time is over."""
         if self._budget.why_over():
             return self._end_unaided()
         decided = self._deciding.decide(self._why_left_to_others)
@@ -148,7 +148,7 @@ class Recovery:
     # -- the levels above
 
     def _why_nobody_is_asked(self) -> Optional[Foreseen]:
-        """Return why the end of the container is left to a level above; None where it is not."""
+        """Return why the end of the container is left to a level above, or None where it is not."""
         if runs_as_precondition(self._node):
             return Foreseen('it runs as a precondition')
         if self._failure.is_held_back:  # no other oracle can confirm that it is repeated
@@ -168,13 +168,13 @@ class Recovery:
         return self._give_up('{}: {}'.format(self._cause, why.text))
 
     def _levels_that_may_decide(self, decider: Decider) -> List[TreeNode]:
-        """Return them, innermost first; none where the failure is to be asked about at once."""
+        """Return them, innermost first. None where the failure is to be asked about at once."""
         if decider is not Decider.POLICY or self._record.failure_class is FailureClass.HIGH:
             return []
         return levels_that_may_decide(self._node)
 
     def _decided_above(self, levels: List[TreeNode]) -> Optional[OuterDecision]:
-        """Return what the innermost level decides that does not ask; None where all ask."""
+        """Return what the innermost level decides that does not ask, or None where all ask."""
         below, ending = self._node, self._natural_ending()
         for level in levels:
             failure = failure_above(level, below.below[0], ending,
@@ -227,7 +227,7 @@ class Recovery:
         return self._fall_back(why)
 
     def make_question(self, deadline_s: float) -> Question:
-        """Return a new question about the failure; `deadline_s`: seconds left, 0 without end."""
+        """Return a new question about the failure. `deadline_s`: seconds left, 0 without end."""
         account = Account(self._continuous, self._cause, tuple(self.tried), self._watch.written(),
                           self._fallback_in_words())
         return make_question(self._node, self._record, self._failure, account, deadline_s)

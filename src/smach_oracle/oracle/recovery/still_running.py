@@ -34,7 +34,7 @@ class TakenOut(NamedTuple):
 class WatchedVisit:
     """One visit of a state that the oracle has entered.
 
-    The machine's thread runs the state. The tree's alarm clock tells when it has run too long; each
+    The machine's thread runs the state. The tree's alarm clock tells when it has run too long. Each
     question has a thread of its own, in which this is an `inquiry.Asker`.
     """
 
@@ -49,13 +49,13 @@ class WatchedVisit:
         self._ended = threading.Event()
         self._answer: Optional[Answer] = None
         self._open_id = ''  # of the question that is open
-        self._answered = False  # by who wants the state to end; it has no effect before `_answer`
+        self._answered = False  # by who wants the state to end. It has no effect before `_answer`
         self._budget = node.tree.budget
         self.tried: List[str] = []
         self.question_cancelled = threading.Event()
 
     def execute(self, userdata: smach.Remapper) -> object:
-        """Execute the state; return its outcome, or a TakenOut.
+        """Execute the state, and return its outcome, or a TakenOut.
 
         It raises what the state raises.
         """
@@ -81,7 +81,7 @@ class WatchedVisit:
         return outcome
 
     def _end(self) -> Optional[Answer]:
-        """The state has ended: close the question; return the answer that has ended it, if any."""
+        """The state has ended: close the question. Return the answer that has ended it, if any."""
         with self._lock:
             self._ended.set()
         self._node.tree.clock.forget(self._ring)
@@ -94,7 +94,7 @@ class WatchedVisit:
     def _ran_s(self) -> float:
         return time.monotonic() - self._begun_s
 
-    # -- asking; in threads of its own
+    # -- asking, in threads of its own
 
     def _ring(self) -> None:
         left_s = self._run.take_stood_s()
@@ -130,13 +130,13 @@ class WatchedVisit:
             self._take_out(reply.answer)
 
     def _why_nobody_is_asked(self) -> str:
-        """Spend a question of the trial's; or say that time or questions are spent."""
+        """Spend a question of the trial's, or say that time or questions are spent."""
         if self._node.tree.expert is None or not self._node.in_force.policy.asks:
             return ''
         return self._budget.why_over() or self._budget.take_question()
 
     def _inquire(self, expert: Expert) -> Reply:
-        # the state runs on, and so do the time limits around it; whoever looks whether a state
+        # the state runs on, and so do the time limits around it. Whoever looks whether a state
         # around still runs has its answer in this question
         watched = [run for run in self._node.runs_around if isinstance(run, WatchedRun)]
         with standing_still(watched), self._node.tree.early_end.asking():
@@ -153,7 +153,7 @@ class WatchedVisit:
                 and answer.container in ('', self._node.path))
 
     def _take_out(self, answer: Answer) -> None:
-        """Preempt the state; once it has ended, the machine goes as answered."""
+        """Preempt the state. Once it has ended, the machine goes as answered."""
         with self._lock:
             if self._ended.is_set():
                 return
@@ -177,7 +177,7 @@ class WatchedVisit:
                 or self._node.is_left_behind())
 
     def make_question(self, deadline_s: float) -> Question:
-        """Return a new question about the state; `deadline_s`: seconds left, 0 without end."""
+        """Return a new question about the state. `deadline_s`: seconds left, 0 without end."""
         ran = ran_in_words(self._ran_s(), self._record.longest_s)
         question = make_question(
             self._node, self._record, self._failure(),
@@ -231,7 +231,7 @@ class WatchedVisit:
         self._node.emit(kind, state=self._record.label, **fields)
 
     def _note_answer(self, fields: Mapping[str, Any]) -> bool:
-        """Close the question, as it is answered; False where it was taken back before."""
+        """Close the question, as it is answered. Return False where it was taken back before."""
         waits_on = (fields.get('outcome'), fields.get('target')) == (
             AnswerKind.GOTO.name.lower(), self._record.label)
         with self._lock:

@@ -1,4 +1,4 @@
-"""What ends a recovery: a preempt, a shutdown, the trial's last minute; and waits until then."""
+"""What ends a recovery: a preempt, a shutdown, the trial's last minute, and waits until then."""
 import threading
 
 import smach
@@ -48,7 +48,7 @@ class RecoveryStop:
         return self.stopped() or bool(self._node.tree.budget.why_over())
 
     def has_waited(self, seconds: float) -> bool:
-        """Let time pass; False where something has ended the recovery meanwhile."""
+        """Let time pass. Return False where something has ended the recovery meanwhile."""
         with standing_still(self._node.runs_around):
             self._node.tree.waiting.wait(seconds, 'waiting', self.is_over, self.cancelled.wait)
         return not self.is_over()
@@ -56,7 +56,10 @@ class RecoveryStop:
     # -- health
 
     def has_waited_after(self, what: str) -> bool:
-        """Wait where the robot was not well at what has happened; whether it is well again."""
+        """Wait where the robot was not well at what has happened.
+
+        Return whether it is well again.
+        """
         health = self._node.tree.health
         if not health.is_set:
             return False
@@ -64,7 +67,7 @@ class RecoveryStop:
         return bool(why) and self.wait_until_well(what, why)
 
     def wait_until_well(self, what: str, why: str) -> bool:
-        """Wait until the robot is well; False where something has ended the recovery."""
+        """Wait until the robot is well. Return False where something has ended the recovery."""
         with standing_still(self._node.runs_around):
             is_well = self._node.tree.health.wait_until_well(
                 self._node, self._record.label, what, why, self.is_over, self.cancelled.wait)

@@ -17,7 +17,7 @@ class UnwellRecovery(Recovery):
 
     def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
                  context: FailureContext, why: str) -> None:
-        """`why`: the robot is not well; '' where a preempt or a shutdown is under way."""
+        """`why`: the robot is not well, or '' where a preempt or a shutdown is under way."""
         super().__init__(node, record, failure, context, False)
         self._why_unwell = why
 

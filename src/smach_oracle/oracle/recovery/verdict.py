@@ -13,7 +13,7 @@ class VerdictKind(Enum):
     JUMP = 'jump'  # to a state, its userdata as the settings say
     SUPERSEDE = 'supersede'  # the failed state counts as having ended with `outcome`
     GIVE_UP = 'give up'  # end, or go on, as `ending` says
-    PREEMPTED = 'preempted'  # a preempt or a shutdown ended the recovery; `ending` as above
+    PREEMPTED = 'preempted'  # a preempt or a shutdown ended the recovery. `ending` as above
 
 
 class Verdict(NamedTuple):
@@ -30,11 +30,14 @@ class Verdict(NamedTuple):
     # JUMP: the level above that decided on it, as if its own state had failed
     decided_by: Optional[TreeNode] = None
     restarts: bool = False  # JUMP: with the userdata of the start, in all containers
-    level: Optional[TreeNode] = None  # GIVE_UP: the container that ends; None: that of the failure
+    level: Optional[TreeNode] = None  # GIVE_UP: the container that ends. None: that of the failure
 
     @property
     def arrives_at(self) -> Optional[TreeNode]:
-        """The level above that goes on, once the containers below it are left; None: no other."""
+        """The level above that goes on, once the containers below it are left.
+
+        None means no other.
+        """
         if self.way is not None:
             return self.way.meets if self.way.left else None
         return self.level

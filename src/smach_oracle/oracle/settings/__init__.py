@@ -1,1 +1,1 @@
-"""What may be set, checked. Pure; no smach."""
+"""What may be set, checked. Pure, and without smach."""

@@ -7,7 +7,7 @@ from . import checks as values
 
 
 class Budget(NamedTuple):
-    """What all containers of a machine may spend together in one trial; None: no limit."""
+    """What all containers of a machine may spend together in one trial. None means no limit."""
 
     recoveries: Optional[int] = None  # decisions of the oracle's own that led to a state
     minutes: Optional[float] = None  # of monotonic time, from the beginning of the trial
@@ -30,7 +30,7 @@ _CHECKS: Dict[str, values.Check] = {
 
 
 def checked_budget(key: str, given: object) -> Budget:
-    """Check for a budget; a limit that is not given, or is None, does not apply.
+    """Check for a budget. A limit that is not given, or is None, does not apply.
 
     :raises SettingsError: naming key, value and what is allowed.
     """

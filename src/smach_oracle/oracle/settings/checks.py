@@ -19,7 +19,7 @@ def is_state(value: object) -> bool:
 
 
 def number(low: float, high: float, allowed: str) -> Check:
-    """Check for a number from `low` to `high`; its SettingsError says `allowed`."""
+    """Check for a number from `low` to `high`. Its SettingsError says `allowed`."""
     def check(key: str, value: Any) -> float:
         if not is_number(value, low, high):
             raise SettingsError(key, value, allowed)
@@ -28,7 +28,7 @@ def number(low: float, high: float, allowed: str) -> Check:
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check:
-    """Check for a whole number from `low` to `high`; its SettingsError says `allowed`."""
+    """Check for a whole number from `low` to `high`. Its SettingsError says `allowed`."""
     def check(key: str, value: Any) -> int:
         if not is_whole(value, low, high):
             raise SettingsError(key, value, allowed)
@@ -47,7 +47,7 @@ def flag(key: str, value: object) -> bool:
 
 
 def choice(options: Sequence[str]) -> Check:
-    """Check for one of some words; its SettingsError names them all."""
+    """Check for one of some words. Its SettingsError names them all."""
     def check(key: str, value: object) -> str:
         if not isinstance(value, str) or value not in options:
             raise SettingsError(key, value, ', '.join(options))
@@ -66,7 +66,7 @@ def text(key: str, value: object) -> str:
 
 
 def file(key: str, value: object) -> str:
-    """Check for a path, empty or not; returns it with `~` filled in."""
+    """Check for a path, empty or not, and return it with `~` filled in."""
     return path_of(text(key, value))
 
 
@@ -140,7 +140,7 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
 
 
 def deadline(key: str, value: object) -> float:
-    """Check for a deadline in seconds; 0 waits without end.
+    """Check for a deadline in seconds. 0 waits without end.
 
     :raises SettingsError: for anything else.
     """
@@ -148,7 +148,7 @@ def deadline(key: str, value: object) -> float:
 
 
 def time_limit(key: str, value: object) -> Optional[float]:
-    """Check for a time limit in seconds; 0 and None are no limit.
+    """Check for a time limit in seconds. 0 and None are no limit.
 
     :raises SettingsError: for anything else.
     """

@@ -1,4 +1,4 @@
-"""Which outcomes sound like a failure. Pure; no smach."""
+"""Which outcomes sound like a failure. Pure, and without smach."""
 import re
 from typing import Iterable, Pattern
 
@@ -7,7 +7,7 @@ PREEMPTED = 'preempted'
 
 
 def is_preempted(outcome: object) -> bool:
-    """Whether an outcome is the one of a preempt; outcomes need not be strings."""
+    """Whether an outcome is the one of a preempt. Outcomes need not be strings."""
     return isinstance(outcome, str) and outcome.lower() == PREEMPTED
 
 

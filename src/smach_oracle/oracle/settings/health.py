@@ -12,7 +12,7 @@ from ..errors import SettingsError
 from . import checks as values
 from .preconditions import PYTHON, Resolver
 
-# no arguments; True or '' is well, else what is wrong
+# no arguments. True or '' is well, else what is wrong
 HealthFunction = Callable[[], Union[bool, str]]
 WORST = ('ok', 'warn')
 # of ROS: a name from the root, of the node's own, or relative
@@ -38,7 +38,7 @@ class HealthCondition(NamedTuple):
     name: str  # what people call it
     source: str = ''  # the topic, or the name of the status in the diagnostics
     field: str = 'data'  # of the topic's messages, dotted
-    equals: Any = None  # bool, number or text; None: the limits count
+    equals: Any = None  # bool, number or text. None means the limits count
     at_least: float = -math.inf
     at_most: float = math.inf
     max_age_s: Optional[float] = None  # what is older, or was never received, is unwell
@@ -106,7 +106,7 @@ def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
 
 
 def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
-    """What the field must be: `equals`, or limits; true where nothing is said."""
+    """What the field must be: `equals`, or limits. True where nothing is said."""
     limits = [name for name in ('at_least', 'at_most') if name in entry]
     if not limits:
         return {'equals': _plain(prefix + 'equals', entry.get('equals', True))}
@@ -163,6 +163,6 @@ def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, 
 
 
 def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:
-    """What is to be listened to, in words; functions are called instead."""
+    """What is to be listened to, in words. Functions are called instead."""
     return ['{} {}'.format(condition.kind.value, condition.source) for condition in conditions
             if condition.kind is not HealthKind.FUNCTION]

@@ -62,7 +62,7 @@ def checked_interfaces(given: object) -> Offers:
 
 
 def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
-    """How it is started; None where it is somebody else's to start it."""
+    """How it is started, or None where it is somebody else's to start it."""
     kinds = [key for key in ('launch', 'node') if key in entry]
     if not kinds:
         for key in ('args', 'start_limit_s'):

@@ -9,7 +9,7 @@ _ALLOWED = 'ask, recover, restart or state:LABEL'
 
 
 def checked_on_resume(key: str, value: object) -> Tuple[str, str]:
-    """Check for what may be done; return it, and the path of a state where it names one.
+    """Check for what may be done, and return it, and the path of a state where it names one.
 
     :raises SettingsError: for anything else.
     """
@@ -23,7 +23,7 @@ def checked_on_resume(key: str, value: object) -> Tuple[str, str]:
 
 
 def checked_resume_map(key: str, value: object) -> Dict[str, str]:
-    """Check for paths of states by those that they had in an earlier script; return them.
+    """Check for paths of states by those that they had in an earlier script, and return them.
 
     The parameter server makes mappings in mappings of paths. They are put together again.
 

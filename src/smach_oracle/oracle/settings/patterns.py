@@ -1,7 +1,7 @@
 """Names of states and containers in settings: labels, paths, and patterns of them. Pure.
 
 A name without '/' is a label, in any container. One with '/' is a path below the top machine. In
-both `*` stands for any part of one label; in a path `**` stands for any number of labels.
+both `*` stands for any part of one label. In a path `**` stands for any number of labels.
 """
 import functools
 import re
@@ -48,7 +48,7 @@ def is_nested_at(nested: Nested, path: str) -> bool:
 
 
 def matches(name: str, path: str) -> bool:
-    """Whether a name stands for the state or container of a path; '' is the top machine's."""
+    """Whether a name stands for the state or container of a path. '' is the top machine's."""
     label = path.rsplit('/', 1)[-1]
     if name in (path, label):
         return True
@@ -60,7 +60,7 @@ def matches(name: str, path: str) -> bool:
 def exactness(name: str) -> Tuple[bool, bool, int, int]:
     """Return what sorts names by how exact they are, the most exact last.
 
-    A name without `*` is more exact than a pattern, a path more than a label; of patterns the one
+    A name without `*` is more exact than a pattern, a path more than a label, of patterns the one
     with more letters, then the one with fewer `**`.
     """
     return (not is_pattern(name), _is_path(name), len(name.replace('*', '').replace('/', '')),

@@ -1,7 +1,7 @@
 """What must hold before a state, as its designer wrote it (paper, section IV-B). Pure.
 
 Four kinds: the label of another state of the same container, or the path of one of another
-container below the top machine; a `smach.State`; a callable `f(userdata) -> bool`; a pair (check,
+container below the top machine, a `smach.State`, a callable `f(userdata) -> bool`. A pair (check,
 achieve) whose second half runs only if the first does not hold. In YAML: a label, a path
 (KITCHEN/LOOK, or /LOOK for a state of the top machine), 'python:module:attribute', or {check: ...,
 achieve: ...}.

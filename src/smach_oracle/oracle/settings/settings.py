@@ -1,4 +1,4 @@
-"""The settings of the executive, validated. Pure; no smach.
+"""The settings of the executive, validated. Pure, and without smach.
 
 `Settings.from_dict` reads nested plain dictionaries, as YAML and rosparam give them. Every error is
 a SettingsError that names the dotted key, the value and what is allowed.
@@ -23,7 +23,7 @@ from .preconditions import PreconditionSpec, Resolver, parse_preconditions
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
 RUN, ANNOUNCE, CONFIRM_FIRST = 'run', 'announce', 'confirm'  # autonomy
 AUTONOMY_LEVELS = (RUN, ANNOUNCE, CONFIRM_FIRST)
-_MAX_HISTORY = 1000000  # visits; each question carries them all
+_MAX_HISTORY = 1000000  # visits. Each question carries them all
 _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
 
 
@@ -36,12 +36,12 @@ class StateSettings:
     moderate_from: float = 0.4  # failure rate from which a state is MODERATE
     high_from: float = 0.75  # and HIGH
     estimator: str = 'window'
-    max_recoveries: int = 5  # per trial; beyond it the oracle asks
+    max_recoveries: int = 5  # per trial. Beyond it the oracle asks
     on_retry: str = ALLOW  # whether it may be repeated
     autonomy: str = RUN  # whether it is entered by itself
     failure_outcomes: Tuple[str, ...] = ()  # outcomes that are failures whatever they lead to
     author_recoveries: str = 'keep'
-    time_limit_s: Optional[float] = None  # of each execution; None: no limit
+    time_limit_s: Optional[float] = None  # of each execution. None means no limit
     grace_period_s: float = 2.0  # between the preempt after an overrun and abandonment
     preconditions: Tuple[PreconditionSpec, ...] = ()
 
@@ -125,7 +125,7 @@ class Settings:
     step_back_across: bool = False
     # those that are not the policy's defaults
     policy_parameters: Mapping[str, float] = field(default_factory=dict)
-    checkpoint: str = ''  # the store of the trials; '': nothing is stored
+    checkpoint: str = ''  # the store of the trials. '' means nothing is stored
     checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
     checkpoint_synchronous: str = 'FULL'
     # what is done about a stored trial that was not finished, and for STATE the path of a state

@@ -2,7 +2,7 @@
 
 These parts are mended. File names are made absolute. Triangles get normals: some meshes have none
 and would look black. Links without inertia get one of a gram, for simulators would take 1 kg. The
-four-bar fingers become jaws that slide; their joints read the travel (m) of one finger from its
+four-bar fingers become jaws that slide. Their joints read the travel (m) of one finger from its
 closed place, so that the gap between the tips is their sum. Parts in signal colours get those of a
 PR2.
 """
@@ -32,20 +32,20 @@ TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribu
 
 
 class ModelError(RuntimeError):
-    """The PR2's model cannot be had; the text names what is missing, and where."""
+    """The PR2's model cannot be had. The text names what is missing, and where."""
 
 
 class Pr2Files(NamedTuple):
     """The mended model on disk."""
 
-    urdf: Path  # root base_footprint, child base_link; what a robot_description has
-    # on BASE_JOINTS, root 'world', links that are fixed to each other made one; for physics
+    urdf: Path  # root base_footprint, child base_link, what a robot_description has
+    # on BASE_JOINTS, root 'world', links that are fixed to each other made one, for physics
     mobile: Path
     srdf: Path  # which pairs of links may touch, among others
 
 
 def pr2_files() -> Pr2Files:
-    """The mended model, derived if need be; two processes may ask at once.
+    """The mended model, derived if need be. Two processes may ask at once.
 
     :raises ModelError: where example-robot-data is not installed, or the cache cannot be written.
     """

@@ -101,7 +101,7 @@ def _set_origin(element: Element, pose: np.ndarray) -> None:
 
 
 def _rpy(pose: np.ndarray) -> Tuple[float, float, float]:
-    """Roll, pitch, yaw about fixed axes; where pitch is upright, roll is 0."""
+    """Roll, pitch, yaw about fixed axes. Where pitch is upright, roll is 0."""
     pitch = float(np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0])))
     if np.hypot(pose[0, 0], pose[1, 0]) < 1e-9:
         return 0.0, pitch, float(np.arctan2(-pose[0, 1], pose[1, 1]))

@@ -52,7 +52,7 @@ def boxes_message(map_id: str, made: CollisionMap) -> CollisionBoxes:
 
 
 def markers_message(boxes: CollisionBoxes) -> MarkerArray:
-    """The same as RViz draws it; what it drew before goes."""
+    """The same as RViz draws it. What it drew before goes."""
     drawn = [
         Marker(header=boxes.header, ns='collision_map', id=number, type=Marker.CUBE,
                action=Marker.ADD, pose=pose, scale=size, color=COLOUR, text=name)

@@ -25,7 +25,7 @@ from .skill_server import SkillServer
 
 
 def robot_model() -> CollisionModel:
-    """The model on the parameter server, if its semantics are there too; else the installed PR2."""
+    """The model on the parameter server, if its semantics are there too, else the installed PR2."""
     urdf = rospy.get_param('robot_description', '')
     srdf = rospy.get_param('robot_description_semantic', '')
     return model_from(urdf.replace('file://', ''), srdf) if urdf and srdf else installed_model()

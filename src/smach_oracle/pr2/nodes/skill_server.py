@@ -28,8 +28,8 @@ class SkillServer:
 
     def __init__(self, abort: Callable[[], None], resume: Callable[[], None]) -> None:
         """
-        :param abort: makes what the robot does, now and until `resume`, end with a RobotError;
-            called from any thread.
+        :param abort: makes what the robot does, now and until `resume`, end with a RobotError.
+            It is called from any thread.
         """
         self._abort = abort
         self._resume = resume
@@ -41,9 +41,9 @@ class SkillServer:
                                                                            ...] = ()) -> None:
         """Serve an action.
 
-        :param spec: the Action type; its feedback has a field `status`, its result a field
+        :param spec: the Action type. Its feedback has a field `status`, its result a field
             `reason`.
-        :param handler: takes the goal and a function that reports what is being done; returns
+        :param handler: takes the goal and a function that reports what is being done. It returns
             the result, or raises SkillError, RobotError, PlanningError or one of `errors`, whose
             text becomes the reason.
         """

@@ -3,7 +3,7 @@ from typing import List, Tuple
 
 import numpy as np
 
-# degrees of hue from which each name counts, up to the next one's; red passes 360
+# degrees of hue from which each name counts, up to the next one's. Red passes 360
 HUES: List[Tuple[float, str]] = [(0.0, 'red'), (18.0, 'orange'), (43.0, 'yellow'), (68.0, 'green'),
                                  (165.0, 'turquoise'), (205.0, 'blue'), (262.0, 'purple'),
                                  (335.0, 'red')]
@@ -18,7 +18,7 @@ SAME_POINT = 0.16
 
 
 def names_of(colours: np.ndarray) -> np.ndarray:
-    """The colours' names, (...,) of text; '' for what is too dark to tell.
+    """The colours' names, (...,) of text, or '' for what is too dark to tell.
 
     :param colours: (..., 3), red, green and blue, 0 to 255.
     """

@@ -19,20 +19,20 @@ LEAST_OF_HANDLE = 15
 
 
 class DoorNotSeen(Exception):
-    """The door cannot be made out; the text is the reason, for people."""
+    """The door cannot be made out. The text is the reason, for people."""
 
 
 class DoorView(NamedTuple):
     """The door as it was seen."""
 
-    angle: float  # rad, against the front of the fridge as the map has it; 0: closed
+    angle: float  # rad, against the front of the fridge as the map has it. 0 means closed
     base_from_fridge: np.ndarray  # 4x4, the map's, moved so that the door lies where it was seen
 
 
 def find_door(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray) -> DoorView:
     """Make out the door in an image.
 
-    :param base_from_fridge: 4x4, where the map has the fridge; right to some 0.1 m and 5 degrees.
+    :param base_from_fridge: 4x4, where the map has the fridge, right to some 0.1 m and 5 degrees.
     :raises DoorNotSeen: where no face of the door is in view.
     """
     points = _points_of_door(image, kitchen, base_from_fridge)

@@ -46,10 +46,10 @@ def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarra
                colour: str = '') -> UprightBox:
     """The foremost thing on the drinks' shelf that can be a drink, in the frame of the base.
 
-    :param base_from_fridge: 4x4, where the map has the fridge; right to some 0.1 m.
-    :param min_height: m above the shelf; lower clusters are no drinks. 0 or less: 0.03.
-    :param limbs: where the robot's own arms are; they are taken out of what is seen.
-    :param colour: one of colours.NAMES: a drink of this colour, and no other; '': any.
+    :param base_from_fridge: 4x4, where the map has the fridge, right to some 0.1 m.
+    :param min_height: m above the shelf. Lower clusters are no drinks. 0 or less: 0.03.
+    :param limbs: where the robot's own arms are. They are taken out of what is seen.
+    :param colour: one of colours.NAMES: a drink of this colour, and no other. '' means any.
     :raises NotSeen: where the shelf is not in view or hidden, nothing on it can be such a drink, or
         there is no such colour.
     """
@@ -80,7 +80,7 @@ def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarra
 
 def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
                colour: str) -> List[Cluster]:
-    """What has a colour: whole things, and parts of things that touch; foremost first."""
+    """What has a colour: whole things, and parts of things that touch, foremost first."""
     found = []
     for cluster in clusters:
         pixels = cloud.colour[tuple(cluster.pixels.T)]
@@ -102,7 +102,7 @@ def _on_shelf(cloud: OrganizedCloud, clusters: Sequence[Cluster]) -> str:
 
 def things_on_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
                     limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
-    """Everything seen on the drinks' shelf, foremost first; [] where the shelf is not seen.
+    """Everything seen on the drinks' shelf, foremost first, or [] where the shelf is not seen.
 
     Parameters and boxes are as in find_drink().
     """

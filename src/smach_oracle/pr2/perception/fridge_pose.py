@@ -65,7 +65,7 @@ def _fitted(kitchen: Kitchen, points: np.ndarray, door: DoorView, expected: np.n
     """Fit the map to points.
 
     :param points: (n, 3) m, in the fridge's frame as the door has it.
-    :param moves: whether the door's angle is fitted, too; else it is shut.
+    :param moves: whether the door's angle is fitted, too, else it is shut.
     """
     def off(values: np.ndarray) -> np.ndarray:
         angle = values[3] if moves else 0.0
@@ -110,7 +110,7 @@ def _points_about(image: CameraImage, kitchen: Kitchen, door: DoorView) -> np.nd
 
 
 def _distance(points: np.ndarray, box: MapBox) -> np.ndarray:
-    """(n,) m from points (n, 3) to the faces of a box; below 0 inside."""
+    """(n,) m from points (n, 3) to the faces of a box, below 0 inside."""
     away = points - box.centre
     turn = np.array([[np.cos(box.yaw), np.sin(box.yaw), 0.0],
                      [-np.sin(box.yaw), np.cos(box.yaw), 0.0], [0.0, 0.0, 1.0]])

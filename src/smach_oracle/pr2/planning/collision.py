@@ -29,8 +29,8 @@ class CollisionWorld:
     def __init__(self, model: CollisionModel, arm: str, joints: Mapping[str, float]) -> None:
         """Put the robot into a client of its own.
 
-        :param arm: the arm that moves, 'left' or 'right'; all other joints stay as in `joints`.
-        :param joints: encoder readings; joints that are missing stand at 0.
+        :param arm: the arm that moves, 'left' or 'right'. All other joints stay as in `joints`.
+        :param joints: encoder readings. Joints that are missing stand at 0.
         :raises ValueError: for an unknown arm, or a description that cannot be loaded.
         """
         if arm not in ARMS:
@@ -107,7 +107,7 @@ class CollisionWorld:
 
     @contextlib.contextmanager
     def touchable(self, names: Iterable[str]) -> Iterator[None]:
-        """While this holds, hand and held object may touch these obstacles; the arm may not."""
+        """While this holds, hand and held object may touch these obstacles. The arm may not."""
         before = self._touchable
         self._touchable = before | {self._boxes[name] for name in names if name in self._boxes}
         try:
@@ -120,7 +120,7 @@ class CollisionWorld:
         return next(self._collisions(q), None) is None
 
     def why_not(self, q: np.ndarray) -> str:
-        """What touches what at joint positions (7,), in words; '' where nothing does."""
+        """What touches what at joint positions (7,), in words, or '' where nothing does."""
         names = {index: name for name, index in self._links.items()}
         bodies = {body: name for name, body in self._boxes.items()}
         found = set()

@@ -19,7 +19,7 @@ from ..robot import ARM_JOINTS
 
 KEPT = 2  # idle clients, at most
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION
-_MOVING, _RESTING = 1, 64  # collision groups; 1 is what PyBullet gives to all that moves
+_MOVING, _RESTING = 1, 64  # collision groups. 1 is what PyBullet gives to all that moves
 _ALL = -1  # mask: meets every group
 
 
@@ -54,7 +54,7 @@ def model_from(urdf: str, srdf: str) -> CollisionModel:
 
 
 class CollisionBody:
-    """The robot in a client of its own; the pairs of links that may touch are left out."""
+    """The robot in a client of its own. The pairs of links that may touch are left out."""
 
     def __init__(self, model: CollisionModel, arm: str) -> None:
         """Load it.
@@ -84,7 +84,7 @@ class CollisionBody:
             raise
 
     def place(self, joints: Mapping[str, float]) -> None:
-        """Set joints to positions (rad or m); names that it does not have are left out."""
+        """Set joints to positions (rad or m). Names that it does not have are left out."""
         known = [(self.joints[name], value) for name, value in sorted(joints.items())
                  if name in self.joints]
         pybullet.resetJointStatesMultiDof(self.robot, [index for index, _ in known],
@@ -126,7 +126,7 @@ class CollisionBody:
             os.remove(path)
 
     def _filter(self, allowed: FrozenSet[FrozenSet[str]]) -> List[Tuple[int, int]]:
-        """Leave on the pairs with a moving link that must not touch; they are returned."""
+        """Leave on the pairs with a moving link that must not touch. They are returned."""
         moving = [each for each in self._solid if each[1] in self.moving]
         resting = [each for each in self._solid if each[1] not in self.moving]
         pairs = []
@@ -141,7 +141,7 @@ class CollisionBody:
 
 
 class BodyPool:
-    """Clients that are lent and given back; any thread."""
+    """Clients that are lent and given back. Any thread may use it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -160,7 +160,7 @@ class BodyPool:
         return CollisionBody(model, arm)
 
     def take_back(self, model: CollisionModel, arm: str, body: CollisionBody) -> None:
-        """Take back one in which nothing but the robot is left; the oldest is dropped."""
+        """Take back one in which nothing but the robot is left. The oldest is dropped."""
         body.clean()
         with self._lock:
             self._idle.append((model, arm, body))

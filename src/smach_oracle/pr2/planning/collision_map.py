@@ -107,7 +107,7 @@ def map_of_image(image: CameraImage, limbs: Sequence[Capsule],
                  target: Optional[UprightBox] = None) -> CollisionMap:
     """The map of all that an image shows within REGION.
 
-    :param limbs: of the robot; they are left out.
+    :param limbs: of the robot. They are left out.
     :param target: the object to be picked, left out as well.
     """
     points = cloud_of(image, limbs).points.reshape(-1, 3)
@@ -131,7 +131,7 @@ def _columns(points: np.ndarray, least: int = 3) -> List[MapBox]:
     """Boxes of CELL in width, as long in y as cells lie side by side.
 
     :param points: (n, 3).
-    :param least: points of a cell; fewer are noise.
+    :param least: points of a cell. Fewer are noise.
     """
     if not len(points):
         return []

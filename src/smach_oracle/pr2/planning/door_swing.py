@@ -5,7 +5,7 @@ import numpy as np
 
 from smach_oracle.geometry.chain import JointChain
 
-# of the hand against the door, to choose from at each step; in units of that step
+# of the hand against the door, to choose from at each step, in units of that step
 TURNS = (-0.8, 0.0, 0.5, 1.0, 1.8)
 MAX_JOINT_STEP = 0.35  # rad between two points of the path
 ROOM = 0.35  # rad of distance to a joint's limit, beyond which more does not count
@@ -31,7 +31,7 @@ def best_swing(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, turns: Tu
     """The longest path found along `angles` (rad, in order, evenly spaced).
 
     :param turns: rad, the least and most that the hand may be turned against the door.
-    :param seed: (7,) a comfortable posture; paths are begun near it first.
+    :param seed: (7,) a comfortable posture. Paths are begun near it first.
     :param may_begin: whether the arm can get to the first joint positions of a path at all.
     :returns: None where not even the first pose can be reached freely.
     """

@@ -16,7 +16,7 @@ from smach_oracle.geometry.transforms import inverse, rotation_about, rotation_v
 
 from .collision import CollisionWorld
 
-BUDGET = 6000  # collision checks for one path; most take less than 1000
+BUDGET = 6000  # collision checks for one path. Most take less than 1000
 RESOLUTION = 0.05  # rad (norm over the joints) between checks along a path
 REACH = 0.6  # rad that a tree grows at once
 STRAIGHT_STEP = 0.01  # m between checks along a line
@@ -29,16 +29,16 @@ ompl_util.setLogLevel(ompl_util.LOG_NONE)
 
 
 class PlanningError(Exception):
-    """No path was found; the text gives the reason."""
+    """No path was found. The text gives the reason."""
 
 
 def plan(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
          budget: int = BUDGET) -> np.ndarray:
     """A path free of collision.
 
-    :param start: (7,), where the arm is; where it touches something by a little, it first steps out
+    :param start: (7,), where the arm is. Where it touches something by a little, it first steps out
         of it.
-    :param goal: (7,), within the limits; continuous joints go there by less than half a turn.
+    :param goal: (7,), within the limits. Continuous joints go there by less than half a turn.
     :param seed: 1 or more.
     :param budget: collision checks to spend at most.
     :returns: (m, 7), from start to goal.
@@ -78,8 +78,8 @@ def straight(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Opti
 
     :param start: (7,), where the arm is.
     :param goal: 4x4, base_footprint from tool.
-    :returns: (m, 7) from the start; None where the line leaves the reach, needs another posture, or
-        meets something.
+    :returns: (m, 7) from the start, or None where the line leaves the reach, needs another posture,
+        or meets something.
     """
     chain = space.chain
     here = chain.forward(start)
@@ -99,9 +99,9 @@ def straight(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Opti
 def timed(chain: JointChain, path: np.ndarray, speed: float = 0.4) -> Tuple[np.ndarray, np.ndarray]:
     """The times of a path's points, with speed and acceleration bounded.
 
-    :param path: (m, n), m >= 1; the arm starts at its first point, at rest.
+    :param path: (m, n), m >= 1. The arm starts at its first point, at rest.
     :param speed: share of the joints' velocity limits, at most.
-    :returns: positions (k, n) after the first point, and times (k,) in s, increasing; for
+    :returns: positions (k, n) after the first point, and times (k,) in s, increasing. For
         Robot.follow().
     """
     points = _sampled(path)

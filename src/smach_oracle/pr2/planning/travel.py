@@ -9,7 +9,7 @@ from ..kitchen import MapBox
 from ..robot import RobotError
 from .arm import Arm, SkillContext, SkillError, Unreachable, encoder_readings, seed_of
 
-# rad; the left hand folded before the chest, the right arm at the robot's side
+# rad, the left hand folded before the chest, the right arm at the robot's side
 TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
           'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0])}
 NEAR_ENOUGH = 0.06  # rad
@@ -35,7 +35,7 @@ def stow(context: SkillContext, arms: Iterable[str], boxes: Mapping[str, MapBox]
 def carry(limb: Arm, level: bool = True) -> None:
     """Take the hand to the robot's side, the elbow low and out of the camera's view.
 
-    :param level: whether the hand is level in the end; if not, it is turned about the vertical
+    :param level: whether the hand is level in the end. If not, it is turned about the vertical
         alone, so that what it holds is as upright as it is now.
     :raises SkillError: where the arm does not get there.
     """

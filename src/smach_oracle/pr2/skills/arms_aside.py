@@ -29,7 +29,7 @@ def is_aside(joints: Mapping[str, float], arm: str) -> bool:
 def arms_aside(context: SkillContext, arms: Sequence[str], boxes: Mapping[str, MapBox]) -> None:
     """Move arms aside, one after the other.
 
-    :param arms: 'left', 'right'; empty: both.
+    :param arms: 'left', 'right'. Empty means both.
     :param boxes: obstacles, in base_footprint.
     :raises SkillError: for an unknown arm, or where an arm does not get there.
     """

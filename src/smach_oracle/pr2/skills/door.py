@@ -41,7 +41,7 @@ CLEAR = (-1.00, -0.14, 0.0)  # beside the open door's edge, ready to drive in
 CLOSING = (-0.92, -0.30, 0.0)
 
 AJAR = np.radians(42.0)  # from here on there is room for a hand behind it: it is pushed
-PULLED = np.radians(68.0)  # as far as the handle is pulled; the hand goes on from inside
+PULLED = np.radians(68.0)  # as far as the handle is pulled. The hand goes on from inside
 WIDE = np.radians(95.0)  # as far as the door is opened
 STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
@@ -62,7 +62,7 @@ PULLS, PUSHES = 2, 2  # until the door is open, or shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
-# m between the tips that lets go of the bar; there is no room for more between bar and door
+# m between the tips that lets go of the bar. There is no room for more between bar and door
 RELEASE = 0.045
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
 APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
@@ -71,7 +71,7 @@ ToolAt = Callable[[float, float], np.ndarray]
 
 
 def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
-    """Open the fridge, from wherever the base stands before it; leave the base ready to drive in.
+    """Open the fridge, from wherever the base stands before it. Leave the base ready to drive in.
 
     :param arm: 'left' or 'right'.
     :returns: rad, the opening that the camera sees in the end.
@@ -265,7 +265,7 @@ def _draw_along(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray, ang
 
 
 def _take_hand_off(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
-    """Drive the open hand straight back from the bar, and stow the arms; the door is at `angle`."""
+    """Drive the open hand straight back from the bar, and stow the arms. The door is at `angle`."""
     try:
         _step_back(context, OFF)
         _stow_beside(context, kitchen, angle)
@@ -274,7 +274,7 @@ def _take_hand_off(context: SkillContext, kitchen: Kitchen, angle: float) -> Non
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
-    """Reach behind the door's edge and push it from inside; returns how far it is open, rad."""
+    """Reach behind the door's edge and push it from inside, and return how far it is open, rad."""
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
@@ -333,7 +333,7 @@ def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, fir
 
 
 def _strain(limb: Arm, swing: DoorSwing, speed: float) -> None:
-    """Follow a swing against resistance; an arm that is held up at the end has not failed."""
+    """Follow a swing against resistance. An arm that is held up at the end has not failed."""
     here = limb.now()
     turns = limb.chain.nearest_turn(swing.path[0], here) - swing.path[0]
     try:
@@ -370,7 +370,7 @@ def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, re
              height: float, inside: bool) -> np.ndarray:
     """4x4, base from tool: the closed hand beside the door's inner or outer face.
 
-    :param turn: rad, of the hand against the face. At 0 it points straight at it; the more it lies
+    :param turn: rad, of the hand against the face. At 0 it points straight at it. The more it lies
         along it, the more room its width needs.
     :param reach: m from the hinge.
     :param height: m.

@@ -129,7 +129,7 @@ def told(removal: Removal) -> str:
 
 
 def remove(plan: Plan, say: Say, warn: Say) -> int:
-    """Remove what the plan names, each after a line about it; return how many are gone.
+    """Remove what the plan names, each after a line about it, and return how many are gone.
 
     One that has changed or is held by now stays.
     """

@@ -19,7 +19,7 @@ SKIPPED, WRONG = 1, 2  # exit codes
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
-    """Run the command; return its exit code."""
+    """Run the command, and return its exit code."""
     given = _parser().parse_args(arguments)
     limits = Limits(given.keep_days, given.keep_gb)
     if not limits.are_set:

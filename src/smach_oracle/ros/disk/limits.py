@@ -6,7 +6,7 @@ GB = 1e9
 
 
 class Limits(NamedTuple):
-    """What is kept; 0: no limit."""
+    """What is kept. 0 means no limit."""
 
     days: float = 0.0  # since the newest bag of a trial was closed
     gb: float = 0.0  # 10^9 bytes, of all bags of a folder

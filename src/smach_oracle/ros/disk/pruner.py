@@ -8,7 +8,7 @@ from .limits import DAY_S, GB, Limits, planned
 
 
 class Pruner:
-    """Removes bags over the limits; the robot never waits for it."""
+    """Removes bags over the limits. The robot never waits for it."""
 
     def __init__(self, folder: str, limits: Limits, say: Say, warn: Say) -> None:
         self._folder, self._limits = folder, limits
@@ -18,7 +18,7 @@ class Pruner:
         self._thread: Optional[threading.Thread] = None
 
     def bag_closed(self) -> None:
-        """Look at the folder soon; any thread."""
+        """Look at the folder soon. Any thread may use it."""
         if not self._limits.are_set:
             return
         self._due.set()

@@ -20,7 +20,7 @@ _KINDS = [int(kind) for kind in AnswerKind]
 def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
     """Return where the decision fits the question.
 
-    :raises AnswerError: where it does not; the text says what would.
+    :raises AnswerError: where it does not. The text says what would.
     """
     if not decision.by.strip():
         raise AnswerError('the answer does not say who gives it: `by` is empty')

@@ -43,7 +43,7 @@ _RETRY_S = 0.3
 
 
 class ExpertQueryClient(Expert):
-    """Asks the experts behind an ExpertQuery server; may be used from several threads at once.
+    """Asks the experts behind an ExpertQuery server. May be used from several threads at once.
 
     A server that dies while a question waits is waited for, and asked again under the same query
     id, until the deadline.
@@ -52,9 +52,9 @@ class ExpertQueryClient(Expert):
     def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S,
                  cameras: Sequence[str] = ()) -> None:
         """
-        :param server: name of a shared server; '' hosts one of this node's own, `~expert_query`,
+        :param server: name of a shared server. '' hosts one of this node's own, `~expert_query`,
             and asks that.
-        :param robot: who asks; '' is the node's name.
+        :param robot: who asks. '' is the node's name.
         :param server_wait_s: how long to wait for a shared-autonomy interface that an expert chose.
         :param cameras: topics whose newest images are published with each question.
         """
@@ -81,7 +81,7 @@ class ExpertQueryClient(Expert):
 
     def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
                       progress: Progress) -> Optional[Answer]:
-        """Run a shared-autonomy interface; None where it fails or is cancelled.
+        """Run a shared-autonomy interface. Return None where it fails or is cancelled.
 
         It is started where it is not there.
 
@@ -130,7 +130,7 @@ class ExpertQueryClient(Expert):
 
     def _provide(self, offer: InterfaceOffer, link: GoalLink, query_id: str,
                  cancelled: threading.Event) -> Optional[StartedInterface]:
-        """Wait for the action server; start it where it can be started and nobody else has."""
+        """Wait for the action server. Start it where it can be started and nobody else has."""
         if (offer.start is None or _advertised(link)) and _wait_until_ready(
                 link, self._server_wait_s, cancelled):
             return None
@@ -224,7 +224,7 @@ class _SentQuestion:
         return event
 
     def _send(self, now_s: float) -> None:
-        """Send the question; the deadline does not begin again."""
+        """Send the question. The deadline does not begin again."""
         if self._deadline_s < math.inf:
             self._goal.deadline = max(self._deadline_s - now_s, 1e-3)
         self._sent = self._link.send(self._goal, now_s)
@@ -264,7 +264,7 @@ class _SentQuestion:
 
 
 def _server_lost(link: GoalLink, sent: SentGoal, now_s: float) -> bool:
-    """Whether the server is gone; at a shutdown it goes down with this node, and is not missed."""
+    """Whether the server is gone. At a shutdown it goes down with this node, and is not missed."""
     return not rospy.core.is_shutdown_requested() and (not link.alive() or sent.unheard(now_s))
 
 
@@ -287,7 +287,7 @@ def _wait_until_ready(link: GoalLink, timeout_s: float, cancelled: threading.Eve
 
 
 def _advertised(link: GoalLink) -> bool:
-    """Whether the master knows of an action server there; one that has died may still be listed."""
+    """Whether the master knows of an action server there. One that has died may still be listed."""
     try:
         published = rosgraph.Master(rospy.get_name()).getPublishedTopics('')
     except (OSError, rosgraph.MasterException):

@@ -41,7 +41,7 @@ class QuestionNotice(NamedTuple):
     """News for the asker of a question."""
 
     query_id: str
-    status: int  # ExpertQueryFeedback.PENDING, CLAIMED or INTERFACE_RUNNING; 0 where it is settled
+    status: int  # ExpertQueryFeedback.PENDING, CLAIMED or INTERFACE_RUNNING. 0: it is settled
     by: str
     text: str
     settled: Optional[SettledQuestion] = None
@@ -64,7 +64,7 @@ class AnswerReply(NamedTuple):
 
 
 class QuestionRefusedError(AnswerError):
-    """A question that cannot be taken in; the text gives the reason."""
+    """A question that cannot be taken in. The text gives the reason."""
 
 
 class OpenQuestion:
@@ -121,7 +121,7 @@ class OpenQuestions:
 
         A question that was taken back (or whose asker was thought gone) opens again.
 
-        :returns: how it ended, where it is settled already; else None.
+        :returns: how it ended, where it is settled already, else None.
         :raises QuestionRefusedError: no id, a deadline that is no time, or another question's id.
         """
         self.tick()
@@ -174,7 +174,7 @@ class OpenQuestions:
         return AnswerReply(True, '', decision)
 
     def close(self, query_id: str, why: str) -> None:
-        """The asker took it back, or is gone; the end of an interface, where one runs."""
+        """The asker took it back, or is gone. The end of an interface, where one runs."""
         self.tick()
         question = self._open.get(query_id)
         if question is not None:
@@ -191,7 +191,7 @@ class OpenQuestions:
                 self._release(question, 'the claim of {} ran out'.format(question.holder))
 
     def next_due_s(self) -> float:
-        """When the next lease or deadline passes, by the given clock; infinity where none will."""
+        """When the next lease or deadline passes, by the given clock, infinity where none will."""
         times = [
             min(question.deadline_s, question.lease_until_s) for question in self._open.values()
         ]

@@ -15,7 +15,7 @@ TOPIC = '~oracle/preconditions'
 PERIOD_S = 2.0
 PATIENCE_S = 1.0  # for one function
 LISTENER_PERIOD_S = 0.25  # how soon somebody who begins to listen is noticed
-MOST_PRECONDITIONS = 500  # of one question; further ones are not checked
+MOST_PRECONDITIONS = 500  # of one question. Further ones are not checked
 MOST_HANGING = 32  # checks that have not come back, of all questions: each keeps a thread
 _RESULT = {
     None: PreconditionCheck.UNKNOWN, True: PreconditionCheck.HOLDS,
@@ -38,7 +38,7 @@ class _WatchedPrecondition:
         self._began_s = 0.0
 
     def refresh(self) -> None:
-        """Check it, waiting a second at most; a check that takes longer goes on."""
+        """Check it, waiting a second at most. A check that takes longer goes on."""
         if self._thread is None or not self._thread.is_alive():
             if not self._free_threads.acquire(blocking=False):
                 self._latest = PreconditionStatus(
@@ -51,7 +51,7 @@ class _WatchedPrecondition:
         self._thread.join(max(0.0, self._began_s + PATIENCE_S - time.monotonic()))
 
     def message(self) -> PreconditionCheck:
-        """The latest status; a check that has not come back is named as hanging."""
+        """The latest status. A check that has not come back is named as hanging."""
         now_s = time.monotonic()
         status, at_s = self._latest, self._at_s
         if self._thread is not None and self._thread.is_alive():
@@ -110,7 +110,7 @@ class _QuestionWatch:
 
 
 class PreconditionWatch:
-    """Watches the preconditions of a node; several questions may be open at once."""
+    """Watches the preconditions of a node. Several questions may be open at once."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher(TOPIC, PreconditionChecks, latch=True, queue_size=5)

@@ -89,7 +89,7 @@ def to_decision(answer: Answer) -> ExpertDecision:
 
 
 def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
-    """The goal for a shared-autonomy interface; here the userdata goes whole."""
+    """The goal for a shared-autonomy interface. Here the userdata goes whole."""
     return _sendable(
         SharedAutonomyGoal(query_id=question.question_id, container_path=question.container_path,
                            state=question.failed_state, interface=offer.name,

@@ -105,7 +105,7 @@ class ExpertQueryServer:
         self._start()
 
     def stop(self) -> None:
-        """Take the server down; who still asks notices it and waits for another."""
+        """Take the server down. Who still asks notices it and waits for another."""
         self._end_watch()
         if rospy.is_shutdown():
             return
@@ -183,13 +183,13 @@ class ExpertQueryServer:
         return AnswerQueryResponse(*reply)
 
     def _changed(self) -> None:
-        """Inform the askers first, who wait for it; then the front ends."""
+        """Inform the askers first, who wait for it. Then the front ends."""
         self._dispatch()
         self._publish_list()
         self._wake.set()
 
     def _dispatch(self) -> bool:
-        """Send out the notices; whether there were any."""
+        """Send out the notices. Return whether there were any."""
         notices = self._questions.take_notices()
         for notice in notices:
             if notice.text:  # a new question has been logged already
@@ -235,7 +235,7 @@ class ExpertQueryServer:
         self._close_abandoned(now_s)
         changed = self._dispatch()
         if len(self._questions):
-            # actionlib's own timer stops with a paused simulation; also finds the dead
+            # actionlib's own timer stops with a paused simulation, also finds the dead
             self._action.publish_status()
         if changed or (len(self._questions) and now_s - self._listed_s >= _LIST_PERIOD_S):
             self._publish_list()

@@ -24,7 +24,7 @@ class _Commanded(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        """Give the command; what it raises is a refusal."""
+        """Give the command. What it raises is a refusal."""
         try:
             self.told.append(self._command(self._hand))
         except OperatorError as err:

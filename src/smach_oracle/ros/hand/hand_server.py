@@ -114,7 +114,9 @@ class HandServer:
             request.pattern, request.level, _caller(request))))
 
     def _each(self, path: str, command: Command, only: bool = False) -> Tuple[bool, str]:
-        """Command the machines that are meant; whether one of them has obeyed, and what they say.
+        """Command the machines that are meant.
+
+        Return whether one of them has obeyed, and what they say.
 
         :param only: one machine must be meant.
         """
@@ -129,7 +131,7 @@ class HandServer:
 
 
 def _is_in(path: str, machine: str) -> bool:
-    """Whether a path is that of a machine or of a container in it; '' is in every one."""
+    """Whether a path is that of a machine or of a container in it. '' is in every one."""
     path = path.strip('/')
     return not path or (path + '/').startswith(machine + '/')
 

@@ -25,14 +25,14 @@ _Shown = Tuple[str, str]  # topic and path of a container there
 
 
 class ViewerCommands:
-    """Sends machines where viewers want them; listens for those that it is told of."""
+    """Sends machines where viewers want them. It listens for those that it is told of."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._shown: Dict[_Shown, 'weakref.ref[smach.Container]'] = {}
         self._subscribers: Dict[str, rospy.Subscriber] = {}
         self._sending = threading.Lock()  # the second of two equal wishes waits for the first
-        self._heard: Dict[_Wish, Tuple[float, bool]] = {}  # when, in s; whether it was sent
+        self._heard: Dict[_Wish, Tuple[float, bool]] = {}  # when, in s, whether it was sent
         add_sender(self.send)
 
     def listen_for(self, machine: smach.StateMachine) -> None:
@@ -80,7 +80,7 @@ class ViewerCommands:
         return sent
 
     def _answered(self, wish: _Wish) -> Optional[bool]:
-        """Whether an equal wish that was just heard was sent; None where there was none."""
+        """Whether an equal wish that was just heard was sent. It is None where there was none."""
         now_s = time.monotonic()
         self._heard = {each: heard for each, heard in self._heard.items()
                        if now_s - heard[0] < _SAME_S}

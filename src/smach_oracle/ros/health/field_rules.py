@@ -10,7 +10,7 @@ LONGEST = 200  # letters of a value that are told
 
 
 class _NoField(Exception):
-    """A message has no such field; never leaves this module."""
+    """A message has no such field. It never leaves this module."""
 
 
 class Status(NamedTuple):
@@ -38,7 +38,7 @@ def why_unwell_by_message(condition: HealthCondition, message: Any) -> str:
 
 
 def _field(message: Any, path: str) -> Any:
-    """The field of a dotted name; a number in it is a place in a list.
+    """The field of a dotted name. A number in it is a place in a list.
 
     :raises _NoField: where there is none.
     """

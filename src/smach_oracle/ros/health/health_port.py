@@ -75,7 +75,7 @@ def _source_of(condition: HealthCondition) -> str:
 
 def listen_to_health(topics: HealthTopics,
                      conditions: Sequence[HealthCondition]) -> Optional[TopicHealth]:
-    """Make a port for conditions; None where the node shuts down."""
+    """Make a port for conditions, or None where the node shuts down."""
     try:
         return outside_main_thread(partial(TopicHealth, conditions, topics))
     except rospy.ROSInterruptException as err:

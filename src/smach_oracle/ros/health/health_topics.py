@@ -32,18 +32,18 @@ class Latest:
         self._heard = (what, time.monotonic())
 
     def heard(self) -> Any:
-        """What was heard; None where nothing was."""
+        """What was heard, or None where nothing was."""
         heard = self._heard
         return heard[0] if heard is not None else None
 
     def age_s(self) -> Optional[float]:
-        """How long ago that was, monotonic; None where nothing was heard."""
+        """How long ago that was, monotonic, or None where nothing was heard."""
         heard = self._heard
         return time.monotonic() - heard[1] if heard is not None else None
 
 
 class HealthTopics:
-    """Those of one process; each topic is subscribed to once. Not for the main thread."""
+    """Those of one process. Each topic is subscribed to once. Not for the main thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -59,7 +59,7 @@ class HealthTopics:
         self.warned: Set[str] = set()
 
     def message(self, topic: str) -> Latest:
-        """The latest message of a topic, listened to from now on; see `decoded`."""
+        """The latest message of a topic, listened to from now on. See `decoded`."""
         name = rospy.resolve_name(topic)
         with self._lock:
             is_new = name not in self._messages
@@ -96,11 +96,11 @@ class HealthTopics:
                 latest.put(status)
 
     def _subscribe(self) -> None:
-        """Subscribe to what has a type; look again where one has none."""
+        """Subscribe to what has a type. Look again where one has none."""
         try:
             known = {**types_at_master(), **types_in_process()}
         except (OSError, rosgraph.MasterException, ValueError):
-            known = types_in_process()  # the master is away; it is asked again
+            known = types_in_process()  # the master is away. It is asked again
         with self._lock:
             for topic in [topic for topic in self._unknown if topic in known]:
                 take = self._unknown.pop(topic)

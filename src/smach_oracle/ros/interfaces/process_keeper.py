@@ -1,9 +1,12 @@
-"""Keeps one command and everything that it starts; ends all of it when its standard input closes.
+"""Keeps one command and everything that it starts.
 
-Run as a program, by its path and in isolation (`python3 -I`); standard library only. Arguments: the
-limits after SIGINT and after SIGTERM (s), then the command. Whoever started it holds the other end
-of the pipe: if that process dies, in whatever way, the pipe closes as well. All descendants stay
-its own, also those that begin a session of their own, because it is their subreaper.
+It ends all of it when its standard input closes.
+
+It is run as a program, by its path and in isolation (`python3 -I`), with the standard library only.
+Its arguments are the limits after SIGINT and after SIGTERM (s), then the command. The process that
+started it holds the other end of the pipe: if that process dies, in whatever way, the pipe closes
+as well. All descendants stay its own, also those that begin a session of their own, because it is
+their subreaper.
 """
 import ctypes
 import os
@@ -44,7 +47,7 @@ def descendants(root: int) -> List[int]:
 
 
 def _reap() -> List[Tuple[int, int]]:
-    """Collect all that have ended; (process id, status) of each."""
+    """Return all that have ended, as (process id, status) of each."""
     ended: List[Tuple[int, int]] = []
     while True:
         try:
@@ -102,7 +105,7 @@ def _raise_exit(*_: object) -> None:
 
 
 def main(interrupt_s: float, terminate_s: float, command: Sequence[str]) -> int:
-    """Run the command; the exit code is its own, 127 where it cannot be started."""
+    """Run the command. The exit code is its own, 127 where it cannot be started."""
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -36,7 +36,7 @@ _ESCAPE_SEQUENCE = re.compile(r'\x1b(\[[0-9;?]*[ -/]*[@-~]|\][^\x07]*\x07|.)')
 def command_of(start: InterfaceStart) -> List[str]:
     """The command line.
 
-    :raises InterfaceError: where the package or the node is not there; roslaunch itself reports a
+    :raises InterfaceError: where the package or the node is not there. Roslaunch itself reports a
         launch file that is not.
     """
     try:
@@ -109,7 +109,7 @@ class StartedInterface:
         self._send()
 
     def stop(self) -> None:
-        """Begin its end; returns at once.
+        """Begin its end, and return at once.
 
         Nothing of it is left after some seconds, by force where needed.
         """
@@ -119,7 +119,7 @@ class StartedInterface:
         self._changed.set()
 
     def ended(self, limit_s: float) -> bool:
-        """Wait until nothing of it is left; whether that is so."""
+        """Wait until nothing of it is left. Return whether that is so."""
         try:
             self._process.wait(limit_s)
         except subprocess.TimeoutExpired:
@@ -148,7 +148,7 @@ class StartedInterface:
 
 
 class InterfaceStarter:
-    """Starts interfaces for a node's questions; one at a time of each name."""
+    """Starts interfaces for a node's questions. One at a time of each name."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher(OUTPUT_TOPIC, InterfaceOutput, latch=True, queue_size=5)

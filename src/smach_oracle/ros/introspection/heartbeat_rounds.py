@@ -17,11 +17,11 @@ GREETING_STEP_S = 0.02
 
 
 class HeartbeatRounds(object):
-    """Rounds over all containers, each of HEARTBEAT_S; a quick one for newcomers."""
+    """Rounds over all containers, each of HEARTBEAT_S, a quick one for newcomers."""
 
     def __init__(self, list_paths: Callable[[], Sequence[str]]) -> None:
         """
-        :param list_paths: the paths there are now; asked at the begin of each round.
+        :param list_paths: the paths there are now. It is asked at the begin of each round.
         """
         self._list_paths = list_paths
         self._left: List[str] = []
@@ -43,7 +43,7 @@ class HeartbeatRounds(object):
         return 0.0 if self._must_hurry() else max(0.0, self._next_s - now_s)
 
     def due(self, now_s: float) -> List[str]:
-        """Return the paths whose turn it is; none before `wait_s` has passed.
+        """Return the paths whose turn it is. None before `wait_s` has passed.
 
         :param now_s: of a monotonic clock.
         """

@@ -66,7 +66,7 @@ class IntrospectionServer(object):
     A status goes out at each start, transition and end of a container, in order, and every two
     seconds (wall time) with the structure. It costs the machine nothing while nobody subscribes.
     Userdata that cannot be pickled is left out. A command on the init topic sets where a container
-    starts next, and with which userdata; a StateMachine that runs goes there at its next
+    starts next, and with which userdata. A StateMachine that runs goes there at its next
     transition.
     """
 
@@ -110,7 +110,7 @@ class IntrospectionServer(object):
         self._thread.start()
 
     def stop(self) -> None:
-        """Publish what is still to be said, then nothing more; take callbacks and topics back."""
+        """Publish what is still to be said, then nothing more. Take callbacks and topics back."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
@@ -124,7 +124,7 @@ class IntrospectionServer(object):
         self._status_pub = self._structure_pub = self._init_sub = None
 
     def clear(self) -> None:
-        """Forget all containers; ``construct`` adds some again."""
+        """Forget all containers. ``construct`` adds some again."""
         self._tree.clear()
 
     def construct(self, server_name: str, state: Any, path: str) -> None:
@@ -171,7 +171,7 @@ class IntrospectionServer(object):
                               functools.partial(self._status, path, change))
 
     def _begin_round(self) -> List[str]:
-        """Look what there is to be told of; nothing while nobody listens."""
+        """Look what there is to be told of. It does nothing while nobody listens."""
         try:
             self._tree.refresh()
         except Exception as err:
@@ -200,11 +200,11 @@ class IntrospectionServer(object):
             topic.send([message])
 
     def _made(self, path: str, make: Callable[[], WireMessage]) -> Optional[WireMessage]:
-        """Return a message; None for a container that cannot be shown. The others still are."""
+        """Return a message, or None for a container that cannot be shown. The others still are."""
         try:
             return make()
         except Exception as err:
-            # once: a machine that grew meanwhile; twice: a container of somebody's own
+            # once: a machine that grew meanwhile, twice: a container of somebody's own
             self._failures[path] += 1
             if self._failures[path] == 2:
                 smach.logwarn("Introspection cannot show '%s': %r" % (path, err))
@@ -267,7 +267,7 @@ class IntrospectionServer(object):
 
 
 def _text_of(err: BaseException) -> str:
-    """Its text; that of an object of somebody's own may raise."""
+    """Its text. That of an object of somebody's own may raise."""
     try:
         return str(err)
     except Exception:
@@ -279,7 +279,7 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
     """Let the container start in ``labels`` with ``data`` from now on, as ``by`` has asked.
 
     Returns False, and logs why, where it has no such states or refuses them. A StateMachine that
-    runs now goes there at its next transition, as soon as its active state has ended; or as a
+    runs now goes there at its next transition, as soon as its active state has ended, or as a
     sender of viewer_jump sends it.
     """
     container = watch.container

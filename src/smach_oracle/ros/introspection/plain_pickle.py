@@ -47,7 +47,7 @@ class PlainUnpickler(pickle.Unpickler):
     """An unpickler that knows no classes but those of plain data."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """The maker of a plain type; raises ``pickle.UnpicklingError`` for any other global."""
+        """The maker of a plain type. It raises ``pickle.UnpicklingError`` for any other global."""
         try:
             return _PLAIN[module, name]
         except KeyError as err:
@@ -55,7 +55,7 @@ class PlainUnpickler(pickle.Unpickler):
 
 
 def decode_userdata(text: str) -> Dict[str, Any]:
-    """Return the plain dict in ``text``; an empty text is an empty dict.
+    """Return the plain dict in ``text``. An empty text is an empty dict.
 
     :raises RefusedDataError: for anything else.
     """

@@ -4,8 +4,8 @@ The introspection knows nothing of who may do that: what has a hand on the machi
 """
 from typing import Any, Callable, Collection, List, Optional
 
-# container, label, userdata keys that come with it, who wants it; None: it is none of theirs, False
-# (logged): it cannot go there
+# container, label, userdata keys that come with it, who wants it. None means it is none of theirs,
+# False (logged): it cannot go there
 Sender = Callable[[Any, str, Collection[str], str], Optional[bool]]
 
 _senders: List[Sender] = []
@@ -18,7 +18,7 @@ def add_sender(sender: Sender) -> None:
 
 
 def send_running(container: Any, label: str, written: Collection[str], by: str) -> Optional[bool]:
-    """Have a container that runs sent to a state; None where nobody takes that on.
+    """Have a container that runs sent to a state. Return None where nobody takes that on.
 
     :param written: userdata keys that come with the command.
     :param by: who wants it.

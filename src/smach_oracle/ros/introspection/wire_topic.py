@@ -31,7 +31,7 @@ LAGGING_BYTES = 1024 * 1024
 FLUSH_S = 0.5
 """So long a closed topic may still write what was sent."""
 _LOOK_S = 0.005
-_HEAD = struct.Struct('<4I')  # bytes that follow the first four; seq, secs and nsecs of the Header
+_HEAD = struct.Struct('<4I')  # bytes that follow the first four, seq, secs and nsecs of the Header
 _STAMP_BYTES = 12
 
 
@@ -53,7 +53,7 @@ def serialised(message: genpy.Message) -> WireMessage:
 
 
 class LatestMessages(object):
-    """The latest message of each container; serialised again only where a field has changed."""
+    """The latest message of each container. Serialised again only where a field has changed."""
 
     def __init__(self, message_class: Type[genpy.Message]) -> None:
         self._message_class = message_class
@@ -62,7 +62,7 @@ class LatestMessages(object):
     def make(self, stamp: genpy.Time, path: str, *fields: Any) -> WireMessage:
         """Return a message of these fields.
 
-        :param fields: those behind `path`, in the order of the message; not to be changed later.
+        :param fields: those behind `path`, in the order of the message, not to be changed later.
         :raises Exception: what genpy raises for a field that cannot be serialised.
         """
         latest = self._latest.get(path)
@@ -112,7 +112,7 @@ class WireTopic(object):
     def __init__(self, name: str, message_class: Type[genpy.Message],
                  on_newcomer: Callable[[], None]) -> None:
         """
-        :param name: of the topic; remapped as any.
+        :param name: of the topic, remapped as any.
         :param on_newcomer: called, in a thread of rospy's, for each new subscriber.
         """
         self._listener = _Newcomers(on_newcomer)
@@ -129,7 +129,7 @@ class WireTopic(object):
         return impl is not None and bool(impl.connections)
 
     def send(self, messages: Sequence[WireMessage], to_lagging: bool = True) -> None:
-        """Send messages to all subscribers; does nothing where the topic is closed.
+        """Send messages to all subscribers. It does nothing where the topic is closed.
 
         :param to_lagging: also to those who have not read what was sent before.
         """
@@ -157,7 +157,7 @@ class WireTopic(object):
         self._publisher.unregister()
 
     def _is_flushed(self) -> bool:
-        """Whether rospy's threads have written all; they take it out of their queues before."""
+        """Whether rospy's threads have written all. They take it out of their queues before."""
         with self._lock:
             return all(connection.done or connection.stat_num_msg >= count
                        for connection, count in self._sent.items())

@@ -19,7 +19,7 @@ _ELSEWHERE = ('__master:=', '__ip:=', '__hostname:=')
 
 
 def start(args: Sequence[str]) -> None:
-    """Go on as a new process, which runs `main` with these arguments; does not return."""
+    """Go on as a new process, which runs `main` with these arguments. It does not return."""
     code = ('import sys; sys.path[:] = {!r}; '
             'from {} import main; main()'.format(list(sys.path), __name__))
     sys.stdout.flush()

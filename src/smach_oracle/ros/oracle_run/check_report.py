@@ -38,7 +38,7 @@ def lines_of(container: ContainerProspect) -> List[str]:
 def wrapped(text: str, indent: int, hanging: int = 0) -> List[str]:
     """Break a paragraph into lines.
 
-    `indent`: columns before it; `hanging`: more before all lines but the first.
+    `indent`: columns before it. `hanging`: more before all lines but the first.
     """
     return textwrap.wrap(text, WIDTH, initial_indent=' ' * indent,
                          subsequent_indent=' ' * (indent + hanging),
@@ -185,7 +185,7 @@ def _changed(settings: Any, others: Any, left_out: Sequence[str]) -> List[str]:
 
 
 def _entry(name: str, text: str, indent: int) -> List[str]:
-    """A line with a name before it; none where there is nothing to say."""
+    """A line with a name before it. None where there is nothing to say."""
     if not text:
         return []
     return wrapped('{:<14}{}'.format(name, text), indent, 14)

@@ -1,6 +1,6 @@
 """While a script is checked, what would wait for others, or move them, does nothing.
 
-Waits return at once, as if all were there; services and actions answer with an empty message. Each
+Waits return at once, as if all were there. Services and actions answer with an empty message. Each
 is told once.
 """
 from typing import Any, Callable, Dict, Optional, Tuple

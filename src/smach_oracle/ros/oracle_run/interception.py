@@ -23,7 +23,7 @@ class Interception:
     machine that a state runs inside its own `execute`, or that a Concurrence or an Iterator at the
     top contains, is a top-level one.
 
-    :param wrap: swaps the machine's class; an error it raises surfaces from the machine's
+    :param wrap: swaps the machine's class. An error it raises surfaces from the machine's
         `execute`.
     """
 
@@ -33,7 +33,7 @@ class Interception:
         self._lock = threading.RLock()  # machines may start in several threads at once
 
     def install(self) -> None:
-        """From now on; cannot be taken back."""
+        """From now on. Cannot be taken back."""
         for cls in family(smach.StateMachine):
             self._patch(cls)
         self._patch_future_subclasses()
@@ -104,7 +104,7 @@ def machines_inside(container: smach.Container) -> Iterator[smach.StateMachine]:
 
 
 def _children(state: smach.State) -> Tuple[smach.State, ...]:
-    """The children of a container; none of any other state.
+    """The children of a container, none of any other state.
 
     An Iterator may have no contained state yet.
     """

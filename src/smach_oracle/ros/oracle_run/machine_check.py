@@ -21,7 +21,7 @@ MAX_ALIKE = 10
 class MachineCheck:
     """Stands in for `execute` of every container, in any thread.
 
-    :param wrap: puts a machine under an oracle as a real run does; a SettingsError is passed on.
+    :param wrap: puts a machine under an oracle as a real run does. A SettingsError is passed on.
     :param settings: those in force, for containers that are no state machines.
     :param tell: takes lines of text for people.
     """
@@ -38,7 +38,7 @@ class MachineCheck:
         self.warnings = 0
 
     def __call__(self, container: smach.Container) -> Any:
-        """Check a container that is about to be executed; return an outcome that is no failure.
+        """Check a container that is about to be executed, and return an outcome that is no failure.
 
         :raises StopIteration: where the script begins again.
         :raises SettingsError: where the settings do not fit.
@@ -78,7 +78,7 @@ class MachineCheck:
 
 
 def _prepare(machine: OracleContainer, running: ExitStack) -> str:
-    """Do what a real run does before the first state; return the machine's name.
+    """Do what a real run does before the first state, and return the machine's name.
 
     :param running: as long as it is open, no other machine takes the name.
     :raises SettingsError: where the parameters of the node are wrong.
@@ -123,7 +123,7 @@ def _top_machines(container: smach.Container) -> Iterator[smach.StateMachine]:
 
 
 def intercept(instead: Callable[[smach.Container], Any]) -> None:
-    """Call this in place of `execute` of every container, present and future; for good."""
+    """Call this in place of `execute` of every container, present and future, for good."""
     for cls in family(smach.Container):
         _patch(cls, instead)
     inherited = smach.Container.__dict__.get('__init_subclass__')

@@ -73,7 +73,7 @@ def _paths(container: smach.Container, above: str) -> Iterator[str]:
 
 
 def _children(container: smach.Container) -> Dict[str, smach.State]:
-    """The states by label; none where an Iterator has no contained state yet."""
+    """The states by label. None where an Iterator has no contained state yet."""
     try:
         return dict(container.get_children())
     except (AttributeError, TypeError):

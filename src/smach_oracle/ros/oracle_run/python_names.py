@@ -34,7 +34,7 @@ def check_python_name(script: str, name: str) -> None:
 
 
 def _source_of(script: str, module: str, attribute: str) -> Optional[str]:
-    """The file of a module; None where it has none, or cannot be told to lack the attribute.
+    """The file of a module, or None where it has none, or cannot be told to lack the attribute.
 
     :raises ImportError: where there is no such module.
     """
@@ -86,7 +86,7 @@ def _changes_path(script: str) -> bool:
 
 
 def _names_in(source: str) -> Optional[Set[str]]:
-    """All names that a file says anywhere; None where it imports some without saying them."""
+    """All names that a file says anywhere, or None where it imports some without saying them."""
     try:
         with open(source, 'rb') as stream:
             tree = ast.parse(stream.read())

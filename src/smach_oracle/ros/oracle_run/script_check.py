@@ -84,7 +84,7 @@ def _report_stream() -> Any:
 
 
 def _run(script: str, args: Sequence[str], watch: '_ScriptWatch') -> str:
-    """Run the script; return what is to be said of its end."""
+    """Run the script, and return what is to be said of its end."""
     try:
         run_script(script, args)
     except SystemExit as end:
@@ -140,7 +140,7 @@ class _ScriptWatch:
         threading.Thread(target=self._watch, name='check_limit', daemon=True).start()
 
     def reached(self, machines: int, warnings: int = 0) -> None:
-        """A machine has been checked; so many machines and warnings are there now."""
+        """A machine has been checked. So many machines and warnings are there now."""
         self.machines, self.warnings = machines, warnings
         self._latest = time.monotonic()
         faulthandler.dump_traceback_later(LIMIT_S + 5.0, exit=True)

@@ -55,7 +55,7 @@ def split(args: Sequence[str]) -> CommandLine:
     """Separate our options from the script and its arguments.
 
     The first word that is neither an option, nor an option's value, nor a ROS remapping (`a:=b`),
-    is the script. All that follows belongs to the script; so do remappings that stand before it.
+    is the script. All that follows belongs to the script. So do remappings that stand before it.
     """
     options: List[str] = []
     remappings: List[str] = []
@@ -137,7 +137,10 @@ class Invocation(NamedTuple):
 
 
 def parse(args: Sequence[str]) -> Invocation:
-    """Understand the command line; ends the process with a message and code 2 where it is wrong."""
+    """Understand the command line.
+
+    It ends the process with a message and code 2 where it is wrong.
+    """
     line = split(args)
     parser = make_parser()
     given = parser.parse_args(line.options)
@@ -191,7 +194,7 @@ def _why_not_readable(script: str) -> str:
 def check(invocation: Invocation) -> None:
     """Find mistakes before the robot moves.
 
-    :raises SettingsError: in the settings file or the command line; the file of the rates cannot be
+    :raises SettingsError: in the settings file or the command line. The file of the rates cannot be
         written.
     :raises OSError: where the folder for the bags cannot be made or written.
     """

@@ -131,7 +131,7 @@ def _kind(name: str, md5sum: str, definition: str) -> MessageType:
 
 
 def _installed(name: str) -> Any:
-    """The message class of a type; None where it is not installed."""
+    """The message class of a type, or None where it is not installed."""
     try:
         return roslib.message.get_message_class(name)
     except (ValueError, ImportError):
@@ -139,7 +139,7 @@ def _installed(name: str) -> Any:
 
 
 def _events_topic(topics: List[str]) -> str:
-    """The topic of the events by the node's other topics; `/oracle/events` where they are lost."""
+    """The topic of the events by the node's other topics. `/oracle/events` where they are lost."""
     for topic in topics:
         for end in _OF_THE_SAME_NODE:
             if topic.endswith(end):

@@ -86,7 +86,7 @@ def pack_chunk_header(size: int) -> bytes:
 
 
 def pack_index(connection: int, count: int, entries: bytes) -> bytes:
-    """Pack the index of one connection in one chunk; entries are packed INDEX_ENTRYs."""
+    """Pack the index of one connection in one chunk. Entries are packed INDEX_ENTRYs."""
     return pack_record(
         {
             'op': bytes((OP_INDEX,)), 'ver': UINT32.pack(1), 'conn': UINT32.pack(connection),

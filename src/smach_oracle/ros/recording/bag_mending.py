@@ -31,7 +31,7 @@ class Saved(NamedTuple):
     torn_bytes: int  # at the end, where the writer died
 
     def losses(self) -> str:
-        """What is lost, in words; '' where nothing is."""
+        """What is lost, in words, or '' where nothing is."""
         parts = []
         if self.bytes_lost:
             parts.append('{} bytes in at least {} chunk{}, among them {} event{}'.format(
@@ -45,9 +45,9 @@ class Saved(NamedTuple):
 def mend(source: BinaryIO, target: str) -> Saved:
     """Write what can be read of a bag into a new file.
 
-    :param source: the damaged bag; it is only read.
-    :param target: path of the new bag; a file that is there is replaced.
-    :raises OSError: where the disk cannot be read or takes no more; there is no new file then.
+    :param source: the damaged bag. It is only read.
+    :param target: path of the new bag. A file that is there is replaced.
+    :raises OSError: where the disk cannot be read or takes no more. There is no new file then.
     """
     return _in_two_passes(source, lambda reading: reading.write(target))
 

@@ -34,7 +34,7 @@ class _Tools(NamedTuple):
 def recover_folder(folder: str, info: Log, warn: Log) -> List[str]:
     """Turn the orphaned `.bag.active` files of a folder into `.bag` files.
 
-    A file that cannot be mended is left as it is and named in a warning; so is what was lost.
+    A file that cannot be mended is left as it is and named in a warning. So is what was lost.
 
     :returns: the paths of the mended bags.
     :raises OSError: where the folder cannot be listed.
@@ -92,7 +92,7 @@ def _mend(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
 
 
 def _leave_empty(bag: BinaryIO, path: str, saved: Saved, warn: Log) -> None:
-    """Remove a file whose writer was killed before its first message; any other one stays."""
+    """Remove a file whose writer was killed before its first message. Any other one stays."""
     size = os.fstat(bag.fileno()).st_size
     if size <= bag_format.BAG_HEADER_END or _begins_with_a_torn_chunk(bag, saved):
         os.unlink(path)

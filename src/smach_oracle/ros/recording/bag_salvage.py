@@ -11,7 +11,7 @@ from . import bag_format
 from .bag_format import BagFormatError, Fields
 
 _FIRST_FIELD = bag_format.UINT32.pack(4) + b'op='  # with which every header of ours begins
-_LONGEST_HEADER = 65536  # bytes; a topic's name is its longest part
+_LONGEST_HEADER = 65536  # bytes. A topic's name is its longest part
 _BLOCK = 1 << 20  # bytes read at once
 _FIELD_SIZES = {
     bag_format.OP_MESSAGE: {'conn': 4, 'time': 8},
@@ -91,7 +91,7 @@ class Salvage:
         return following
 
     def _find(self, position: int) -> int:
-        """Where the next record begins, at `position` or behind it; the file's size: nowhere."""
+        """Where the next record begins, at `position` or behind it, the file's size: nowhere."""
         while True:
             found = self._window.find(_FIRST_FIELD, position + 4)
             if found < 0:
@@ -101,7 +101,7 @@ class Salvage:
             position = found - 3
 
     def _record_at(self, position: int) -> Optional[Record]:
-        """The record at a position; None where there is none that fits into the file.
+        """The record at a position, or None where there is none that fits into the file.
 
         A chunk ends, here, where its data begin: the records in it follow.
         """
@@ -138,7 +138,7 @@ class _Window:
         self._block = b''
 
     def read(self, position: int, size: int) -> bytes:
-        """At most `size` bytes; fewer at the end of the file."""
+        """At most `size` bytes. Fewer at the end of the file."""
         offset = position - self._start
         if offset < 0 or offset + size > len(self._block):
             self._source.seek(position)
@@ -147,7 +147,7 @@ class _Window:
         return self._block[offset:offset + size]
 
     def find(self, pattern: bytes, position: int) -> int:
-        """Where the pattern is, from `position` on; -1: nowhere."""
+        """Where the pattern is, from `position` on. -1 means nowhere."""
         while position + len(pattern) <= self.size:
             self.read(position, len(pattern))
             found = self._block.find(pattern, position - self._start)

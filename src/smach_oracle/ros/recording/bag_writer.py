@@ -3,7 +3,7 @@
 rosbag.Bag opens a chunk on disk and patches its length in afterwards, keeps an index entry of every
 message in memory until it is closed, and is left undefined by a failing write. A recorder beside a
 robot wants the opposite: here a chunk is put together in memory and appended whole, with its index,
-at a known end; a failing write is cut off again, so that what was written stays a valid bag; memory
+at a known end. A failing write is cut off again, so that what was written stays a valid bag. Memory
 holds one chunk, and some ten bytes for each chunk before it. Chunks 1, 2, 4, 8 and so on repeat all
 connections: where the first chunk is damaged, the messages of later ones still have a type.
 """
@@ -53,7 +53,7 @@ class BagWriter:
     def __init__(self, path: str) -> None:
         """Create the file and write its header.
 
-        :raises OSError: where that cannot be done; FileExistsError where it is there already.
+        :raises OSError: where that cannot be done. FileExistsError where it is there already.
         """
         self.path = path
         self._connections: Dict[Tuple[str, str, str], _Connection] = {}
@@ -114,7 +114,7 @@ class BagWriter:
         From here on the messages survive the death of this process (not that of the machine: see
         `sync`).
 
-        :raises OSError: where the disk does not take it; the file then ends where it did before.
+        :raises OSError: where the disk does not take it. The file then ends where it did before.
         """
         if not self._index:
             return
@@ -138,7 +138,7 @@ class BagWriter:
         """Flush, write the index and close.
 
         :param sync: return only when the disk holds it.
-        :raises OSError: where the disk does not take it; the file is then closed, unindexed, and
+        :raises OSError: where the disk does not take it. The file is then closed, unindexed, and
             can be repaired.
         """
         try:
@@ -187,7 +187,7 @@ def write_bag_index(fd: int, end: int, connections: List[bytes], chunks: List[Ch
     A power cut in here can leave a header that points to nothing: repairing therefore never trusts
     an index, it makes a new one.
 
-    :raises OSError: where the disk does not take it; the file is then cut off at `end`.
+    :raises OSError: where the disk does not take it. The file is then cut off at `end`.
     """
     try:
         _write_at(fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)),

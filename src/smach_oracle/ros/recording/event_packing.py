@@ -16,7 +16,7 @@ from .. import event_messages
 from .bag_format import Stamp
 from .bag_writer import MessageType
 
-# Of the definition that `_pack_directly` is written for; with any other, events go through the
+# Of the definition that `_pack_directly` is written for. With any other, events go through the
 # message object.
 PACKED_MD5 = 'c55b3669678f23608a1881f94e335911'
 # Of earlier definitions with the same fields, which had fewer kinds of event.
@@ -24,7 +24,7 @@ EARLIER_MD5S = frozenset(['04f09f94edfdd6b539964b195d7837e8',
                           '67052263768e7d7c201c9b0c957ecc48'])
 EVENT_TYPE = MessageType(OracleEvent._type, OracleEvent._md5sum, OracleEvent._full_text)
 
-_HEAD = struct.Struct('<BIIII')  # kind; header: seq, stamp, no frame_id
+_HEAD = struct.Struct('<BIIII')  # kind, header: seq, stamp, no frame_id
 _WALL_TIME = struct.Struct('<d')
 _UINT64 = struct.Struct('<Q')
 _FAILURE = struct.Struct('<BBdB')  # kind, class, rate, continuous
@@ -69,7 +69,7 @@ def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
 
 
 def event_number(data: bytes) -> Optional[int]:
-    """The sequence number of a serialised OracleEvent; None where the bytes are not an event."""
+    """The sequence number of a serialised OracleEvent, or None where the bytes are not an event."""
     try:
         position = _after_strings(data, _HEAD.size - _LENGTH.size, 1)
         position = _after_strings(data, position + _WALL_TIME.size, 1)

@@ -21,7 +21,7 @@ class Moment(NamedTuple):
 
     ros: Optional[Stamp]  # None where there is no ROS time (yet)
     wall: float  # s since the epoch
-    monotonic: float = 0.0  # s; how long it has waited for the disk
+    monotonic: float = 0.0  # s, how long it has waited for the disk
 
 
 class EventItem(NamedTuple):
@@ -48,7 +48,7 @@ class EndItem(NamedTuple):
 
 
 class MessageItem(NamedTuple):
-    """A message of another topic, as it came; it goes to the bags of all trials that run."""
+    """A message of another topic, as it came. It goes to the bags of all trials that run."""
 
     topic: str
     message_type: MessageType
@@ -97,7 +97,7 @@ class RecorderQueue:
             return True
 
     def put_message(self, item: MessageItem) -> bool:
-        """Append a message of another topic; whether there was room."""
+        """Append a message of another topic. Return whether there was room."""
         with self._changed:
             if self._closing or self._message_bytes + len(item.data) > self._max_message_bytes:
                 return False
@@ -113,7 +113,7 @@ class RecorderQueue:
     def take(self, timeout_s: Optional[float]) -> Tuple[List[QueueItem], bool]:
         """All that waits, in order, and whether the queue is closing.
 
-        :param timeout_s: how long to wait where it is empty; None: without end.
+        :param timeout_s: how long to wait where it is empty. None means without end.
         """
         with self._changed:
             if not self._items and not self._closing:

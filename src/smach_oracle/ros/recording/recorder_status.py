@@ -18,7 +18,7 @@ class RecorderState(IntEnum):
 
 
 class RecordingStatus(NamedTuple):
-    """The status that is published; the fields are those of RecorderStatus.msg."""
+    """The status that is published. The fields are those of RecorderStatus.msg."""
 
     state: RecorderState
     file: str = ''

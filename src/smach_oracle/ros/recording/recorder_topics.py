@@ -76,7 +76,7 @@ class TopicListener:
             try:
                 self._subscribe({**types_at_master(), **types_in_process()})
             except (OSError, rosgraph.MasterException, ValueError):
-                pass  # the master is away; it is asked again
+                pass  # the master is away. It is asked again
             self._closing.wait(LOOK_AGAIN_S)
 
     def _subscribe(self, classes: Dict[str, MessageClass]) -> None:

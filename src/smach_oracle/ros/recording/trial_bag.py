@@ -110,7 +110,7 @@ class TrialBag:
             self.flush()
 
     def due_s(self) -> Optional[float]:
-        """In how many seconds `flush` is due; None while there is nothing to flush."""
+        """In how many seconds `flush` is due, or None while there is nothing to flush."""
         if self._chunk_since is None:
             return None
         return max(0.0, self._chunk_since + self._flush_after_s - time.monotonic())
@@ -182,7 +182,7 @@ def file_name(trial_id: str, wall_time: float) -> str:
 
 
 def ros_stamp_of(seconds: int, nanoseconds: int) -> Optional[Stamp]:
-    """A ROS time as a stamp; None for zero.
+    """A ROS time as a stamp, or None for zero.
 
     A simulated clock shows zero before it runs.
     """

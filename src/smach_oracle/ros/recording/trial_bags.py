@@ -41,7 +41,7 @@ class Reporter(NamedTuple):
 class TrialBags:
     """One bag for each trial that runs.
 
-    Used by the writer thread alone; raises nothing on a disk error.
+    Used by the writer thread alone. It raises nothing on a disk error.
 
     After an error everything is dropped and counted, until a retry (after half a second, later
     after five, and at the start of every trial) finds that the disk takes a file again.
@@ -187,7 +187,7 @@ class TrialBags:
                 self._folder, err))
 
     def wait_s(self) -> Optional[float]:
-        """How long the writer thread may sleep; None: until something comes."""
+        """How long the writer thread may sleep. None means until something comes."""
         times = [due for due in (bag.due_s() for bag in self._bags.values()) if due is not None]
         return min(times) if times else None
 
@@ -205,7 +205,7 @@ class TrialBags:
 
 
 def kept_key(item: MessageItem) -> Optional[KeptKey]:
-    """Under what a message is remembered for later bags; None: it is not."""
+    """Under what a message is remembered for later bags. None means it is not."""
     if item.message_type.name == 'smach_msgs/SmachContainerStructure':
         return item.topic, item.callerid, container_path(item.data)
     return (item.topic, item.callerid) if item.latching else None

@@ -66,7 +66,7 @@ class _Server:
         self._cancel.unregister()
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        """Take what runs; what the server does not know has ended."""
+        """Take what runs. What the server does not know has ended."""
         running = {each.goal_id.id for each in message.status_list if each.status in _RUNS}
         with self._lock:
             self.left.intersection_update(running)

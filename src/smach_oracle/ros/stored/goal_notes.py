@@ -15,7 +15,7 @@ _NOT_NOTED = ('smach_oracle/ExpertQueryActionGoal',)
 
 
 def note_goals() -> None:
-    """Note each goal of actionlib's clients from now on; does nothing the second time."""
+    """Note each goal of actionlib's clients from now on. It does nothing the second time."""
     client = actionlib.ActionClient
     if hasattr(client.send_goal, _MARK):
         return

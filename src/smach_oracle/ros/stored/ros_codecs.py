@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def offer_ros_codecs() -> None:
-    """Let every store of this program take them; what the user has registered goes before."""
+    """Let every store of this program take them. What the user has registered goes before."""
     OFFERED.register(genpy.Message, _of_message, _to_message, 'ros_message')
     OFFERED.register(genpy.Time, _of_time, _to_time, 'ros_time')
     OFFERED.register(genpy.Duration, _of_time, _to_duration, 'ros_duration')

@@ -15,7 +15,7 @@ from ..service_calls import ServerGoneError, ServiceCall
 
 _PIECE_S = 1.0  # a preempt is heeded between pieces
 _LOOK_S = 0.05
-_LIMIT_S = 60.0  # of one call; physics may have to be computed
+_LIMIT_S = 60.0  # of one call. Physics may have to be computed
 _ENOUGH = 0.99  # share of the time, for what the clock's messages are late
 
 
@@ -41,7 +41,7 @@ class ServiceWaiting:
             left_s -= piece_s
 
     def _pass(self, seconds: float, what: str, stopped: Stopped) -> Optional[float]:
-        """Let time pass; return how many s it was, None where the service does not do so."""
+        """Let time pass, and return how many s it was, None where the service does not do so."""
         begun_s, until_s = rospy.get_time(), time.monotonic() + _LIMIT_S
         call = ServiceCall(self._service, PassTime, PassTimeRequest(seconds, what))
         while call.is_alive() and time.monotonic() < until_s:

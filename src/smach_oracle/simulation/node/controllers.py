@@ -43,7 +43,7 @@ class Controller:
 
     All but the two callbacks run in the world's thread.
 
-    :param make: the motion of a goal; a ValueError from it rejects the goal.
+    :param make: the motion of a goal. A ValueError from it rejects the goal.
     :param report: (motion, end) to the action's result.
     :param feed: a motion to the action's feedback.
     """

@@ -23,7 +23,7 @@ Limits = Mapping[str, Tuple[float, float]]
 
 
 class BadGoal(ValueError):
-    """A goal that no controller can follow; the text says where it is wrong and what is allowed."""
+    """A goal that no controller can follow. The text says where it is wrong and what is allowed."""
 
     def __init__(self, text: str, code: int = FollowJointTrajectoryResult.INVALID_GOAL) -> None:
         super().__init__(text)

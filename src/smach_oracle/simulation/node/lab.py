@@ -13,7 +13,7 @@ from .settings import WorldSettings
 
 
 class LabFileError(ValueError):
-    """The file of a lab cannot be used; the text says why."""
+    """The file of a lab cannot be used. The text says why."""
 
 
 class Lab:
@@ -36,7 +36,7 @@ class Lab:
                          self._settings.lasting)
 
     def leave(self, world: World, verdict: TrialVerdict, took_s: float) -> Dict[str, Any]:
-        """Have a trial end; returns what its line of truth says of it.
+        """Have a trial end, and return what its line of truth says of it.
 
         :param took_s: s of the world's time.
         """

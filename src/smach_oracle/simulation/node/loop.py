@@ -45,7 +45,7 @@ class Stopwatch:
 class WorldLoop:
     """Steps the world, and does jobs between two control periods, all in one thread.
 
-    :param after_tick: called after each control period; publishes what is due.
+    :param after_tick: called after each control period. It publishes what is due.
     """
 
     def __init__(self, motions: MotionTable, clock: SimClock, settings: WorldSettings,
@@ -75,17 +75,17 @@ class WorldLoop:
         return result.result()
 
     def post(self, job: Callable[[], None]) -> None:
-        """Have the world's thread call `job` soon; returns at once."""
+        """Have the world's thread call `job` soon, and return at once."""
         self._jobs.put(job)
 
     def pass_time(self, seconds: float) -> None:
-        """Let motions and physics go on for so long at once; for the world's own thread."""
+        """Let motions and physics go on for so long at once, for the world's own thread."""
         for _ in range(round(seconds / PERIOD_S)):
             self._motions.tick()
             self._clock.advance(PERIOD_S)
 
     def pass_by(self, world: World, seconds: float) -> None:
-        """Let time pass in the world that the motions move; for the world's own thread.
+        """Let time pass in the world that the motions move, for the world's own thread.
 
         What is due is published on the way. In a world that runs at a pace it does nothing.
         """
@@ -153,7 +153,7 @@ class WorldLoop:
             pass
 
     def _job_within(self, timeout_s: float) -> bool:
-        """Do one job that is there within the time; whether there was one."""
+        """Do one job that is there within the time. Return whether there was one."""
         try:
             job = self._jobs.get(block=timeout_s > 0, timeout=max(timeout_s, 1e-4))
         except queue.Empty:

@@ -59,14 +59,14 @@ CLOCK_S = {False: 0.05, True: 0.2}
 LONGEST_PASS_S = 36000.0  # of the world's time, that may pass at once
 REST_S = 1.0  # after a trial, before it is judged
 # for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
-# sends a second signal; it takes a tenth of a second where nothing else is done
+# sends a second signal. It takes a tenth of a second where nothing else is done
 LAST_WORDS_S = 12.0
 UNREGISTERING_S = 0.7  # for taking back some sixty topics from a master that may be busy, or gone
 SWITCH_S = 0.001  # between threads: a step of physics must not keep a message waiting
 
 
 class WorldNode:
-    """The node's topics, services and actions around one world; `run` serves until `close`."""
+    """The node's topics, services and actions around one world. `run` serves until `close`."""
 
     def __init__(self, settings: WorldSettings) -> None:
         """Build the first scene and offer everything.
@@ -75,7 +75,7 @@ class WorldNode:
         :raises ValueError: where a scene cannot be built.
         """
         self._settings = settings
-        self.exit_code = 0  # of the process; 1 where the world failed
+        self.exit_code = 0  # of the process. 1 where the world failed
         self._lab = read_lab(settings) if settings.lab != NONE else None
         self._world = World(self._drawn(settings.seed), settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
@@ -103,7 +103,7 @@ class WorldNode:
                                rospy.Service('world/judge', Judge, self._answer_judge)]
 
     def run(self) -> None:
-        """Serve until close(); in the thread that owns the physics."""
+        """Serve until close(), in the thread that owns the physics."""
         rospy.loginfo('pr2_world: ready for %s', self._settings.task)
         self._publish_state()
         self._loop.run(self._end)
@@ -284,7 +284,7 @@ def main() -> None:
 
 
 def _run(node: WorldNode) -> None:
-    """Run the world; where it fails, its node ends too."""
+    """Run the world. Where it fails, its node ends too."""
     try:
         node.run()
     except Exception:  # whatever it is, the node cannot go on

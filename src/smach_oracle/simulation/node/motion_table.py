@@ -39,7 +39,7 @@ class MotionTable:
 
     def start(self, part: str, motion: Motion, ended: Callable[[MotionEnd], object],
               newer: str = '') -> None:
-        """Begin a motion; an older one of the same part ends with the text `newer`.
+        """Begin a motion. An older one of the same part ends with the text `newer`.
 
         :param ended: called once, when it has ended.
         """
@@ -63,7 +63,7 @@ class MotionTable:
             self.stop(part, text, aborted=True)
 
     def tick(self) -> None:
-        """Advance or end every motion; then let a control period pass, unless all have ended."""
+        """Advance or end every motion. Then let a control period pass, unless all have ended."""
         for part in sorted(self._running):
             running = self._running[part]
             if running.result is None:

@@ -27,7 +27,7 @@ class _BodyPart(NamedTuple):
 
     body: str  # in the world
     pose: np.ndarray  # 4x4, the world from its centre
-    size: np.ndarray  # (3,) m; 0: not known
+    size: np.ndarray  # (3,) m. 0 means not known
 
 
 def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[RevealedBody]:

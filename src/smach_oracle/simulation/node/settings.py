@@ -20,18 +20,18 @@ class WorldSettings(NamedTuple):
     benign: bool = False  # scenes without causes to fail
     # the share of the causes that last, 0 to 1
     lasting: float = LASTING_SHARE
-    # simulated s per wall s; 0: as fast as possible, frozen while nothing is commanded
+    # simulated s per wall s. 0 means as fast as possible, frozen while nothing is commanded
     real_time_factor: float = 0.0
     # at factor 0: s that the clock goes on per wall s while nothing is commanded
     idle_speed: float = 10.0
     # at factor 0: wall s that nothing was commanded before the clock goes on alone
     idle_grace: float = 0.1
-    # file of a lab that goes on from trial to trial; none: each trial has a fresh world
+    # file of a lab that goes on from trial to trial. None means each trial has a fresh world
     lab: str = NONE
     truth_file: str = NONE  # gets a line of JSON on each trial that has ended
-    # joint states and transforms per simulated s; at factor 0 the default is 4
+    # joint states and transforms per simulated s. At factor 0 the default is 4
     state_rate: float = 10.0
-    # images per simulated s for those who subscribe; at factor 0 the default is 0: snapshots
+    # images per simulated s for those who subscribe. At factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
     # offer the truth to everybody, as services world/reveal and world/judge: to try things out
     reveal: bool = False

@@ -49,7 +49,7 @@ class StatePublisher:
     def __init__(self, urdf: str, joints: List[str], latch: bool) -> None:
         """Offer the topics.
 
-        :param joints: those that have encoders; the others of the URDF (the wheels') count as
+        :param joints: those that have encoders. The others of the URDF (the wheels') count as
             fixed.
         :param latch: late subscribers get the last state: a world that stands still publishes no
             other.
@@ -90,7 +90,7 @@ def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_ba
 
 
 def odometry(odom_from_base: np.ndarray, velocity: np.ndarray, stamp: rospy.Time) -> Odometry:
-    """Where the robot believes to stand, and how it moves; no variance is known (zeros).
+    """Where the robot believes to stand, and how it moves. No variance is known (zeros).
 
     :param odom_from_base: 4x4, ODOM_FRAME from BASE_FRAME.
     :param velocity: (3,), as `Pr2Body.base_velocity` gives it.

@@ -9,7 +9,7 @@ FAST = 1.1  # times its limit that a joint may go at most
 
 
 class StreamedTarget:
-    """Goes straight to one target in a given time and holds it; no joint goes too fast.
+    """Goes straight to one target in a given time and holds it. No joint goes too fast.
 
     :param targets: rad, by joint.
     :param seconds: rounded to control periods, at least one.

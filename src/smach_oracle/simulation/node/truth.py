@@ -14,7 +14,7 @@ class TrialTruth:
     """The record of a trial that is under way.
 
     :param sim_s: simulated s that have passed in the world when it begins.
-    :param began_s: wall s at which its reset was asked for, of time.monotonic(); None: now.
+    :param began_s: wall s at which its reset was asked for, of time.monotonic(). None means now.
     """
 
     def __init__(self, scene: Scene, sim_s: float, began_s: Optional[float] = None) -> None:

@@ -25,7 +25,7 @@ TURNING_FRICTION = 0.002  # m, against spinning and rolling
 
 
 class SceneBuildError(ValueError):
-    """A scene that cannot be built; the text names the setting, its value and what is allowed."""
+    """A scene that cannot be built. The text names the setting, its value and what is allowed."""
 
 
 class PlacedBody(NamedTuple):
@@ -33,7 +33,7 @@ class PlacedBody(NamedTuple):
 
     number: int  # in the physics client
     body: Body
-    links: Dict[str, int]  # by name; -1 is the root
+    links: Dict[str, int]  # by name. -1 is the root
     joints: Dict[str, int]  # by name
 
 
@@ -97,7 +97,7 @@ def _check_body(body: Body) -> None:
 
 
 def add_floor(client: int) -> int:
-    """The floor at z = 0; what is seen of it is a plate a millimetre below."""
+    """The floor at z = 0. What is seen of it is a plate a millimetre below."""
     shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
     seen = pybullet.createVisualShape(pybullet.GEOM_BOX,
                                       halfExtents=[FLOOR_SIZE / 2, FLOOR_SIZE / 2,
@@ -172,7 +172,7 @@ def _load(client: int, body: Body, turn: Sequence[float]) -> int:
 
 
 def _set_joints(client: int, placed: PlacedBody) -> None:
-    """Where its joints start, and their dry friction; nothing else drives them."""
+    """Where its joints start, and their dry friction. Nothing else drives them."""
     friction = dict(placed.body.joint_friction)
     start = dict(placed.body.joints)
     for name in list(friction) + list(start) + [each[0] for each in placed.body.joint_closing]:

@@ -85,7 +85,7 @@ class RenderedView:
                                         physicsClientId=world.client, **dict(LIGHT, **light))
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
-        # m along the axis; `far` where there is nothing
+        # m along the axis. `far` where there is nothing
         self.depth = far * NEAR / (far - (far - NEAR) * buffer)
         # numbers in the client, -1 for none
         self.bodies = np.asarray(image[4], int).reshape(height, width)
@@ -106,7 +106,7 @@ def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List
 
 
 def see(world: World) -> CameraImage:
-    """An image of the head camera; the world goes on for the time that it takes."""
+    """An image of the head camera. The world goes on for the time that it takes."""
     world.step(IMAGE_PERIODS)
     return take_image(world)
 

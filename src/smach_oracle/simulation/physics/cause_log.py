@@ -45,7 +45,7 @@ class CauseLog:
 
     def __init__(self, causes: Tuple[SceneCause, ...], awaited: List[str]) -> None:
         """
-        :param awaited: kinds that begin with an event; the others are there from the start.
+        :param awaited: kinds that begin with an event. The others are there from the start.
         """
         self._causes = causes
         self._began: Dict[str, int] = {each.kind: 0 for each in causes if each.kind not in awaited}

@@ -2,11 +2,11 @@
 
 Kinds, with their values (a scene's Disturbance.values) and the defaults of these:
 * ``arm``: joints of an arm by name, rad: somebody pushes it there, in ``duration`` s (1.5). Its
-  controllers are stopped meanwhile, and hold it then where it was let go; with ``motors`` 1 (0)
+  controllers are stopped meanwhile, and hold it then where it was let go. With ``motors`` 1 (0)
   they run on, and take it back. See pushed_arm.py.
 * ``dim``: the light falls to ``brightness`` (0.15) for ``duration`` s (60).
 * ``glare``: a place (``x``, ``y``, ``z``, m in the world) reflects light towards ``eye_x``,
-  ``eye_y``, ``eye_z`` for ``duration`` s (60), within ``lobe`` rad (0.2) about that direction; it
+  ``eye_y``, ``eye_z`` for ``duration`` s (60), within ``lobe`` rad (0.2) about that direction. It
   dazzles a patch of ``radius`` rad (0.2) of the image. See light.py.
 * ``swing:BODY``: the joints of a body that is a URDF, a door, swing to ``angle`` rad (0) in
   ``duration`` s (1.5).
@@ -94,7 +94,7 @@ class _ActiveDisturbance(NamedTuple):
     values: Dict[str, float]
     periods: int  # how long it takes
     begun: int  # at which period
-    start: Dict[str, float]  # arm, swing: where the joints were; nudge: where the body was, x and y
+    start: Dict[str, float]  # arm, swing: where the joints were. Nudge: where the body was, x and y
 
 
 class Disturbances:
@@ -149,7 +149,7 @@ class Disturbances:
         return max(period, min([end] + [each.period for each in self._due]))
 
     def tick(self, world: DisturbedWorld) -> None:
-        """Move what is disturbed; called before each control period."""
+        """Move what is disturbed. It is called before each control period."""
         if world.periods % LOOK_PERIODS == 0:
             self.log.look(world, self.moving)
         now = [each for each in self._due if each.period <= world.periods]

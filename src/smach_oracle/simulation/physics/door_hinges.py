@@ -33,7 +33,7 @@ class DoorHinges:
                 self._drive(name, joint, 0.0, self._friction(name, joint))
 
     def turn(self, name: str, joint: str, speed: float) -> None:
-        """Drive a joint at rad/s with a person's strength; what is in its way stops it."""
+        """Drive a joint at rad/s with a person's strength. What is in its way stops it."""
         self._driven[name, joint] = True
         self._drive(name, joint, speed, TURNING_FORCE)
 

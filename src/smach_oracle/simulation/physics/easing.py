@@ -2,5 +2,5 @@
 
 
 def eased(share: float) -> float:
-    """Share of the way after a share of the time, both 0 to 1; its speed is 0 at both ends."""
+    """Share of the way after a share of the time, both 0 to 1. Its speed is 0 at both ends."""
     return share * share * (3.0 - 2.0 * share)

@@ -78,7 +78,7 @@ class HarmWatch:
         return name in self._carried
 
     def found(self, world: HarmedWorld) -> Tuple[Harm, ...]:
-        """All that came to harm so far, in its order; what still moves is judged as it is."""
+        """All that came to harm so far, in its order. What still moves is judged as it is."""
         now = [(name, self._harm(world, name, seen, world.body_pose(name)))
                for name, seen in self._things.items() if not seen.held]
         return tuple(self._done + [Harm(kind, name) for name, kind in now if kind])

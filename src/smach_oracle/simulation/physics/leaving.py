@@ -18,7 +18,7 @@ JOINTS = ('torso_lift_joint', 'head_pan_joint', 'head_tilt_joint')  # the arms a
 def left_by(world: World, success: bool, began: float, ended: float) -> LabState:
     """Return how a lab is left: the thing of the task is put away, what does not stand is put back.
 
-    :param success: whether the task was done; a robot that has failed is set right, too.
+    :param success: whether the task was done. A robot that has failed is set right, too.
     :param began: h of the run at which the trial began.
     :param ended: likewise.
     """

@@ -40,7 +40,7 @@ class Lights:
         self._all: List[Light] = []
 
     def add(self, light: Light) -> None:
-        """One more; it need not have begun."""
+        """One more. It need not have begun."""
         self._all.append(light)
 
     def quality(self, quality: CameraQuality, period: int) -> CameraQuality:

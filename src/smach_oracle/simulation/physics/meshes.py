@@ -73,11 +73,11 @@ def egg() -> str:
 
 @lru_cache(maxsize=None)
 def turned(name: str, profile: Tuple[Tuple[float, float], ...]) -> str:
-    """A file with a thing of 1 by 1 by 1 as from a lathe; two processes may write it at once.
+    """A file with a thing of 1 by 1 by 1 as from a lathe. Two processes may write it at once.
 
     :param name: of the file, without its ending.
     :param profile: radius and height, 0 to 0.5 and -0.5 to 0.5, from the lowest ring to the
-        highest; convex, for physics fills what is not.
+        highest. Convex, for physics fills what is not.
     """
     rings = np.array(profile)
     angles = np.arange(SIDES) * 2 * np.pi / SIDES

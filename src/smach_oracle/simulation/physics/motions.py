@@ -19,7 +19,7 @@ STALL_S = 0.25
 LONGEST_S = 10.0  # for what trembles between the fingers
 TORSO_SPEED = 0.013  # m/s, a PR2's
 HEAD_SPEED = 1.0  # rad/s, mean of a turn
-# m, or rad, after which a drive's error is all its own; a shorter one keeps some of the last one's
+# m, or rad, after which a drive's error is all its own. A shorter one keeps some of the last one's
 LONG_DRIVE = 0.5
 BASE_SPEED, BASE_TURN = 0.25, 0.4  # m/s, rad/s, means of a drive
 
@@ -74,7 +74,10 @@ class GripperMotion:
         return ['{}_{}'.format('open' if self._goal > self._start else 'close', self._arm)]
 
     def stop(self, world: World) -> None:
-        """See Motion."""
+        """See Motion; fingers that close no longer press, as on a PR2.
+
+        Its pr2_gripper_action sends the present gap, with no effort, where a goal is cancelled.
+        """
         world.set_gripper(self._arm, min(max(world.gap(self._arm), 0.0), GRIPPER_OPEN),
                           self._effort)
 

@@ -15,7 +15,7 @@ NECK: Sequence[str] = ('torso_lift_joint', 'head_pan_joint', 'head_tilt_joint')
 
 @lru_cache(maxsize=1)
 def neck() -> JointChain:
-    """From base_footprint to the head camera, as the URDF has it; its joints are NECK."""
+    """From base_footprint to the head camera, as the URDF has it. Its joints are NECK."""
     return JointChain.from_urdf(pr2_urdf().read_text(encoding='utf-8'), BASE_FRAME, CAMERA_FRAME)
 
 

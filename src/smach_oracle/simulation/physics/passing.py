@@ -7,7 +7,7 @@ from .world import World
 STILL = 2e-4
 LOOK_PERIODS = 6  # control periods of physics from one look whether all stands still to the next
 # control periods of physics, at most, from one leap to the next: what trembles for longer, as a
-# thing between fingers may, stays where it is; a door takes up to 225 to fall shut
+# thing between fingers may, stays where it is. A door takes up to 225 to fall shut
 UNREST_PERIODS = 240
 
 
@@ -19,7 +19,7 @@ def pass_time(world: World, periods: int, tick: Optional[Callable[[], None]] = N
     What begins or ends meanwhile does so at its time.
 
     :param periods: control periods.
-    :param tick: lets one control period of physics pass; None: the world's `step`.
+    :param tick: lets one control period of physics pass. None means the world's `step`.
     :param leaped: gets the control periods of each leap.
     :param moving: whether the robot is being moved: then there is no leap.
     """

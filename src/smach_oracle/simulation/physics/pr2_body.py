@@ -18,13 +18,13 @@ SUBSTEPS = 2  # steps of physics in a control period
 STEP = 1.0 / 120.0  # s
 PERIOD = SUBSTEPS * STEP
 FINGERS = {arm: [name.replace('_joint', '_link') for name in FINGER_JOINTS[arm]] for arm in ARMS}
-# N, N, N m: about where the wheels of 220 kg begin to slip; other joints have the URDF's efforts
+# N, N, N m: about where the wheels of 220 kg begin to slip. Other joints have the URDF's efforts
 BASE_EFFORT = {'base_x': 1000.0, 'base_y': 1000.0, 'base_theta': 300.0}
 GRIP = 20.0  # N, of each finger at the start
 # m, that a finger is sent ahead of where the two are: how fast it closes, and how both keep
 # together
 LEAD = 0.003
-# N m, of an arm whose motors are off; shoulder and elbow have most of it
+# N m, of an arm whose motors are off. Shoulder and elbow have most of it
 DRY_FRICTION = (1.0, 1.0, 0.5, 0.5, 0.2, 0.2, 0.1)
 STIFFNESS = 0.51  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
@@ -184,7 +184,7 @@ class Pr2Body:
         """Send a joint to a position (rad or m, by its encoder) at the end of the coming period.
 
         :param velocity: rad/s or m/s until then.
-        :param force: N m or N, at most; None: as before.
+        :param force: N m or N, at most. None means as before.
         """
         number = self.numbers[name]
         self._targets[number], self._rates[number] = position, velocity
@@ -240,7 +240,8 @@ class Pr2Body:
     def advance(self, pull: Callable[[], None]) -> None:
         """One control period of physics.
 
-        :param pull: applies the forces from outside that hold for one step; called before each.
+        :param pull: applies the forces from outside that hold for one step. It is called before
+            each.
         """
         for arm in ARMS:
             self._drive_jaws(arm)

@@ -34,8 +34,8 @@ class PushedArm:
                  motors: bool) -> None:
         """Begin to push.
 
-        :param joints: rad by name, of one arm; the others of it stay.
-        :param seconds: that the way takes; the person holds the arm for SETTLING_S more.
+        :param joints: rad by name, of one arm. The others of it stay.
+        :param seconds: that the way takes. The person holds the arm for SETTLING_S more.
         :param motors: whether the arm's controllers run, and hold against it.
         """
         self._robot, self._motors = robot, motors
@@ -60,7 +60,7 @@ class PushedArm:
         return self._left <= 0
 
     def push(self) -> None:
-        """Push for the coming step of physics; let go after the last one."""
+        """Push for the coming step of physics. Let go after the last one."""
         share = eased(min(1.0, 1.0 - (self._left - round(SETTLING_S / STEP)) / self._steps))
         wanted = self._points(share)
         here = [apply(self._robot.link_pose(link), np.array(point))

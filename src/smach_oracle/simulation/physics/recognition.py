@@ -15,7 +15,7 @@ DARK, DAZZLING = 9.0, 250.0  # of 255: means around a pixel between which its co
 AROUND = 5  # px, of these means
 LEAST = 0.0008  # share of the image's pixels that must show a thing
 SHARE_SEEN = 0.25  # of the pixels that show it, whose colours can be told
-USUAL_WIDTH = 640.0  # px of an image; a small one is shown as large as any
+USUAL_WIDTH = 640.0  # px of an image. A small one is shown as large as any
 MISSED = 2.0  # px of such an image, sigma by which an outline errs, on the whole and here and there
 SMOOTH = 14.0  # px along which the error changes
 

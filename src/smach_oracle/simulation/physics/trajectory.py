@@ -48,7 +48,7 @@ class Motion(Protocol):
     """Something a controller does."""
 
     def tick(self, world: World) -> Optional[MotionResult]:
-        """Send the joints on for the coming period; the result where it has ended."""
+        """Send the joints on for the coming period. The result where it has ended."""
 
     def events(self) -> Sequence[str]:
         """What has happened when it has ended, for the world's disturbances."""
@@ -80,9 +80,9 @@ class Trajectory:
                  tolerances: Tolerances = USUAL) -> None:
         """Take a command.
 
-        :param positions: (n, len(joints)), rad or m; continuous joints are taken the short way to
+        :param positions: (n, len(joints)), rad or m. Continuous joints are taken the short way to
             the first point.
-        :param times: (n,) s from the start, increasing; the first may be 0.
+        :param times: (n,) s from the start, increasing. The first may be 0.
         :param velocities: (n, len(joints)), rad/s or m/s.
         :raises ValueError: for shapes that do not fit, values that are not finite, times that do
             not increase.
@@ -103,7 +103,7 @@ class Trajectory:
         return self._joints
 
     def refusal(self, world: World) -> str:
-        """Why this robot cannot do it, from where it is now; or ''."""
+        """Why this robot cannot do it, from where it is now, or ''."""
         robot = world.robot
         for column, name in enumerate(self._joints):
             if name not in robot.encoders or name.endswith('finger_joint'):
@@ -227,7 +227,7 @@ def _blended(way: np.ndarray) -> np.ndarray:
 
 
 def _held(world: World, name: str) -> float:
-    """Where a joint was sent, if it is about there; else where it is."""
+    """Where a joint was sent, if it is about there, else where it is."""
     target, position = world.robot.target(name), world.robot.position(name)
     return target if abs(target - position) < 0.02 else position
 

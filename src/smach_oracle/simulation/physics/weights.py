@@ -35,7 +35,7 @@ class Weights:
                                         pybullet.WORLD_FRAME, physicsClientId=self._client)
 
     def _centre(self, number: int, link: int) -> Sequence[float]:
-        """(3,) m in the world, the centre of mass of a link; -1 is the root."""
+        """(3,) m in the world, the centre of mass of a link. -1 is the root."""
         state: Sequence[Sequence[float]] = pybullet.getBasePositionAndOrientation(
             number, physicsClientId=self._client) if link < 0 else pybullet.getLinkState(
                 number, link, physicsClientId=self._client)

@@ -1,4 +1,4 @@
-"""The world of a trial: the PR2, the bodies of the scene, physics; the only place with the truth.
+"""The world of a trial: the PR2, the bodies of the scene, physics, the only place with the truth.
 
 The same scene and the same calls give the same states to the last bit: every reset begins in a
 fresh physics client, and nothing here reads a clock or shares a random generator.
@@ -57,7 +57,7 @@ class World:
     def reset(self, scene: Scene) -> None:
         """Build a scene's world from nothing, and let it come to rest.
 
-        :raises SceneBuildError: with what is wrong with the scene; the world is as it was then.
+        :raises SceneBuildError: with what is wrong with the scene. The world is as it was then.
         """
         check_scene(scene)
         client = pybullet.connect(pybullet.DIRECT)
@@ -95,7 +95,7 @@ class World:
         return floor, robot, {body.name: add_body(client, body) for body in scene.bodies}
 
     def close(self) -> None:
-        """Free the physics client; reset() makes another."""
+        """Free the physics client. Reset() makes another."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
@@ -104,7 +104,7 @@ class World:
 
     @property
     def time(self) -> float:
-        """s of simulated time since the first reset began; it never goes back."""
+        """s of simulated time since the first reset began. It never goes back."""
         return (self._periods_before + self.periods) * PERIOD
 
     def step(self, count: int = 1) -> None:
@@ -128,11 +128,11 @@ class World:
         self._pushed = [each for each in self._pushed if not each.over]
 
     def push_arm(self, joints: Dict[str, float], seconds: float, motors: bool) -> None:
-        """Begin to push an arm as a person would; see PushedArm."""
+        """Begin to push an arm as a person would. See PushedArm."""
         self._pushed.append(PushedArm(self._robot, joints, seconds, motors))
 
     def happened(self, *events: str) -> None:
-        """Count events, such as 'look_at'; they may set off a disturbance of the scene."""
+        """Count events, such as 'look_at'. They may set off a disturbance of the scene."""
         for event in events:
             self._disturbances.happened(event, self.periods)
 
@@ -160,7 +160,7 @@ class World:
 
     @property
     def client(self) -> int:
-        """PyBullet's number for this world; another one after each reset."""
+        """PyBullet's number for this world. Each reset gives another one."""
         return self._client
 
     def joints(self) -> Dict[str, float]:
@@ -179,7 +179,7 @@ class World:
                    max_force: Optional[float] = None) -> None:
         """Send a joint to a position at the end of the coming control period, and hold it there.
 
-        :param velocity: rad/s or m/s on the way; it holds for that one period.
+        :param velocity: rad/s or m/s on the way. It holds for that one period.
         :raises ValueError: for an unknown joint, a position outside its limits, or what is not a
             finite number.
         """
@@ -313,7 +313,7 @@ class World:
         return list(self._find(name).joints)
 
     def slide_body(self, name: str, x: float, y: float, let_go: bool = False) -> None:
-        """Push a body over what it stands on, at m/s; it does not topple, but obstacles stop it.
+        """Push a body over what it stands on, at m/s. It does not topple, but obstacles stop it.
 
         :param let_go: leave it where it is, with its own friction again.
         """
@@ -326,7 +326,7 @@ class World:
                                    physicsClientId=self._client)
 
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
-        """Drive a joint of a body at rad/s with a person's strength; what is in its way stops it.
+        """Drive a joint of a body at rad/s with a person's strength. What is in its way stops it.
 
         :param let_go: leave it to its own hinge again.
         """

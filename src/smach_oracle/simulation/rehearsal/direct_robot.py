@@ -21,7 +21,7 @@ def no_report(status: str) -> None:
 
 
 class DirectRobot:
-    """Drives the PR2 of a world; every call returns when the motion has ended.
+    """Drives the PR2 of a world. Every call returns when the motion has ended.
 
     Values that are not allowed, and motions that do not get there, raise RobotError.
     """

@@ -41,7 +41,7 @@ class FilmedWorld(World):
     def __init__(self, frames_s: float, carried_s: float) -> None:
         """Begin with an empty world.
 
-        :param frames_s: images of the video per simulated s; 0: no video.
+        :param frames_s: images of the video per simulated s. 0 means no video.
         :param carried_s: simulated s for which something must have been carried when the picture is
             taken.
         """
@@ -74,7 +74,7 @@ class FilmedWorld(World):
 def film(task: FilmedTask, seed: int, frames_s: float) -> Tuple[np.ndarray, List[np.ndarray]]:
     """The picture and the images of one trial, each (h, w, 3) uint8 RGB.
 
-    :param frames_s: images per simulated s; 0: none.
+    :param frames_s: images per simulated s. 0 means none.
     :raises RuntimeError: where nothing was carried in it.
     """
     world = FilmedWorld(frames_s, task.carried_s)

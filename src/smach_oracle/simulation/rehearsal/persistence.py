@@ -22,7 +22,7 @@ class Course(NamedTuple):
     failed: str  # the state that failed first, '' for none
     cured_by: str  # '', 'retry' or 'restart'
     # whether the cause was there when the failed state was tried again, the first time, and when it
-    # was tried again after a restart; False where it was not tried
+    # was tried again after a restart. It is False where it was not tried
     there_at_retry: bool
     there_at_restart: bool
     success: bool  # in truth

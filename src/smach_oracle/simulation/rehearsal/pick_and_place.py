@@ -96,7 +96,7 @@ class PickAndPlaceRehearsal:
 
 def rehearse(scene: Scene, world: Optional[World] = None,
              task: Callable[[World], Rehearsal] = PickAndPlaceRehearsal) -> RehearsalResult:
-    """One trial up to its first failure; in a world of its own, where none is given."""
+    """One trial up to its first failure, in a world of its own, where none is given."""
     if world is None:
         world = World()
         try:

@@ -15,7 +15,7 @@ LIGHT = {
 }
 # where it stands: to the left of the camera, rad, and m above
 LIGHT_TURN, LIGHT_HEIGHT = np.radians(40.0), 4.0
-FAR = 5.0  # m; the horizon: with a further one the shadows get lost
+FAR = 5.0  # m. The horizon: with a further one the shadows get lost
 BACKGROUND = (236, 238, 241)
 FINER = 2  # times more pixels are drawn, each way, than shown
 

@@ -9,7 +9,7 @@ import numpy as np
 from smach_oracle.geometry.transforms import rotation_about
 
 LASTING, PASSING = 'lasting', 'passing'
-LASTING_SHARE = 0.6  # of the causes; a parameter of the world may say otherwise
+LASTING_SHARE = 0.6  # of the causes. A parameter of the world may say otherwise
 ANOTHER = 0.10  # chance of a second cause, where there is one
 WEIGHTS = Mapping[str, float]
 

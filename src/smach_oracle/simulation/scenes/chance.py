@@ -5,7 +5,7 @@ import numpy as np
 
 
 def generator_for(seed: int, what: str) -> np.random.Generator:
-    """The generator of one use in one trial; a use that is added leaves the others as they were.
+    """The generator of one use in one trial. A use that is added leaves the others as they were.
 
     :param seed: of the trial, 0 or more.
     :param what: the use's name.

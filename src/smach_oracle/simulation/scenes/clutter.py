@@ -42,7 +42,7 @@ OTHER_SHARE = 0.6
 
 
 def another(generator: np.random.Generator, thing: Body, floor: float) -> Body:
-    """Perhaps something else in a thing's place; its name stays.
+    """Perhaps something else in a thing's place. Its name stays.
 
     :param floor: m, the height on which it stands.
     """

@@ -5,7 +5,7 @@ from .scene import Disturbance, SceneCause
 
 
 class SceneDraft(Protocol):
-    """What the drafts of all tasks have; each is a NamedTuple."""
+    """What the drafts of all tasks have. Each is a NamedTuple."""
 
     @property
     def disturbances(self) -> Tuple[Disturbance, ...]:

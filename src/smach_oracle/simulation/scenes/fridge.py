@@ -13,7 +13,7 @@ from smach_oracle.pr2.kitchen import Kitchen
 from .scene import Body, ClosingHinge
 
 DOOR_JOINT = 'door_hinge'  # rad; 0 closed, positive open
-DOOR_LIMIT = 1.75  # rad; a stop, as of a cabinet next to it
+DOOR_LIMIT = 1.75  # rad. A stop, as of a cabinet next to it
 WHITE, GLASS, DARK = (0.93, 0.93, 0.95), (0.75, 0.82, 0.90), (0.20, 0.20, 0.22)
 DOOR_MASS, BODY_MASS = 8.0, 60.0  # kg
 GAP = 0.02  # m below and above the door
@@ -29,7 +29,7 @@ Triple = Tuple[float, float, float]
 def fridge(kitchen: Kitchen, closing: Optional[ClosingHinge] = None) -> Body:
     """The refrigerator of a kitchen, its door closed.
 
-    :param closing: of its door; None: it stays where it is left.
+    :param closing: of its door. None means it stays where it is left.
     """
     x, y, yaw = kitchen.place
     hinges = () if closing is None else ((DOOR_JOINT, closing),)

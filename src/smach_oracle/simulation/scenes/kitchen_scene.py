@@ -63,7 +63,7 @@ def composed(seed: int, draft: KitchenDraft, kitchen: Kitchen, robot: RobotStart
 
 
 def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
-    """Upright on the shelf, apart from each other, near the front; the foremost comes first."""
+    """Upright on the shelf, apart from each other, near the front. The foremost comes first."""
     generator = np.random.default_rng([seed, 2])
     places: List[Tuple[float, float]] = []
     for _ in range(100):

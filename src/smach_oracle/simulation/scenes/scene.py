@@ -8,14 +8,14 @@ class ClosingHinge(NamedTuple):
     """What pulls a door towards 0, unless it stands open past its stop."""
 
     torque: float  # N m
-    stop: float  # rad; from there on the door stays where it is left
+    stop: float  # rad. From there on the door stays where it is left
     pace: float = 0.4  # rad/s: it is damped, and does not slam
 
 
 class Body(NamedTuple):
     """A thing in the world, in whose frame its pose is.
 
-    The floor is z = 0; the robot starts near the origin facing x.
+    The floor is z = 0. The robot starts near the origin facing x.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Body(NamedTuple):
     yaw: float = 0.0  # rad, as roll and pitch: about the fixed axes z, x and y, roll first
     roll: float = 0.0
     pitch: float = 0.0
-    mass: float = 0.0  # kg; 0: it cannot move
+    mass: float = 0.0  # kg. 0 means it cannot move
     friction: float = 0.8  # coefficient
     colour: Vector = (0.5, 0.5, 0.5)
     urdf: str = ''  # text of the model, for shape 'urdf'
@@ -68,7 +68,7 @@ class SceneCause(NamedTuple):
 
 
 class RobotStart(NamedTuple):
-    """How the robot stands at the beginning; joints that are not named have their defaults."""
+    """How the robot stands at the beginning. Joints that are not named have their defaults."""
 
     joints: Tuple[Tuple[str, float], ...] = ()
     base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
@@ -84,7 +84,7 @@ class RobotStart(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """What makes the trial a true success; the judge alone reads it."""
+    """What makes the trial a true success. The judge alone reads it."""
 
     kind: str  # 'stands_at' or 'in_hand'
     body: str  # name of the body; '' : any of the movable ones

@@ -195,7 +195,7 @@ def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
 
 
 def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """The nearest thing stands at the edge of the right arm's reach; the others are beyond it."""
+    """The nearest thing stands at the edge of the right arm's reach. The others are beyond it."""
     thing = draft.things[TARGET]
     spot = (float(generator.uniform(0.50, 0.60)), float(generator.uniform(0.34, 0.50)))
     moved = thing._replace(position=(spot[0], spot[1], thing.position[2]))

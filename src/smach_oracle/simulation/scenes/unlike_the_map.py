@@ -34,7 +34,7 @@ class TrueTable(NamedTuple):
 
 
 def true_kitchen(seed: int) -> Kitchen:
-    """The kitchen as it is; the robot has Kitchen()."""
+    """The kitchen as it is. The robot has Kitchen()."""
     drawn = _drawn(seed, 'true_kitchen', 6)
     mapped = Kitchen()
     x, y, yaw = (float(value + sigma * each)

@@ -4,7 +4,7 @@ import time
 
 import smach
 
-PLAN = {}  # label: how its next visits end; then they succeed
+PLAN = {}  # label: how its next visits end. Then they succeed.
 _timers = []
 _STUCK_S = 0.9  # longer than time limit and grace, so that the state is abandoned
 _SLOW_S = 20.0
@@ -28,7 +28,7 @@ def begin(word, machine):
 
 
 def take(label):
-    """How the next visit of a state ends; '' where the plan has nothing for it."""
+    """Return how the next visit of a state ends, or '' where the plan has no entry for it."""
     return PLAN[label].pop(0) if PLAN.get(label) else ''
 
 

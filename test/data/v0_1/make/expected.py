@@ -2,7 +2,7 @@
 """Write what the code makes of the data: expected.py FOLDER.
 
 The files in expected/ are those of version 0.1 and stay so. This script is for those who want to
-check them with a checkout of that version; README.md has the commands.
+check them with a checkout of that version. README.md has the commands.
 """
 import json
 import sys

@@ -57,7 +57,7 @@ def nodes():
 
 
 def oracle_run(script, *arguments, config=None, options=()):
-    """The command line; bags lie where it runs."""
+    """Return the command line. Bags lie where it runs."""
     given = ['--config', str(SETTINGS / config)] if config else []
     return ['rosrun', 'smach_oracle', 'oracle_run', '--record', '.', *given, *options,
             str(HERE / script), *arguments]

@@ -7,7 +7,7 @@ import smach
 
 
 def build():
-    """Three states; the second waits."""
+    """Make a machine of three states. The second one waits."""
     machine = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('BEGIN', Act('BEGIN'), {'succeeded': 'WAIT'})

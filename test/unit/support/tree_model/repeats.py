@@ -7,7 +7,7 @@ Place = Tuple[str, str]  # path of a container, label
 
 
 class Repeats:
-    """The course of a trial, in the words of doc/executive.md, "States that are not repeated"."""
+    """The course of a trial, in the words of doc/limits.md, "States that are not repeated"."""
 
     def __init__(self, plan: TreePlan) -> None:
         self._plan = plan

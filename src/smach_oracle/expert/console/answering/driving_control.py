@@ -18,7 +18,7 @@ Vector = Tuple[float, float, float]
 class DelayCheck:
     """Distinguishes messages that arrive at once from those that a slow link has held back.
 
-    The clocks of page and server have nothing in common; the least difference seen stands for a
+    The clocks of page and server have nothing in common. The least difference seen stands for a
     message without delay.
     """
 
@@ -55,7 +55,7 @@ class DrivingControl:
         self.held = False
 
     def take(self, session: DrivingSession, now_s: float) -> str:
-        """Take control; returns why not, or ''. A page that has fallen silent has lost it."""
+        """Take control, and return why not, or ''. A page that has fallen silent has lost it."""
         if self.session is not None and self.session.page != session.page and not self.silent(
                 now_s):
             return '{} drives; one at a time'.format(self.session.person.expert)
@@ -68,7 +68,7 @@ class DrivingControl:
         return now_s - self._heard_s > SILENT_S
 
     def accept(self, sent_s: float, held: bool, now_s: float) -> bool:
-        """Take in a command of the page; whether to carry it out as one that is held."""
+        """Take in a command of the page. Return whether to carry it out as one that is held."""
         self._heard_s = now_s
         in_time = self._delay_check.is_in_time(sent_s, now_s)
         if held:
@@ -77,7 +77,7 @@ class DrivingControl:
         return self.held
 
     def leave(self, now_s: float) -> Dict[str, Any]:
-        """End the session; returns its summary for the audit."""
+        """End the session, and return its summary for the audit."""
         summary: Dict[str, Any] = dict(self._counts)
         if self.session is not None:
             summary['seconds'] = round(now_s - self.session.begun_s, 1)
@@ -89,7 +89,7 @@ def along(frame: str, vector: Sequence[float], most: float) -> Vector:
     """Shares of `most` along the axes of a frame.
 
     :param vector: shares forward, left and up, each from -1 to 1.
-    :returns: x, y, z; the axes of a camera are right, down and forward.
+    :returns: x, y, z. The axes of a camera are right, down and forward.
     """
     forward, left, up = (most * each for each in vector)
     return (-left, -up, forward) if frame == 'camera' else (forward, left, up)

@@ -11,13 +11,13 @@ _RESULT = '/result'
 
 
 def interface_actions(topics: Iterable[Sequence[str]]) -> Set[str]:
-    """Names of the SharedAutonomy actions; `topics`: with their types, as the master knows them."""
+    """Names of the SharedAutonomy actions. `topics`: with their types, as the master knows them."""
     return {topic[:-len(_RESULT)] for topic, kind in topics
             if kind == SharedAutonomyActionResult._type and topic.endswith(_RESULT)}
 
 
 def action_of(listed: ListedQuestion) -> str:
-    """The resolved name of the action that now runs for a question; '' where none does."""
+    """The resolved name of the action that now runs for a question, or '' where none does."""
     offer = next((each for each in listed.goal.interfaces if each.name == listed.goal.interface),
                  None)
     if not listed.goal.interface or offer is None:

@@ -137,7 +137,7 @@ def _points(message: PointCloud2) -> Dict[str, Any]:
 def outlines(mask: np.ndarray) -> List[List[int]]:
     """Outlines of a mask (h, w) uint8 where it is not 0, those of holes among them.
 
-    :returns: closed lines x, y, x, y, ... in px; none where OpenCV is missing.
+    :returns: closed lines x, y, x, y, ... in px. None where OpenCV is missing.
     """
     if cv2 is None:
         return []

@@ -12,7 +12,7 @@ LONGEST_TEXT = 500
 
 
 def interface_output_view(message: Optional[InterfaceOutput]) -> Optional[Dict[str, Any]]:
-    """Status, text and the last lines; None where nothing was started."""
+    """Status, text and the last lines, or None where nothing was started."""
     if message is None:
         return None
     return {'status': _STATUS.get(message.status, ''), 'text': message.text[:LONGEST_TEXT],

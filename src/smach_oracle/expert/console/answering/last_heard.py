@@ -15,13 +15,13 @@ from ..web.sections import PageSections
 BEAT_S = 1.0
 SILENT_AFTER_S = 6.0  # the page has the same limit (liveness.js)
 OLDEST_SEEN_S = 15.0  # what a page may have seen last when it sends an answer
-# commands that end the robot's waiting; stopping and letting go are never refused
+# commands that end the robot's waiting. Stopping and letting go are never refused
 ANSWERING = ('answer', 'hand_over')
 GetHeard = Callable[[], Optional[float]]
 
 
 class LastHeard:
-    """One thread calls `write_sections`; any thread the rest."""
+    """One thread calls `write_sections`. Any thread calls the rest."""
 
     def __init__(self, front_end: FrontEnd, pulse: NodePulse,
                  nodes: Callable[[], Mapping[str, Any]], master_heard_s: GetHeard,
@@ -56,7 +56,7 @@ class LastHeard:
         })
 
     def _is_heard_again(self) -> bool:
-        """A server without questions is silent; with the next one it must not read as silent."""
+        """A server without questions is silent. With the next one it must not read as silent."""
         for name in self._front_end.servers:
             came_s = _came_s(self._front_end.news(name))
             before_s = self._told.get(name)
@@ -66,7 +66,7 @@ class LastHeard:
         return False
 
     def refusal(self, command: PageCommand, listed: ListedQuestion) -> str:
-        """Why a command is not carried out for what is too old; '' where it may be."""
+        """Why a command is not carried out for what is too old, or '' where it may be."""
         if command.name not in ANSWERING:
             return ''
         now_s = time.monotonic()
@@ -74,9 +74,9 @@ class LastHeard:
             listed.server, _came_s(self._front_end.news(listed.server)), now_s)
 
     def robot_refusal(self, robot: str, seen: Optional[float]) -> str:
-        """Why nothing is sent to a robot that would have it go on; '' where it may be.
+        """Why nothing is sent to a robot that would have it go on, or '' where it may be.
 
-        :param seen: the newest beat that the page had seen, s; None: it does not say.
+        :param seen: the newest beat that the page had seen, s. None means it does not say.
         """
         now_s = time.monotonic()
         if seen is not None and now_s - seen > OLDEST_SEEN_S:

@@ -22,7 +22,7 @@ class Onlookers:
         self._by_page: Dict[int, Onlooker] = {}
 
     def look(self, page: int, question: str, person: Person) -> None:
-        """A page shows a question from now on; '' for none."""
+        """A page shows a question from now on, or '' for none."""
         if question:
             self._by_page[page] = Onlooker(question, person)
             self._write()

@@ -18,7 +18,10 @@ _HOLDS = {PreconditionCheck.HOLDS: True, PreconditionCheck.DOES_NOT_HOLD: False}
 
 
 class PreconditionStatuses:
-    """Follows `<robot>/oracle/preconditions` of robots that ask; holds the newest by question."""
+    """Follows `<robot>/oracle/preconditions` of robots that ask.
+
+    It holds the newest by question.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -27,7 +30,7 @@ class PreconditionStatuses:
         self._newest: 'OrderedDict[Tuple[str, str], StatusByState]' = OrderedDict()
 
     def write_sections(self, sections: PageSections, questions: Iterable[ListedQuestion]) -> None:
-        """Bring the section up to date; new robots are listened to from now on."""
+        """Bring the section up to date. New robots are listened to from now on."""
         questions = list(questions)
         self._topics.follow([listed.goal.robot for listed in questions])
         with self._lock:

@@ -1,7 +1,7 @@
 """Carries out commands about questions: claims, answers, and those of their interfaces.
 
 Claims are kept alive as long as the pages are there that show the questions. Called from several
-threads; a call takes as long as a robot's service does, 5 s at most.
+threads. A call takes as long as a robot's service does, 5 s at most.
 """
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
 
@@ -31,12 +31,12 @@ _FIELD = {'goto': 'state', 'supersede': 'outcome', 'give_up': 'outcome', 'interf
 
 # may raise ServerGoneError
 CommandWorker = Callable[[PageCommand, Person, ListedQuestion], CommandReply]
-# why a command is refused before anything is done for it; '' where it is not
+# why a command is refused before anything is done for it, or '' where it is not
 Refusal = Callable[[PageCommand, ListedQuestion], str]
 
 
 class OutputError(OracleError):
-    """An output that cannot be sent; the text names it and says why."""
+    """An output that cannot be sent. The text names it and says why."""
 
 
 class QuestionCommands:

@@ -9,13 +9,13 @@ from ..trials.trial_log import TrialLog
 from ..web.sections import PageSections
 from .question_view import question_view
 
-# each list has ages of its own; smaller differences come from the link, not from the question
+# each list has ages of its own. Smaller differences come from the link, not from the question
 _JITTER_S = 1.0
 MOST_REMEMBERED = 1000
 
 
 class QuestionSections:
-    """Draws the queue; one thread calls it."""
+    """Draws the queue. One thread calls it."""
 
     def __init__(self, front_end: FrontEnd, log: TrialLog, session_of: Callable[[
             ListedQuestion], str] = lambda listed: '') -> None:

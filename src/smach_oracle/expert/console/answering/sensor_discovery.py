@@ -41,7 +41,7 @@ class SensorDiscovery:
         return action in self._perception_actions
 
     def start(self) -> None:
-        """Begin; the threads end with the node."""
+        """Begin. The threads end with the node."""
         repeat(self.discover, DISCOVERY_PERIOD_S)
         repeat(self._update, UPDATE_PERIOD_S)
 
@@ -75,7 +75,7 @@ class SensorDiscovery:
     def _running(self) -> Dict[str, Any]:
         """The questions for which a perception interface runs, each with two of its sensors.
 
-        Those of the image and of its cloud; None before there is one.
+        Those of the image and of its cloud, or None before there is one.
         """
         running = {}
         for listed in self._front_end.questions():

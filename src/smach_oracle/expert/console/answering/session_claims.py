@@ -1,4 +1,4 @@
-"""Which browser holds a claim. Pure; any thread.
+"""Which browser holds a claim. Pure. Any thread may use it.
 
 Robots know a claim by the expert's name alone, and two people may have the same. Here it belongs to
 the session of one browser: another one of the same name neither shares it nor answers by it.
@@ -33,7 +33,7 @@ class SessionClaims:
         self._held: 'OrderedDict[str, HeldClaim]' = OrderedDict()
 
     def session_of(self, listed: ListedQuestion) -> str:
-        """The session whose claim its server lists; '' where that was not made here."""
+        """The session whose claim its server lists, or '' where that was not made here."""
         held = self._held.get(listed.key)
         return held.session if held is not None and held.expert == listed.holder else ''
 
@@ -43,7 +43,7 @@ class SessionClaims:
         return held is not None and (held.session, held.expert) == (person.session, person.expert)
 
     def refusal(self, command: PageCommand, person: Person, listed: ListedQuestion) -> str:
-        """Why a claim or an answer is not the person's; '' where it may be."""
+        """Why a claim or an answer is not the person's, or '' where it may be."""
         if command.name == 'claim':
             held = self._valid(listed)
             if held is not None and held.expert == person.expert \

@@ -35,7 +35,7 @@ class TeleopClient:
         self._open = float(rospy.get_param(action + '/gripper_open', GRIPPER_OPEN))
         self._publisher = rospy.Publisher(action + '/command', TeleopCommand, queue_size=2,
                                           tcp_nodelay=True)
-        # number of boxes in the robot's collision map; None: there is no map
+        # number of boxes in the robot's collision map. None means there is no map
         self.boxes: Optional[int] = None
         self._subscribers = [
             rospy.Subscriber(action + '/state', TeleopState, self._on_state, queue_size=2,
@@ -66,11 +66,11 @@ class TeleopClient:
 
     @property
     def arm(self) -> str:
-        """The arm that the interface has chosen for the state or moved last; '' if unknown."""
+        """The arm that the interface has chosen for the state or moved last, or '' if unknown."""
         return self.state.arm if self.state is not None else ''
 
     def frames(self, arm: str) -> Dict[str, str]:
-        """The tf frames by the names that a page uses for them; unknown ones are left out."""
+        """The tf frames by the names that a page uses for them. Unknown ones are left out."""
         frames = {'tool': self._tools.get(arm, ''), 'base': self._base, 'camera': self._camera}
         return {name: frame for name, frame in frames.items() if frame}
 

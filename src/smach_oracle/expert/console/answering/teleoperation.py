@@ -33,7 +33,7 @@ TAKE_FIRST = 'Take the wheel first.'
 class Teleoperation:
     """All of them.
 
-    `drive` and `stop` are called from the server's loop and wait for nothing; the rest from other
+    `drive` and `stop` are called from the server's loop and wait for nothing, the rest from other
     threads.
     """
 
@@ -51,7 +51,7 @@ class Teleoperation:
         return action in self._interfaces
 
     def start(self) -> None:
-        """Begin; the threads end with the node."""
+        """Begin. The threads end with the node."""
         for step, period_s in ((self.discover, DISCOVERY_PERIOD_S), (self.write_sections,
                                                                      SECTIONS_PERIOD_S)):
             repeat(step, period_s)
@@ -62,7 +62,7 @@ class Teleoperation:
                    for client in list(self._clients.values()))
 
     def drive(self, command: PageCommand, page: int) -> CommandReply:
-        """Relay one command of the page in control; a command that comes late stops the arm."""
+        """Relay one command of the page in control. A command that comes late stops the arm."""
         arguments = command.arguments
         client = self._clients.get(arguments['question'])
         if client is None:
@@ -85,7 +85,7 @@ class Teleoperation:
         return CommandReply(True)
 
     def stop(self, command: PageCommand, person: Person, page: int) -> CommandReply:
-        """Leave control, or end that of whoever has it; waits for nothing."""
+        """Leave control, or end that of whoever has it. It waits for nothing."""
         key = command.arguments['question']
         if command.name == 'leave_wheel':
             self._leave(key, page, 'left')
@@ -159,7 +159,7 @@ class Teleoperation:
                     action, err))
 
     def write_sections(self) -> None:
-        """Bring the sections up to date; end the sessions of pages that have fallen silent."""
+        """Bring the sections up to date. End the sessions of pages that have fallen silent."""
         for key, client in list(self._clients.items()):
             if client.control.session is not None and client.control.silent(time.monotonic()):
                 self._leave(key, None, 'the page has fallen silent')

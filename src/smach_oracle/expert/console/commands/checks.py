@@ -2,7 +2,7 @@
 
 A check takes what came and returns what is meant.
 
-:raises ValueError: (each check) for anything else; the text says what is allowed.
+:raises ValueError: (each check) for anything else. The text says what is allowed.
 """
 import math
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
@@ -53,13 +53,13 @@ def one_of(allowed: Tuple[str, ...]) -> Check:
 
 
 def number(low: float, high: float, allowed: str = '') -> Check:
-    """A finite number from `low` to `high`; a refusal says `allowed`."""
+    """A finite number from `low` to `high`. A refusal says `allowed`."""
     return _argument(
         checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high)))
 
 
 def whole(low: int, high: int, allowed: str) -> Check:
-    """A whole number from `low` to `high`; a refusal says `allowed`."""
+    """A whole number from `low` to `high`. A refusal says `allowed`."""
     return _argument(checks.whole(low, allowed, high))
 
 
@@ -93,7 +93,7 @@ def shown(value: object) -> str:
 
 
 def outputs(value: object) -> List[TypedOutput]:
-    """Values for the userdata; none where they are left out.
+    """Values for the userdata. None where they are left out.
 
     :raises ValueError: for what is no list of outputs, too many of them, one twice, or one that is
         nested too deep.

@@ -44,7 +44,7 @@ class CommandReply(NamedTuple):
 
     ok: bool
     message: str = ''
-    data: Optional[Mapping[str, object]] = None  # plain; None where there is no more to it
+    data: Optional[Mapping[str, object]] = None  # plain, or None where there is no more to it
 
 
 def parse(text: object) -> PageCommand:

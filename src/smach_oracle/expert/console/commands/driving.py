@@ -27,7 +27,7 @@ DRIVING_COMMANDS: Dict[str, CommandSpec] = {
     'stop_hand': CommandSpec('viewer', QUESTION),
     # linear, angular: forward, left, up, and turns about these, as shares of the interface's limits
     # sent: by the page's clock
-    # arm: checked against the interface's own; '': the one that it has chosen for the state
+    # arm: checked against the interface's own. '' means the one that it has chosen for the state
     'drive': CommandSpec(
         'teleoperator',
         dict(QUESTION, held=flag, frame=one_of(FRAMES), linear=_axes, angular=_axes,

@@ -25,7 +25,7 @@ class NodeUnknownError(OracleError):
 
 
 class NodeLink:
-    """Asks one node; its address is looked up at the master, and kept while it answers."""
+    """Asks one node. Its address is looked up at the master, and kept while it answers."""
 
     def __init__(self, node: str) -> None:
         self._node = node
@@ -75,7 +75,7 @@ class NodePulse:
             self._stops.pop(node).set()
 
     def heard_s(self, node: str) -> Optional[float]:
-        """When it answered last, by the monotonic clock; None where it never has."""
+        """When it answered last, by the monotonic clock, or None where it never has."""
         return self._heard_s.get(node)
 
     def _run(self, node: str, stop: threading.Event) -> None:

@@ -18,7 +18,7 @@ _KINDS = {int(kind): kind for kind in EventKind}
 
 
 def event_of(message: OracleEvent) -> Event:
-    """The event as the executive emitted it; of its data only what the console needs."""
+    """The event as the executive emitted it. Of its data only what the console needs."""
     kind: Any = _KINDS.get(message.kind, message.kind)
     data: Optional[Dict[str, Any]] = None
     if kind == EventKind.TRIAL_START:
@@ -65,5 +65,5 @@ def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
 
 
 def number(value: float, digits: int = 4) -> Optional[float]:
-    """A number that JSON knows: rounded to some digits; None for what is not finite."""
+    """A number that JSON knows: rounded to some digits, or None for what is not finite."""
     return round(float(value), digits) if math.isfinite(value) else None

@@ -6,9 +6,9 @@ to itself. The page draws it beside the rest, and its edges as thin curves.
 import json
 from typing import Any, Counter, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-MOST_STATES = 500  # of a container; more are not drawn
+MOST_STATES = 500  # of a container. More are not drawn
 MOST_EDGES = 3000
-# edges up to which dot keeps room for their labels; beyond, it would take minutes
+# edges up to which dot keeps room for their labels. Beyond, it would take minutes
 MOST_LABELLED = 100
 # of a large graph: fewer rounds of making it prettier
 _HASTE = ' nslimit=2; nslimit1=2; mclimit=0.3;'
@@ -127,7 +127,7 @@ def read_layout(text: str) -> GraphLayout:
 
 def drawing(structure: ContainerGraph, layout: Optional[GraphLayout],
             nested: Iterable[str]) -> Dict[str, Any]:
-    """The section of a graph: plain data for the page; positions only where there is a layout.
+    """The section of a graph: plain data for the page. Positions only where there is a layout.
 
     :param nested: labels of the states that are containers themselves.
     """
@@ -152,7 +152,7 @@ def drawing(structure: ContainerGraph, layout: Optional[GraphLayout],
 
 def _drawn_edge(layout: Optional[GraphLayout],
                 name: str) -> Tuple[List[Point], Optional[Point]]:
-    """Points and place of the label of an edge; none where it is not laid out."""
+    """Points and place of the label of an edge. None where it is not laid out."""
     edge = layout.edges.get(name) if layout else None
     return edge if edge else ([], None)
 

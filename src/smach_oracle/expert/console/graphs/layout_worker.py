@@ -23,7 +23,7 @@ class LayoutWorker:
     """
 
     def __init__(self, command: str = 'dot', limit_s: float = DOT_LIMIT_S) -> None:
-        """`command`: found in PATH; without it there are no layouts, and the page shows lists."""
+        """`command`: found in PATH. Without it there are no layouts, and the page shows lists."""
         self._command = shutil.which(command)
         self._limit_s = limit_s
         self._layouts: 'OrderedDict[str, Optional[GraphLayout]]' = OrderedDict()
@@ -38,7 +38,7 @@ class LayoutWorker:
             threading.Thread(target=self._run, name='layout', daemon=True).start()
 
     def find(self, text: str, done: Done) -> Optional[GraphLayout]:
-        """The layout of a graph; None where it cannot be had, or not yet.
+        """The layout of a graph, or None where it cannot be had, or not yet.
 
         :param done: called when it is there.
         """
@@ -55,7 +55,7 @@ class LayoutWorker:
         return None
 
     def wait(self, text: str, limit_s: float) -> Optional[GraphLayout]:
-        """The layout of a graph, within `limit_s`; None where it cannot be had, or not in time."""
+        """The layout of a graph, or None where there is none within `limit_s`."""
         there = threading.Event()
         found = self.find(text, there.set)
         if found is None and text in self._asked:

@@ -10,13 +10,13 @@ from .down_machines import DownMachines
 
 
 class DownMachineHand:
-    """For all pages; any thread."""
+    """For all pages. Any thread may use it."""
 
     def __init__(self, machines: DownMachines, audit: Audit) -> None:
         self._machines, self._audit = machines, audit
 
     def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
-        """Change one machine, and record it; takes as long as its store does."""
+        """Change one machine, and record it. It takes as long as its store does."""
         reply = self._try(command, person)
         self._audit.record(person, command.name, reply.ok, reply.message, command.arguments)
         return reply
@@ -34,7 +34,7 @@ class DownMachineHand:
 
 
 def _change(stopped: StoppedTrial, name: str, arguments: Mapping[str, Any], who: str) -> str:
-    """Do it; return what was done.
+    """Do it, and return what was done.
 
     :raises StoreError: where it cannot be done.
     """

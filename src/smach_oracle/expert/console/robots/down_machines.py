@@ -30,13 +30,13 @@ class _Looked(NamedTuple):
 
 
 class DownMachines:
-    """Looks at stores again and again, and changes what is in them; any thread.
+    """Looks at stores again and again, and changes what is in them. Any thread may use it.
 
     A machine that a living process holds is not down.
     """
 
     def __init__(self, stores: Sequence[str], sections: PageSections) -> None:
-        """`stores`: paths of stores; one that is not there yet may come."""
+        """`stores`: paths of stores. One that is not there yet may come."""
         self._stores, self._sections = tuple(stores), sections
         self._looked: Dict[str, _Looked] = {}
         # a look must not take a change of our own for a program that holds the machine
@@ -49,12 +49,12 @@ class DownMachines:
                 self._look()
 
     def change(self, key: str, seen: int, work: Callable[[StoppedTrial], str]) -> str:
-        """Have a machine changed that was down at the last look; return what `work` does.
+        """Have a machine changed that was down at the last look, and return what `work` does.
 
         :param key: of its row.
         :param seen: the moment that its row had.
-        :raises StoreError: where there is none, it has gone on since, or a program holds it; where
-            the stores do not answer in time; and what `work` raises.
+        :raises StoreError: where there is none, it has gone on since, or a program holds it. Where
+            the stores do not answer in time, and what `work` raises.
         """
         if not self._lock.acquire(timeout=BUSY_S):
             raise StoreError(BUSY.format(BUSY_S))
@@ -70,7 +70,7 @@ class DownMachines:
             self._lock.release()
 
     def _row_of(self, key: str) -> Optional[Dict[str, Any]]:
-        """Return the row of a machine of our stores; it may be held by now."""
+        """Return the row of a machine of our stores. It may be held by now."""
         for path in self._stores:
             looked = self._looked.get(path)
             for row in looked.rows if looked is not None else ():

@@ -27,7 +27,7 @@ _ENDS_WAIT = (OracleEvent.HEALTH_WAIT_END, OracleEvent.TRIAL_START, OracleEvent.
 
 
 class FollowedRobot:
-    """Fed by ROS threads; one thread calls `write_sections`."""
+    """Fed by ROS threads. One thread calls `write_sections`."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -45,11 +45,11 @@ class FollowedRobot:
         self._counts: Dict[str, List[List[Any]]] = {}
         self._trial = ''
         self._unwell = ''  # why it waits until it is well
-        # how its machines stand; None: they cannot be held
+        # how its machines stand. None means they cannot be held
         self.machines: Optional[List[MachineView]] = None
 
     def on_structure(self, message: SmachContainerStructure) -> None:
-        """A container's graph; most repeat what is known."""
+        """A container's graph. Most repeat what is known."""
         path = message.path.lstrip('/')
         edges = [
             GraphEdge(*each)
@@ -71,7 +71,7 @@ class FollowedRobot:
                 self.changed = True
 
     def on_rates(self, message: OracleRates) -> None:
-        """What was learned; a message covers one top machine."""
+        """What was learned. A message covers one top machine."""
         rates = rates_view(message)
         rows: Dict[str, List[Any]] = {}
         for row in message.transitions:
@@ -158,7 +158,7 @@ class FollowedRobot:
         sections.put('live ' + self.name, None)
 
     def source(self, nodes: FrozenSet[str]) -> Source:
-        """What it shows, to compare; `nodes`: those that publish it."""
+        """What it shows, to compare. `nodes`: those that publish it."""
         with self._lock:
             return Source(self.name, nodes, self.learns, {
                 path: frozenset(structure.states)
@@ -175,7 +175,7 @@ class FollowedRobot:
         self.changed = self._reshaped = True
 
     def _all_structures(self) -> Dict[str, ContainerGraph]:
-        """The structures of introspection; of other paths what rates and transitions show."""
+        """The structures of introspection. Of other paths what rates and transitions show."""
         found = dict(self._structures)
         for path, rates in self._rates.items():
             if path not in found:

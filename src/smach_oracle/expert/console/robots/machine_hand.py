@@ -27,7 +27,7 @@ NO_MACHINE = 'There is no machine {} of {} here.'
 NO_ANSWER = '{} has not answered within {:.0f} s: whether it has heard that is not known.'
 # by robot the paths of its containers
 Holdable = Callable[[], Mapping[str, Collection[str]]]
-# why a robot that is silent is not commanded; '' where it may be
+# why a robot that is silent is not commanded, or '' where it may be
 Refusal = Callable[[str, Optional[float]], str]
 _Key = Tuple[str, str, str]
 
@@ -51,11 +51,11 @@ class MachineHand:
         self._under_way: Dict[_Key, List['Future[Any]']] = {}  # of the loop alone
 
     def look_up(self) -> None:
-        """Learn where robots are stopped; call it again and again, in a thread of its own."""
+        """Learn where robots are stopped. Call it again and again, in a thread of its own."""
         self._calls.look_up(list(self._holdable()))
 
     async def stop(self, command: PageCommand, person: Person) -> CommandReply:
-        """Stop or pause, whatever else is at work; called in the loop."""
+        """Stop or pause, whatever else is at work. It is called in the loop."""
         reply = await self._stop(command, _by(person))
         self._note(command, person, reply)
         return reply
@@ -88,7 +88,7 @@ class MachineHand:
         return under_way[-1]
 
     def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
-        """Do what is no stop, and record it; takes as long as the robot's service does."""
+        """Do what is no stop, and record it. It takes as long as the robot's service does."""
         reply = self._try(command, _by(person))
         self._note(command, person, reply)
         return reply
@@ -111,7 +111,7 @@ class MachineHand:
         return CommandReply(response.ok, response.message)
 
     def _unknown(self, command: PageCommand) -> str:
-        """Why the console knows no such machine; '' where it does."""
+        """Why the console knows no such machine, or '' where it does."""
         robot, path = command.arguments['robot'], command.arguments['path']
         holdable = self._holdable()
         if robot not in holdable:

@@ -17,7 +17,7 @@ NOT_REACHED = (rospy.ServiceException, rospy.ROSException, OSError)
 
 
 class StopError(OracleError):
-    """A service that stops could not be reached; the text says why."""
+    """A service that stops could not be reached. The text says why."""
 
 
 class _AtAddress(rospy.ServiceProxy):
@@ -38,7 +38,7 @@ class StopCalls:
         self._addresses: Dict[str, str] = {}  # by robot
 
     def look_up(self, robots: Iterable[str]) -> None:
-        """Ask the master where their services are; what is known stays where it does not say."""
+        """Ask the master where their services are. What is known stays where it does not say."""
         master = rosgraph.Master(rospy.get_name())
         for robot in robots:
             try:

@@ -19,7 +19,7 @@ _CODES = {
 
 
 class CloudError(ValueError):
-    """A message that is not the cloud it should be; the text says why."""
+    """A message that is not the cloud it should be. The text says why."""
 
 
 class Cloud(NamedTuple):
@@ -39,7 +39,7 @@ def encode_cloud(message: PointCloud2) -> BrowserFile:
 
 
 def encode_points(cloud: Cloud, of: int) -> BrowserFile:
-    """The same of points that were thinned already; `of`: how many there were."""
+    """The same of points that were thinned already. `of`: how many there were."""
     low = cloud.points.min(axis=0) if len(cloud.points) else np.zeros(3)
     span = np.maximum(cloud.points.max(axis=0) - low, 1e-6) if len(cloud.points) else np.ones(3)
     packed = np.round((cloud.points - low) / span * 65535).astype('<u2')
@@ -53,7 +53,7 @@ def encode_points(cloud: Cloud, of: int) -> BrowserFile:
 
 
 def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
-    """At most so many points of a cloud, evenly taken, with their colours; else coloured by height.
+    """At most so many points of a cloud, evenly taken, with their colours, else coloured by height.
 
     :raises CloudError: for a message that contradicts itself, or too large a one.
     """

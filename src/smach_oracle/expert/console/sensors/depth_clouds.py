@@ -100,7 +100,7 @@ def cloud_of_depth(depth: Image, info: CameraInfo, colour: Optional[Image] = Non
                    most: int = MOST_SHOWN) -> Cloud:
     """At most so many points, evenly taken, in the camera's optical frame.
 
-    :param colour: gives colours where it is of the same moment and size; else distance does.
+    :param colour: gives colours where it is of the same moment and size, else distance does.
     :raises ImageError: for what is no depth image, too large a one, or a camera that is not
         calibrated.
     """

@@ -1,7 +1,7 @@
 """The mesh files that a robot description names, found on this machine and read as meshes alone.
 
 Names come from the parameter server, never from a browser. `package://NAME/PATH` is looked for
-within that package; an absolute path (with or without file://) is read where it ends as a mesh does
+within that package. An absolute path (with or without file://) is read where it ends as a mesh does
 and is a plain file of a mesh's size.
 """
 import os
@@ -18,10 +18,10 @@ _KINDS = ('stl', 'obj', 'dae')
 
 
 class MeshFiles:
-    """The mesh files of one robot; each is read once."""
+    """The mesh files of one robot. Each is read once."""
 
     def __init__(self, packages: Optional[rospkg.RosPack] = None) -> None:
-        """`packages`: where to look for them; None: ROS_PACKAGE_PATH."""
+        """`packages`: where to look for them. None means ROS_PACKAGE_PATH."""
         self._packages = packages
         self._read: Dict[str, Mesh] = {}
         self._bytes = 0

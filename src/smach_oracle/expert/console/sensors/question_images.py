@@ -1,4 +1,6 @@
-"""Camera images from the time when questions were asked, kept as files. Bounded; any thread.
+"""Camera images from the time when questions were asked, kept as files.
+
+Bounded. Any thread may use it.
 
 Those that a robot itself publishes (~failure_frames) come first: it had them before there was a
 question. For other robots the console takes images itself, as soon as the question appears.
@@ -38,15 +40,15 @@ class QuestionImage(NamedTuple):
 
     number: int
     topic: str
-    # after its question was asked; None: the robot's own, from the moment of the failure
+    # after its question was asked. None means the robot's own, from the moment of the failure
     late_s: Optional[float]
     width: int  # px of the original
     height: int
-    stamp_s: float = 0.0  # by the clock of its camera; 0 where it has none
+    stamp_s: float = 0.0  # by the clock of its camera, or 0 where it has none
 
 
 class ImageStore:
-    """Files by numbers; the oldest are forgotten."""
+    """Files by numbers. The oldest are forgotten."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -54,7 +56,7 @@ class ImageStore:
         self._numbers = itertools.count(1)
 
     def put(self, encoded: BrowserFile) -> int:
-        """Keep one; its number."""
+        """Keep one. Return its number."""
         with self._lock:
             number = next(self._numbers)
             self._files[number] = encoded
@@ -64,7 +66,7 @@ class ImageStore:
             return number
 
     def find(self, number: int) -> Optional[BrowserFile]:
-        """A file; None where it is not kept any more."""
+        """A file, or None where it is not kept any more."""
         with self._lock:
             return self._files.get(number)
 
@@ -153,7 +155,7 @@ class QuestionImages:
 
 def stored_images(files: ImageStore, topics: Sequence[str],
                 images: Sequence[CompressedImage]) -> Iterable[QuestionImage]:
-    """Keep a robot's images, four at most; those that cannot be encoded are left out."""
+    """Keep a robot's images, four at most. Those that cannot be encoded are left out."""
     for topic, image in list(zip(topics, images))[:4]:
         try:
             yield files.keep(topic[:200], image, None)
@@ -164,7 +166,7 @@ def stored_images(files: ImageStore, topics: Sequence[str],
 def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
     """As plain data.
 
-    :param asked_s: when the question was put, by the robot's ROS clock; 0: not known.
+    :param asked_s: when the question was put, by the robot's ROS clock. 0 means not known.
     """
     stamped = bool(image.stamp_s and asked_s)
     late = image.stamp_s - asked_s if stamped else image.late_s

@@ -147,7 +147,7 @@ def _plain(values: Iterable[float]) -> List[float]:
 
 
 def _box() -> Mesh:
-    """A box of 1 m; the other primitives have that size, too."""
+    """A box of 1 m. The other primitives have that size, too."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return Mesh(corners,

@@ -20,10 +20,10 @@ _RANK = [re.compile(pattern) for pattern in ('/(rgb|color|colour)/', 'image_(raw
 
 
 class RobotCameras:
-    """Asked by any thread; one thread declares, one writes sections."""
+    """Asked by any thread. One thread declares, one writes sections."""
 
     def __init__(self, sensors: SensorStreams, chosen: Mapping[str, Sequence[str]]) -> None:
-        """`chosen`: of a robot its topics, or names above topics; the setting."""
+        """`chosen`: of a robot its topics, or names above topics, the setting."""
         self._sensors = sensors
         self._chosen = chosen
         self._declared: Dict[str, List[str]] = {}
@@ -38,7 +38,7 @@ class RobotCameras:
         }
 
     def of(self, robot: str) -> List[SensorView]:
-        """A robot's own cameras in colour, the likeliest first; none where none is known."""
+        """A robot's own cameras in colour, the likeliest first. None where none is known."""
         images = [each for each in self._sensors.view() if each['kind'] == 'image']
         colour = [each for each in images if not _NO_COLOUR.search(each['topic'])]
         if robot in self._chosen:

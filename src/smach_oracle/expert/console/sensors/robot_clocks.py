@@ -1,4 +1,4 @@
-"""What a robot's clock says now, by the stamps of what it sends; and how old an image is by it.
+"""What a robot's clock says now, by the stamps of what it sends, and how old an image is by it.
 
 The robot, its cameras and the console may run on machines whose clocks differ, or by simulated
 time.
@@ -42,7 +42,7 @@ class RobotClocks:
             self._readings.pop(robot, None)
 
     def now_s(self, robot: str) -> Optional[float]:
-        """A robot's time, s; None where it has told none."""
+        """A robot's time, s, or None where it has told none."""
         reading = self._readings.get(robot)
         return None if reading is None else reading.stamp_s + time.monotonic() - reading.came_s
 
@@ -65,7 +65,7 @@ class ImageAges:
         self._cameras = cameras
 
     def age_s(self, topic: str, stamp_s: float) -> Optional[float]:
-        """Below 0 where the stamp is ahead of the clock; None where the age is not known."""
+        """Below 0 where the stamp is ahead of the clock, or None where the age is not known."""
         owner = next((robot for robot in self._clocks.robots()
                       if topic in self._cameras.topics_of(robot)), None)
         now_s = self._clocks.shared_now_s() if owner is None else self._clocks.now_s(owner)

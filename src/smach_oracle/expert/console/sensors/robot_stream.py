@@ -28,11 +28,11 @@ def robots_in(parameters: Sequence[str]) -> List[str]:
 
 
 class RobotStream(SensorStream):
-    """Its samples are the poses of the links; their geometries are in `appearance`."""
+    """Its samples are the poses of the links. Their geometries are in `appearance`."""
 
     def __init__(self, sensor: int, parameter: str, read: Callable[[str],
                                                                    Any] = rospy.get_param) -> None:
-        """`parameter` holds the robot's description; `read` gets it."""
+        """`parameter` holds the robot's description. `read` gets it."""
         super().__init__(sensor, parameter, DESCRIPTION)
         self._read = read
         self._read_s = 0.0
@@ -47,9 +47,9 @@ class RobotStream(SensorStream):
         self._transforms: Optional[_RecentTransforms] = None
 
     def appearance(self) -> RobotAppearance:
-        """How to draw the robot; takes some seconds for a new description.
+        """How to draw the robot. It takes some seconds for a new description.
 
-        :raises ValueError: where the description cannot be used; the text says why.
+        :raises ValueError: where the description cannot be used. The text says why.
         """
         with self._appearance_lock:
             urdf = self._urdf
@@ -89,7 +89,7 @@ class RobotStream(SensorStream):
         return at[:3], ''
 
     def take(self, message: JointState) -> None:
-        """Take in joint states; several nodes may each publish some of the joints."""
+        """Take in joint states. Several nodes may each publish some of the joints."""
         with self._positions_lock:
             if len(self._positions) + len(message.name) < MOST_JOINTS:
                 self._positions.update((name, value)

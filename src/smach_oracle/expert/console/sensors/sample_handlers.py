@@ -70,7 +70,7 @@ class SensorHandler(SignedInHandler):
 
 
 class RobotAppearanceHandler(SensorHandler):
-    """GET /model/NUMBER: a robot as of RobotAppearance.encoded; 422 with a text if that fails."""
+    """GET /model/NUMBER: a robot as of RobotAppearance.encoded. 422 with a text if that fails."""
 
     async def get(self, number: str) -> None:
         """Answer when it has been read."""

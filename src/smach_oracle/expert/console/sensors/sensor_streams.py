@@ -1,6 +1,6 @@
 """The sensors that people may watch: topics found by type, subscribed to only while watched.
 
-A browser names a sensor by the number that it was given here; whatever has no number cannot be
+A browser names a sensor by the number that it was given here. Whatever has no number cannot be
 named.
 """
 import itertools
@@ -59,15 +59,15 @@ class SensorStream:
         return self._subscriber is not None
 
     def newer(self, than: int) -> Optional[SensorSample]:
-        """The newest sample, None where it is number `than`; keeps the subscription alive."""
+        """The newest sample, None where it is number `than`. It keeps the subscription alive."""
         self._asked_s = time.monotonic()
         sample = self._sample
         return sample if sample is not None and sample.sequence != than else None
 
     def file_of(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
-        """A sample as a browser gets it, and its facts as JSON; several browsers share the work.
+        """A sample as a browser gets it, and its facts as JSON. Several browsers share the work.
 
-        :raises ValueError: for a message that cannot be shown; the text says why.
+        :raises ValueError: for a message that cannot be shown. The text says why.
         """
         with self._lock:
             key = (sample.sequence, width)
@@ -82,7 +82,7 @@ class SensorStream:
     def update_subscription(self, may_listen: bool) -> None:
         """Subscribe while somebody watches, unsubscribe when nobody does.
 
-        One thread calls it; a master may hang it.
+        One thread calls it. A master may hang it.
         """
         wanted = time.monotonic() - self._asked_s < IDLE_S
         if self._subscriber is None:
@@ -140,7 +140,7 @@ class SensorStreams:
         self._lock = threading.Lock()
 
     def find(self, sensor: int) -> Optional[SensorStream]:
-        """A sensor by its number; None where it has never been given."""
+        """A sensor by its number, or None where it has never been given."""
         return self._by_number.get(sensor)
 
     def on(self, topic: str) -> Optional[SensorStream]:
@@ -165,7 +165,7 @@ class SensorStreams:
                     number, topic, kind)
 
     def update_subscriptions(self) -> None:
-        """Subscribe and unsubscribe as needed; to be called often, by one thread."""
+        """Subscribe and unsubscribe as needed. It is to be called often, by one thread."""
         for sensor in self._all():
             listened = sum(each.listened for each in self._all())
             sensor.update_subscription(listened < MOST_LISTENED)

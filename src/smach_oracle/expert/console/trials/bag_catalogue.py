@@ -44,7 +44,7 @@ _ENDINGS = {'success': 'ended in success', 'failure': 'ended in failure', 'preem
 
 
 class RecordedTrialError(OracleError):
-    """A trial of a bag cannot be read; the text says why."""
+    """A trial of a bag cannot be read. The text says why."""
 
 
 class BagTrial(NamedTuple):
@@ -56,7 +56,7 @@ class BagTrial(NamedTuple):
 
 
 class BagCatalogue:
-    """`run` in a thread of its own; the rest from any thread."""
+    """`run` in a thread of its own, the rest from any thread."""
 
     def __init__(self, folders: Sequence[str], sections: PageSections) -> None:
         """`folders`: with bags in them or below."""
@@ -71,7 +71,7 @@ class BagCatalogue:
         self._notes: List[str] = []
 
     def run(self) -> None:
-        """Scan again and again until the node goes down; return at once without folders."""
+        """Scan again and again until the node goes down, and return at once without folders."""
         if not self._folders:
             return
         try:
@@ -103,7 +103,7 @@ class BagCatalogue:
         self.write_sections(0)
 
     def write_sections(self, waiting: int) -> None:
-        """Bring the section up to date; `waiting`: so many bags are still to be read."""
+        """Bring the section up to date. `waiting`: so many bags are still to be read."""
         with self._lock:
             trials = sorted(self._trials.values(), key=lambda each: -each.summary.start_time)
             broken = sorted({**self._refused, **self._broken}.items())
@@ -132,7 +132,7 @@ class BagCatalogue:
         return trial
 
     def replayed(self, trial: BagTrial, most_events: int) -> BagReply:
-        """The first events of a trial, in order, and its machines; read now.
+        """The first events of a trial, in order, and its machines. Read now.
 
         :raises RecordedTrialError: where its bags cannot be read any more.
         """
@@ -147,7 +147,7 @@ class BagCatalogue:
             raise RecordedTrialError('A bag of this trial is gone.') from err
 
     def _fresh(self) -> List[Tuple[str, FileState]]:
-        """The bags that are to be read, newest first; forgets those that are gone."""
+        """The bags that are to be read, newest first. It forgets those that are gone."""
         found = self._folders.find()
         self._notes, states = found.missing, found.states
         with self._lock:
@@ -167,7 +167,7 @@ class BagCatalogue:
                 self._drop(path)
 
     def _drop(self, path: str) -> None:
-        """Forget the trials of a bag; with the lock held."""
+        """Forget the trials of a bag, with the lock held."""
         for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
             del self._trials[trial_id]
 
@@ -179,7 +179,7 @@ class BagCatalogue:
             if path.endswith('.active'):
                 if self._is_written(path, state):
                     del self._read[path]
-                    return  # its trial runs; it is shown live
+                    return  # its trial runs. It is shown live
                 raise BagReadError(UNFINISHED)
             if state.size > MOST_BYTES:
                 raise BagReadError('it has {:.1f} GiB; at most {:.0f} are read'.format(

@@ -40,7 +40,7 @@ class BagFolders:
         return bool(self._places)
 
     def find(self) -> FoundBags:
-        """Look for bags; each is found once."""
+        """Look for bags. Each is found once."""
         found = FoundBags({}, {}, [])
         for place in self._real():
             if os.path.isdir(place):
@@ -92,7 +92,7 @@ class BagFolders:
             found.states[real] = FileState(status.st_size, status.st_mtime_ns)
 
     def _problem(self, real: str, mode: int) -> str:
-        """Why a file is not read; '' where it may be. `real`: its path without links."""
+        """Why a file is not read, or '' where it may be. `real`: its path without links."""
         if not any(real == place or real.startswith(_within(place)) for place in self._real()):
             return 'a link that leads out of the folder'
         if not stat.S_ISREG(mode):

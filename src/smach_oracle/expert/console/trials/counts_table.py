@@ -13,7 +13,7 @@ COUNTED = ('failures', 'recoveries', 'questions', 'answered')
 
 
 def has_oracle(counter: TrialCounter) -> bool:
-    """Whether a trial runs with an oracle; it does where nothing else is known yet."""
+    """Whether a trial runs with an oracle. It does where nothing else is known yet."""
     return counter.recovers is not False
 
 

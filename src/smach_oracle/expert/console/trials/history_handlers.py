@@ -27,14 +27,14 @@ class _HistoryHandler(SignedInHandler):
     _shared: HistoryRequests
 
     def prepare(self) -> None:
-        """Check access and who it is; refuse arguments."""
+        """Check access and who it is. Refuse arguments."""
         super().prepare()
         if self.request.query_arguments:
             raise tornado.web.HTTPError(400)
 
 
 class RecordedHandler(_HistoryHandler):
-    """GET /recorded/NUMBER: a trial of a bag as JSON; 422 with a text if unreadable."""
+    """GET /recorded/NUMBER: a trial of a bag as JSON. 422 with a text if unreadable."""
 
     async def get(self, number: str) -> None:
         """Answer when it has been read."""
@@ -49,7 +49,7 @@ class RecordedHandler(_HistoryHandler):
 
 
 class QuestionImageHandler(_HistoryHandler):
-    """GET /image/NUMBER: a camera image of a question; 404 where it is not kept any more."""
+    """GET /image/NUMBER: a camera image of a question. 404 where it is not kept any more."""
 
     def get(self, number: str) -> None:
         """Answer."""

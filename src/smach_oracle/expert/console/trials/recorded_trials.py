@@ -32,7 +32,7 @@ ImagesByQuestion = Dict[str, List[Dict[str, Any]]]  # as of image_view
 
 
 class RecordedTrials:
-    """Reads trials of bags; the last few are remembered. Any thread."""
+    """Reads trials of bags. The last few are remembered. Any thread may use it."""
 
     def __init__(self, catalogue: BagCatalogue, layouts: LayoutWorker, files: ImageStore) -> None:
         self._catalogue = catalogue

@@ -37,7 +37,7 @@ class RecoveryStatistics:
         self._trying: 'OrderedDict[Tuple[str, str], Dict[str, str]]' = OrderedDict()
 
     def add(self, robot: str, event: Event, failing_end: bool) -> None:
-        """Take in one event; `failing_end`: it ends its container or trial, and not well."""
+        """Take in one event. `failing_end`: it ends its container or trial, and not well."""
         trying = self._trying.setdefault((event.trial_id, event.path), {})
         if event.kind == EventKind.FAILURE:
             self._count(robot, event.path, event.state, trying.pop(event.state, None), False)

@@ -35,7 +35,7 @@ class _AccessToken(NamedTuple):
 class AccessTokens:
     """The tokens of a file, kept as digests only.
 
-    One a line, `ROLE TOKEN [NAME]`; `#` begins a comment.
+    One a line, `ROLE TOKEN [NAME]`. `#` begins a comment.
     """
 
     def __init__(self, text: str, where: str) -> None:
@@ -49,11 +49,11 @@ class AccessTokens:
                 key.update(self._entries[-1].digest)
         if not self._entries:
             raise SettingsError(where, 'no token', 'at least one line: ROLE TOKEN [NAME]')
-        # another set of tokens ends all sessions; a restart ends none
+        # another set of tokens ends all sessions. A restart ends none
         self.cookie_secret = key.hexdigest()
 
     def identify(self, token: str) -> Optional[Identity]:
-        """Whose token this is; takes the same time for every wrong one."""
+        """Whose token this is. It takes the same time for every wrong one."""
         digest = _digest(token)
         found = None
         for entry in self._entries:
@@ -93,7 +93,7 @@ class AllowedHosts:
     """
 
     def __init__(self, names: Iterable[str], addresses: bool) -> None:
-        """`addresses`: IP addresses are allowed, too; they need no name to be resolved."""
+        """`addresses`: IP addresses are allowed, too. They need no name to be resolved."""
         self._names = {name.lower().rstrip('.') for name in names} | {'localhost'}
         self._addresses = addresses
 

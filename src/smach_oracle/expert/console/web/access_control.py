@@ -23,16 +23,16 @@ class AccessControl:
         self.connections = OpenConnections()
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
-        # a page has some 100; a browser may open many pages
+        # a page has some 100. A browser may open many pages
         self.files = ClientRateLimits(rate=100.0, burst=2000.0, for_all=5.0)
         # wrong tokens: those that are answered as such, and those that are heard at all
         self.sign_ins = ClientRateLimits(rate=0.2, burst=5.0, for_all=4.0)
         self.wrong_tokens = ClientRateLimits(rate=2.0, burst=20.0, for_all=5.0)
-        # id of a session -> when, s; of those whose cookie might still be good
+        # id of a session -> when, s, of those whose cookie might still be good
         self._ended: Dict[str, float] = {}
 
     def session(self, handler: tornado.web.RequestHandler) -> Optional[BrowserSession]:
-        """The session of a request's cookie; None where it has none of ours."""
+        """The session of a request's cookie, or None where it has none of ours."""
         session = sessions.from_text(
             handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
         over = session is None or session.id in self._ended or session.left_s <= 0.0
@@ -48,7 +48,7 @@ class AccessControl:
         self._ended[session.id] = now_s
 
     def identity(self, session: Optional[BrowserSession]) -> Optional[Identity]:
-        """The role and name of a session; None where it is not signed in any more, or too old.
+        """The role and name of a session, or None where it is not signed in any more, or too old.
 
         Without tokens everybody who gets here may do everything, for as long as the page is open.
         """
@@ -61,7 +61,7 @@ class AccessControl:
 
     def refusal(self, handler: tornado.web.RequestHandler,
                 limits: Optional[ClientRateLimits] = None, limited: bool = True) -> int:
-        """The status with which a request is refused; 0 where it may go on.
+        """The status with which a request is refused, or 0 where it may go on.
 
         :param limits: of its own, where it has any.
         :param limited: False: it is never too fast.
@@ -90,7 +90,7 @@ class AccessControl:
         return network_of(request.remote_ip or ''), False
 
     def from_own_page(self, handler: tornado.web.RequestHandler, must_say: bool) -> bool:
-        """Whether the Origin is this console; `must_say`: a request without one is refused, too."""
+        """Whether the Origin is this console. `must_say`: a request without one is refused, too."""
         headers = handler.request.headers
         origin = headers.get('Origin')
         if origin is None:

@@ -28,9 +28,11 @@ class Person(NamedTuple):
 
 
 class AuditTopic(rospy.SubscribeListener):
-    """A topic whose first subscriber also gets the records of the last seconds; any thread.
+    """A topic whose first subscriber also gets the records of the last seconds.
 
-    A recorder takes its time to connect; a person who is quick must not go unrecorded.
+    Any thread may use it.
+
+    A recorder takes its time to connect. A person who is quick must not go unrecorded.
     """
 
     def __init__(self, topic: str) -> None:
@@ -68,7 +70,7 @@ class AuditTopic(rospy.SubscribeListener):
 
 
 class Audit:
-    """Publishes the records; any thread."""
+    """Publishes the records. Any thread may use it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -17,7 +17,7 @@ from .access import RateLimit, network_of
 MOST_STRANGERS = 192  # connections that have shown no token, in all
 MOST_OF_A_NETWORK = 32  # of these from one address
 MOST_KNOWN = 320  # with a token, in all
-SPARED = 8  # of one address, as long as others have more; a browser opens six
+SPARED = 8  # of one address, as long as others have more. A browser opens six
 MOST_OF_A_SESSION = 64  # of these from one browser
 KEPT_FILES = 256  # for the ROS side, bags and the console itself
 
@@ -30,7 +30,7 @@ class OpenConnections:
     """
 
     def __init__(self, most_files: Optional[int] = None) -> None:
-        """`most_files`: that this process may open; by default as the system says."""
+        """`most_files`: that this process may open, by default as the system says."""
         files = most_files or resource.getrlimit(resource.RLIMIT_NOFILE)[0]
         # a new file has the lowest number that is free: one above means that the files run out
         self._highest_file = max(files // 2, files - KEPT_FILES)
@@ -40,7 +40,7 @@ class OpenConnections:
         self._known: Dict[tornado.iostream.IOStream, str] = {}  # session
 
     def admit(self, stream: tornado.iostream.IOStream, address: str) -> bool:
-        """Whether a new connection may stay; it or another one may be closed."""
+        """Whether a new connection may stay. It or another one may be closed."""
         network = self._strangers[stream] = network_of(address)
         if stream.socket.fileno() >= self._highest_file:
             self._forget_closed()
@@ -54,7 +54,7 @@ class OpenConnections:
         return not stream.closed()
 
     def heard(self, request: tornado.httputil.HTTPServerRequest, session: str) -> bool:
-        """Whether a request may go on; `session`: who has come with a token, '' for a stranger."""
+        """Whether a request may go on. `session`: who has come with a token, '' for a stranger."""
         stream = _stream_of(request)
         if stream is None or stream in self._known:
             return True

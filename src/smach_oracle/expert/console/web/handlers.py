@@ -57,7 +57,7 @@ class CheckedHandler(tornado.web.RequestHandler):
         """Our own check is in `demand_xsrf`."""
 
     def demand_xsrf(self, session: Optional[BrowserSession]) -> BrowserSession:
-        """The session, of a request that knows its token; any other is answered with 403."""
+        """The session, of a request that knows its token. Any other is answered with 403."""
         given = self.request.headers.get('X-Xsrf', '')
         if session is None or not sessions.same(given, sessions.xsrf_token(
                 session, self.access.secret)):
@@ -77,7 +77,7 @@ class SharedByRequests(Protocol):
 
 
 class SignedInHandler(CheckedHandler):
-    """A handler for our own pages, of people who are signed in; it has limits of its own."""
+    """A handler for our own pages, of people who are signed in. It has limits of its own."""
 
     def initialize(self, shared: SharedByRequests) -> None:
         """Called by Tornado."""
@@ -128,7 +128,7 @@ class SessionHandler(CheckedHandler):
         self._close = close
 
     def prepare(self) -> None:
-        """Check access; who comes with a right token is never too fast, whatever others try.
+        """Check access. Who comes with a right token is never too fast, whatever others try.
 
         Wrong ones have limits of their own, and so take nothing from those who load the page.
         """
@@ -196,7 +196,7 @@ class SessionHandler(CheckedHandler):
         self.finish(json.dumps(known))
 
     def _given(self) -> Optional[Identity]:
-        """Whose token comes with the request; None for a wrong one."""
+        """Whose token comes with the request, or None for a wrong one."""
         tokens = self.access.settings.tokens
         return tokens.identify(self._token()) if tokens is not None else None
 

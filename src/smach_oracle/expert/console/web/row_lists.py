@@ -51,7 +51,7 @@ class SentLists:
         self._sent: Dict[str, Optional[RowList]] = {}
 
     def changes(self, lists: RowLists) -> str:
-        """JSON of what the page lacks; '' where that is nothing, or it does not look."""
+        """JSON of what the page lacks, or '' where that is nothing, or it does not look."""
         if not self.looks:
             return ''
         parts = []
@@ -86,7 +86,7 @@ def _moved(old: Dict[str, str], new: Dict[str, str]) -> bool:
 
 
 def _placed(changed: Dict[str, str], rows: Dict[str, str]) -> List[Tuple[str, str]]:
-    """Each of the changed rows with the id of the one before it; '' for the first."""
+    """Each of the changed rows with the id of the one before it, or '' for the first."""
     before = dict(zip(rows, ['', *rows]))
     return [(before[key], row) for key, row in changed.items()]
 

@@ -13,7 +13,7 @@ _MOST_GONE = 2000  # that are remembered, for pages that do not know yet
 
 class _PageSection(NamedTuple):
     version: int
-    text: str  # JSON; 'null' for one that is gone
+    text: str  # JSON. 'null' for one that is gone
 
 
 class PageSections:
@@ -31,7 +31,7 @@ class PageSections:
         return self._version
 
     def put(self, name: str, data: object) -> None:
-        """Set a section to plain data without NaN; None takes it away."""
+        """Set a section to plain data without NaN. None takes it away."""
         if name in LISTS and isinstance(data, dict):
             self.lists.put(name, data)
             return
@@ -63,7 +63,7 @@ class PageSections:
             return self._version, changed
 
     def _forget_gone(self) -> None:
-        """Forget some of very many that are gone; with the lock held."""
+        """Forget some of very many that are gone, with the lock held."""
         gone = [name for name, section in self._sections.items() if section.text == 'null']
         if len(gone) > _MOST_GONE:
             for name in sorted(gone,

@@ -27,7 +27,7 @@ class BrowserSession(NamedTuple):
 
     @property
     def left_s(self) -> float:
-        """For how long it is still good, s; below 0 where it has become too old."""
+        """For how long it is still good, s. Below 0 where it has become too old."""
         return self.began_s + 3600.0 * HOURS - time.time()
 
 
@@ -45,7 +45,7 @@ def to_text(session: BrowserSession) -> str:
 
 
 def from_text(text: Optional[bytes]) -> Optional[BrowserSession]:
-    """The session that `to_text` has written; None for any other text."""
+    """The session that `to_text` has written, or None for any other text."""
     try:
         values = json.loads(text or b'null')
     except ValueError:
