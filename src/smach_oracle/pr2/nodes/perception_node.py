@@ -27,15 +27,22 @@ from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.parameters import name_of
 
 from ..kitchen import Kitchen, base_from_fridge, kitchen_from, shelf_point
-from ..perception.clusters import Capsule, NotSeen
+from ..perception.clusters import HERE, Capsule, NotSeen
 from ..perception.colours import name_of as name_of_colour
 from ..perception.drink import find_drink
 from ..perception.own_limbs import limbs_of
-from ..perception.tabletop import Look, Tabletop, find_tabletop, things_on_table
-from ..robot import BASE_FRAME, Robot
+from ..perception.tabletop import (
+    Look,
+    Tabletop,
+    distance_from,
+    find_tabletop,
+    things_on_table,
+)
+from ..planning.arm import SkillError
+from ..robot import ODOM_FRAME, Robot
 from ..ros_robot import NO_PASS_TIME, NO_SNAPSHOT, RosRobot
 from ..work_costs import Work
-from .frames import box_messages
+from .frames import box_messages, point_in_base
 from .skill_server import PartResultError, ReportStatus, SkillServer
 
 HIGHEST_LEAST = 0.3  # m: what is asked for as `min_height`
@@ -70,11 +77,11 @@ class Perception:
         image = self._robot.see()
         limbs = self._limbs()
         self._robot.spend('perception', DETECTION)
-        like = _look(goal)
-        with told_where_to_look(image):
-            found = find_tabletop(image, lowest, limbs, like)
+        like, near = _look(goal), self._near(goal.nearest_to)
+        with told_where_to_look(image, self._robot.odom_from_base()):
+            found = find_tabletop(image, lowest, limbs, like, near)
             if like is None:
-                self._look_beside(image, found)
+                self._look_beside(image, found, near)
         report('{} objects'.format(len(found.objects)))
         objects = [box_messages(box, _stamp(image)) for box in found.objects]
         return DetectTabletopResult(table=box_messages(found.table, _stamp(image))[0],
@@ -100,8 +107,22 @@ class Perception:
             find_drink(image, self._kitchen, fridge, lowest, limbs, goal.colour), _stamp(image))
         return DetectDrinkResult(drink=pose, size=size)
 
-    def _look_beside(self, image: CameraImage, found: Tabletop) -> None:
+    def _near(self, point: PointStamped) -> np.ndarray:
+        """(2,) m or more in the frame of the base, from which "nearest" counts.
+
+        :raises NotSeen: for a point that is not allowed.
+        """
+        if not point.header.frame_id:
+            return HERE
+        try:
+            return point_in_base(point, self._robot, 'nearest_to')
+        except SkillError as err:
+            raise NotSeen(str(err)) from err
+
+    def _look_beside(self, image: CameraImage, found: Tabletop, near: np.ndarray) -> None:
         """Glance at parts of the table that the image cuts off, then look where it showed.
+
+        :param near: (2,) m or more, from which "nearest" counts.
 
         :raises NotSeen: where something stands there that is nearer than the first object.
         """
@@ -111,7 +132,7 @@ class Perception:
             glance, limbs = self._robot.see(), self._limbs()
             self._robot.spend('perception', DETECTION)
             for box in things_on_table(glance, limbs):
-                if np.hypot(*box.centre[:2]) < np.hypot(*first[:2]) - NEARER:
+                if distance_from(near, box.centre) < distance_from(near, first) - NEARER:
                     raise NotSeen('something nearer stands beside what the image showed',
                                   box.centre)
         if found.beyond:
@@ -123,7 +144,7 @@ class Perception:
 
 
 def _look(goal: DetectTabletopGoal) -> Optional[Look]:
-    """What the object that a goal asks for looks like; None where it asks for the nearest one.
+    """What the object that a goal asks for looks like, or None where it asks for the nearest one.
 
     :raises NotSeen: for numbers that are not allowed.
     """
@@ -137,20 +158,23 @@ def _look(goal: DetectTabletopGoal) -> Optional[Look]:
 
 
 @contextlib.contextmanager
-def told_where_to_look(image: CameraImage) -> Iterator[None]:
-    """Where what fails knows it, the action's result says where to look to see more."""
+def told_where_to_look(image: CameraImage, odom_from_base: np.ndarray) -> Iterator[None]:
+    """Where what fails knows it, the action's result says where to look to see more.
+
+    It says so in odom_combined: the robot may have driven when it looks there.
+    """
     try:
         yield
     except NotSeen as err:
         if err.where is None:
             raise
-        header = Header(frame_id=BASE_FRAME, stamp=_stamp(image))
-        raise PartResultError(
-            str(err), {'look_at': PointStamped(header, Point(*err.where))}) from err
+        header = Header(frame_id=ODOM_FRAME, stamp=_stamp(image))
+        where = Point(*apply(odom_from_base, err.where))
+        raise PartResultError(str(err), {'look_at': PointStamped(header, where)}) from err
 
 
 def _message_of(colour: np.ndarray) -> ColorRGBA:
-    """A colour (3,), 0 to 255, as a message; with a 0 where it is too dark to tell."""
+    """A colour (3,), 0 to 255, as a message, with a 0 where it is too dark to tell."""
     return ColorRGBA(*(colour / 255.0), 1.0 if name_of_colour(colour) else 0.0)
 
 
@@ -196,7 +220,7 @@ def kitchen_at(parameter: str) -> Kitchen:
     """The map that a parameter names as a file, or gives as a dictionary.
 
     :returns: the usual map where the parameter is `none`.
-    :raises ValueError: for what is not a map; names the parameter.
+    :raises ValueError: for what is not a map. The error names the parameter.
     """
     value: object = rospy.get_param(parameter, 'none')
     if value in ('none', ''):

@@ -9,7 +9,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.outer_points import outer_points
 from smach_oracle.geometry.plane import Plane
 
-from .clusters import COLUMNS, Cluster
+from .clusters import COLUMNS, HERE, Cluster
 
 # pixels of an image of COLUMNS columns: less has been lost at the edges of things
 NARROWEST = 5
@@ -41,11 +41,12 @@ def dazzled(image: CameraImage) -> bool:
 
 
 def blind_distance(image: CameraImage, blind: np.ndarray, plane: Plane,
-                   patch: np.ndarray) -> Optional[float]:
-    """m from the robot to the nearest place on a surface that is behind a blind patch.
+                   patch: np.ndarray, near: np.ndarray = HERE) -> Optional[float]:
+    """m from a point to the nearest place on a surface that is behind a blind patch.
 
     :param blind: as from blind_patches().
     :param patch: (n, 3) points of the surface.
+    :param near: (2,) m or more, the point.
     :returns: None where no such patch lies before the surface.
     """
     rows, columns = np.nonzero(blind)
@@ -67,7 +68,7 @@ def blind_distance(image: CameraImage, blind: np.ndarray, plane: Plane,
     there = there[(there @ edges[:, :2].T + edges[:, 2] < 0.0).all(axis=1)]
     if len(there) < LEAST_PATCH:
         return None
-    return float(np.percentile(np.hypot(*there.T), 5))
+    return float(np.percentile(np.hypot(*(there - near[:2]).T), 5))
 
 
 def blind_beside(blind: np.ndarray, cluster: Cluster) -> bool:

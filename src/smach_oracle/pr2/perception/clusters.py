@@ -13,13 +13,15 @@ from smach_oracle.geometry.plane import Plane
 
 # that are looked at: enough for objects to have hundreds of points
 COLUMNS = 320
+HERE = np.zeros(2)  # m, the robot's own middle
 MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
 class NotSeen(Exception):
-    """What was looked for cannot be made out in the image; the text is the reason, for people.
+    """What was looked for cannot be made out in the image. The text is the reason, for people.
 
-    :param where: (3,) m in the frame of the base, at which to look to see more; None: not known.
+    :param where: (3,) m in the frame of the base, at which to look to see more. None means not
+        known.
     """
 
     def __init__(self, reason: str, where: Optional[np.ndarray] = None) -> None:
@@ -77,9 +79,9 @@ def generator_of(image: CameraImage) -> np.random.Generator:
 
 def clusters_on(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, lowest: float,
                 highest: float, margin: float = MARGIN) -> List[Cluster]:
-    """The clusters above a surface, in no order; a small one is taken for noise.
+    """The clusters above a surface, in no order. A small one is taken for noise.
 
-    :param patch: (n, 3) points of the surface; clusters stand within its convex hull.
+    :param patch: (n, 3) points of the surface. Clusters stand within its convex hull.
     :param lowest: m above the surface from which points count, up to `highest`.
     """
     seen = np.isfinite(cloud.points[..., 2])

@@ -10,6 +10,7 @@ from smach_oracle.geometry.plane import Plane, find_plane
 
 from .blind import blind_beside, blind_distance, blind_patches
 from .clusters import (
+    HERE,
     Capsule,
     Cluster,
     NotSeen,
@@ -46,8 +47,8 @@ class Look(NamedTuple):
 class Tabletop(NamedTuple):
     """What was found, in the frame of the base."""
 
-    table: UprightBox  # the part of the table's top that is in view; its height is 0
-    # the one that was asked for, then nearest first; the first one is fit for the gripper
+    table: UprightBox  # the part of the table's top that is in view. Its height is 0
+    # the one that was asked for, then nearest first. The first one is fit for the gripper
     objects: List[UprightBox]
     colours: List[np.ndarray]  # (3,) each, of the objects, 0 to 255
     # (3,) each, m: where to look for more of the table, which the image cuts off nearer than the
@@ -56,13 +57,15 @@ class Tabletop(NamedTuple):
 
 
 def find_tabletop(image: CameraImage, min_height: float = 0.02,
-                  limbs: Sequence[Capsule] = (), like: Optional[Look] = None) -> Tabletop:
+                  limbs: Sequence[Capsule] = (), like: Optional[Look] = None,
+                  near: np.ndarray = HERE) -> Tabletop:
     """The table and what stands on it.
 
-    :param min_height: m above the table; lower clusters are no objects. 0 or less: 0.02.
-    :param limbs: where the robot's own arms are, by its encoders; they are taken out of what is
+    :param min_height: m above the table. Lower clusters are no objects. 0 or less: 0.02.
+    :param limbs: where the robot's own arms are, by its encoders. They are taken out of what is
         seen.
-    :param like: what the object that is looked for looked like; None: it is the nearest one.
+    :param like: what the object that is looked for looked like. None means it is the nearest one.
+    :param near: (2,) m or more, from which "nearest" counts.
     :raises NotSeen: where there is no table, no object, or the one that is looked for cannot be
         told well enough to be grasped.
     """
@@ -77,9 +80,10 @@ def find_tabletop(image: CameraImage, min_height: float = 0.02,
         raise NotSeen(_no_table(cloud))
     lowest = max(OFF_TABLE, min_height if min_height > 0 else 0.02)
     clusters = sorted((part for each in clusters_on(cloud, plane, patch, lowest, TALLEST)
-                       for part in parts_by_colour(cloud, each, plane)), key=_distance)
+                       for part in parts_by_colour(cloud, each, plane)),
+                      key=lambda each: distance_from(near, each.box.centre))
     blind = blind_patches(image)
-    hidden = blind_distance(image, blind, plane, patch)
+    hidden = blind_distance(image, blind, plane, patch, near)
     if not clusters:
         raise NotSeen('there is nothing on the table that stands higher than {:.0f} cm{}{}'.format(
             100 * lowest, _hidden_by(cloud), '' if hidden is None else BLIND))
@@ -88,18 +92,19 @@ def find_tabletop(image: CameraImage, min_height: float = 0.02,
     else:
         target, what = _like(cloud, clusters, plane, like, hidden is not None), 'the object'
     _check(cloud, target, what)
+    away = distance_from(near, target.box.centre)
     if blind_beside(blind, target) or (like is None and hidden is not None
-                                       and hidden < _distance(target) + target.box.wide):
+                                       and hidden < away + target.box.wide):
         raise NotSeen('{} may be hidden in part, or something nearer{}'.format(what, BLIND))
     order = [target] + [each for each in clusters if not _overlap(each, target)]
     objects = [each for each in order if max(each.box.wide, each.box.size[2]) <= LARGEST]
     return Tabletop(_top(patch, plane), [each.box for each in objects],
                     [_colour(cloud, each) for each in objects],
-                    _beyond(cloud, plane, _distance(target)))
+                    _beyond(cloud, plane, away, near))
 
 
 def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
-    """All that stands on the table, whatever it is, in no order; [] where no table is seen.
+    """All that stands on the table, whatever it is, in no order, or [] where no table is seen.
 
     Parameters and boxes are as in find_tabletop().
     """
@@ -114,13 +119,14 @@ def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[U
             if max(each.box.wide, each.box.size[2]) <= LARGEST]
 
 
-def _beyond(cloud: OrganizedCloud, plane: Plane, distance: float) -> List[np.ndarray]:
+def _beyond(cloud: OrganizedCloud, plane: Plane, distance: float,
+            near: np.ndarray) -> List[np.ndarray]:
     """Where to look, (3,) each, for what may stand nearer than `distance` m beside the image."""
     found = []
     for edge in (cloud.points[:, :EDGE], cloud.points[:, -EDGE:]):
         points = edge[np.isfinite(edge[..., 2])]
         points = points[np.abs(plane.height(points)) < OFF_TABLE]
-        away = np.hypot(*points[:, :2].T)
+        away = np.hypot(*(points[:, :2] - near[:2]).T)
         if len(points) >= LEAST_EDGE and away.min() < distance:
             nearest = points[away.argmin()]
             aside = float(np.copysign(BESIDE, nearest[1]))
@@ -136,8 +142,9 @@ def _top(patch: np.ndarray, plane: Plane) -> UprightBox:
                         size=box.size * [1, 1, 0])
 
 
-def _distance(cluster: Cluster) -> float:
-    return float(np.hypot(*cluster.box.centre[:2]))
+def distance_from(near: np.ndarray, point: np.ndarray) -> float:
+    """Return how far apart two points, (2,) m or more, are in the plane, m."""
+    return float(np.hypot(*(point[:2] - near[:2])))
 
 
 def _colour(cloud: OrganizedCloud, cluster: Cluster) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""Whether a cluster of points is one thing or several that touch: by a waist, or two colours."""
-from typing import List, Optional, Tuple
+"""Whether a cluster of points is one thing or several that touch: by a waist, or by colours."""
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -15,28 +15,52 @@ WAIST = 0.65  # a slice in the middle narrower than this share of both its sides
 # difference of the shares of red, green and blue from which two sides have two colours
 CHROMA = 0.06
 LEAST_LENGTH = 0.06  # m: shorter things are one
+MOST_COLOURS = 4  # of a cluster
+LEAST_SHARE = 0.1  # of its points, that are of a third colour
 CELL = 0.012  # m: points of one colour that are closer than this belong together
 
 
 def parts_by_colour(cloud: OrganizedCloud, cluster: Cluster, plane: Plane) -> List[Cluster]:
-    """A cluster as the things of two colours that it is made of, or as it is where it has one.
+    """A cluster as the things of different colours that it is made of, or as it is.
 
     :param plane: of the surface on which it stands.
     """
-    box = cluster.box
-    ends = None if box.wide < LEAST_LENGTH else _end_shares(
-        _along(cluster)[:, 0], cloud.colour[tuple(cluster.pixels.T)].astype(float))
-    if ends is None or np.abs(ends[0] - ends[1]).max() <= CHROMA:
+    if cluster.box.wide < LEAST_LENGTH:
         return [cluster]
-    colours = cloud.colour[tuple(cluster.pixels.T)]
-    second = unlikeness(colours, ends[1]) < unlikeness(colours, ends[0])
-    parts = [part_of(cluster, chosen, plane) for chosen in (~second, second)]
+    colours = cloud.colour[tuple(cluster.pixels.T)].astype(float)
+    ends = _end_shares(_along(cluster)[:, 0], colours)
+    if np.abs(ends[0] - ends[1]).max() <= CHROMA:
+        return [cluster]
+    own = _with_those_between(cluster.points, colours, ends)
+    nearest = np.argmin([unlikeness(colours, each) for each in own], axis=0)
+    parts = [part_of(cluster, nearest == number, plane) for number in range(len(own))]
     found = [part for part in parts if part is not None]
-    return found if len(found) == len(parts) else [cluster]
+    return found if len(found) > 1 else [cluster]
+
+
+def _with_those_between(points: np.ndarray, colours: np.ndarray,
+                        ends: Sequence[np.ndarray]) -> List[np.ndarray]:
+    """The colours of a cluster's two ends, and of what is unlike both, (3,) each.
+
+    :param points: (n, 3) m.
+    :param colours: (n, 3).
+    """
+    found = list(ends)
+    while len(found) < MOST_COLOURS:
+        unlike = np.min([unlikeness(colours, each) for each in found], axis=0) > CHROMA
+        if unlike.sum() < max(LEAST_POINTS, LEAST_SHARE * len(points)):
+            break
+        piece = colours[unlike][largest_piece(points[unlike], CELL)]
+        between = np.median(piece / np.maximum(piece.sum(axis=1, keepdims=True), 1.0), axis=0)
+        if len(piece) < LEAST_POINTS or min(
+                float(unlikeness(between, each)) for each in found) <= CHROMA:
+            break  # the noise of one colour
+        found.append(between)
+    return found
 
 
 def part_of(cluster: Cluster, chosen: np.ndarray, plane: Plane) -> Optional[Cluster]:
-    """What some points of a cluster make by themselves; None where they are too few.
+    """What some points of a cluster make by themselves, or None where they are too few.
 
     :param chosen: (n,) bool. Those that lie apart from most of them are left out.
     """

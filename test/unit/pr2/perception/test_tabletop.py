@@ -7,6 +7,9 @@ from pr2_world import TABLE, extents, places, thing
 from ray_camera import INTRINSICS, WIDTH, camera_at, see
 
 from smach_oracle.geometry.depth import pixels_of
+from smach_oracle.geometry.transforms import transform
+from smach_oracle.pr2.nodes.perception_node import told_where_to_look
+from smach_oracle.pr2.nodes.skill_server import PartResultError
 from smach_oracle.pr2.perception.clusters import Capsule, NotSeen
 from smach_oracle.pr2.perception.tabletop import Look, find_tabletop
 from smach_oracle.simulation.scenes.scene import Body
@@ -127,6 +130,22 @@ def test_boxes_side_by_side_are_told_by_their_colours():
         assert np.allclose(box.centre[:2], (0.7, y), atol=0.008)
 
 
+def test_three_things_in_a_row_are_told_by_their_colours():
+    row = [can(0.70 + 0.02 * k, 0.062 * k, colour=colour)
+           for k, colour in enumerate(((0.16, 0.55, 0.25), (0.25, 0.8, 0.7), (0.14, 0.35, 0.75)))]
+    for seed in range(3):
+        found = find_tabletop(image_of([TABLE] + row, seed))
+        assert len(found.objects) == 3
+        assert all(np.linalg.norm(box.centre - body.position) < 0.012
+                   for box, body in zip(found.objects, row))
+
+
+def test_nearest_counts_from_where_one_says():
+    image = image_of([TABLE, can(0.65, -0.2), can(0.70, 0.2)])
+    assert find_tabletop(image).objects[0].centre[1] < 0
+    assert find_tabletop(image, near=np.array([0.0, 0.3])).objects[0].centre[1] > 0
+
+
 def test_what_was_seen_first_is_found_again_though_another_thing_is_nearer_by_now():
     first = find_tabletop(image_of([TABLE, can(0.65, 0.0), can(0.8, 0.2, colour=(0.8, 0.2, 0.1))]))
     seen = Look(first.colours[0], first.objects[0].size)
@@ -203,3 +222,13 @@ def test_what_the_edge_of_the_image_cuts_off_is_not_measured():
     aside = next(camera for camera in cameras
                  if pixels_of([body.position], INTRINSICS, camera)[0, 0] > WIDTH - 8)
     assert 'cut off by the edge' in reason(image_of([TABLE, body], camera=aside))
+
+
+def test_where_to_look_is_said_in_the_odometry_so_that_the_robot_may_drive():
+    stands = transform((0.0, 0.3, 0.0))
+    with pytest.raises(PartResultError) as error:
+        with told_where_to_look(image_of([TABLE]), stands):
+            raise NotSeen('cut off', np.array([0.5, 0.1, 0.7]))
+    target = error.value.fields['look_at']
+    assert target.header.frame_id == 'odom_combined'
+    assert (target.point.x, target.point.y, target.point.z) == pytest.approx((0.5, 0.4, 0.7))

@@ -7,7 +7,6 @@ import genpy
 from expert_fixtures import make_question
 from hypothesis import strategies as st
 
-import smach
 from smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
@@ -29,14 +28,12 @@ from smach_oracle.msg import (
     SharedAutonomyResult,
     UserdataItem,
 )
-from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import AnswerKind
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 from smach_oracle.ros.expert import client, server
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.hand import hand_server
-from smach_oracle.ros.hand.hand_server import HandServer
 from smach_oracle.ros.introspection.plain_pickle import RefusedDataError, decode_userdata
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 from smach_oracle.srv import (
@@ -51,8 +48,9 @@ from smach_oracle.srv import (
 )
 
 from .border import BOTH, REFUSED, TAKEN, Border, refused
-from .fake_ros import FakeHandle, SilentPublisher, fake_ros
+from .fake_ros import FakeHandle, fake_ros
 from .json_texts import json_texts, no_number, pickles
+from .kitchen_machine import kitchen_at_hand
 from .values import message, words
 
 _ids = words('q1', 'q2', '')
@@ -137,24 +135,9 @@ def _take_handed_over(result: SharedAutonomyResult) -> str:
 
 # -- an operator's hand
 
-def _machine() -> Any:
-    inner = smach.StateMachine(outcomes=['done'])
-    with inner:
-        smach.StateMachine.add('LOOK', smach.CBState(lambda ud: 'done', outcomes=['done']))
-    made = smach.StateMachine(outcomes=['done'])
-    with made:
-        smach.StateMachine.add('A', smach.CBState(lambda ud: 'done', outcomes=['done']),
-                               {'done': 'KITCHEN'})
-        smach.StateMachine.add('KITCHEN', inner)
-    return OracleContainer.wrap(made, name='task')
-
-
 def _hand(service: str) -> Callable[[Any], str]:
     def take(request: Any) -> str:
-        with fake_ros() as offered, mock.patch.multiple(
-                hand_server, ControlPublisher=SilentPublisher, ViewerCommands=SilentPublisher):
-            made, machine = HandServer(), _machine()
-            made.watch(machine)
+        with kitchen_at_hand() as (offered, _):
             return _told(offered.call('~oracle/' + service, request))
     return take
 
@@ -219,7 +202,7 @@ def _take_events(events: List[OracleEvent]) -> str:
     for event in events:
         log.add('/robot', event_of(event))
         robot.on_event(event)
-        _shown(log.events(event.trial_id, 0).events)
+        _shown([json.loads(each) for each in log.events(event.trial_id, 0)])
     _shown(log.overview())
     return _written(robot)
 
