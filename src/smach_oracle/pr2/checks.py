@@ -1,6 +1,6 @@
-"""What must hold before a PR2 looks for something: functions for the oracle's settings.
+"""What must hold before a PR2 looks for something, or takes it: functions for an oracle's settings.
 
-Each takes a machine's userdata, which it does not read. They look through the head camera, with the
+Each takes a machine's userdata, which it does not read. They use head camera and encoders, with the
 names of topics and services relative to the script's node. Where its parameter ~snapshot names no
 service, or `none`, the next image of a real camera counts.
 """
@@ -11,6 +11,7 @@ import rospy
 
 from smach_oracle.ros.parameters import name_of
 
+from .fingers import may_hold
 from .perception.blind import dazzled
 from .robot import BASE_FRAME, CAMERA_FRAME, RobotError
 from .ros_senses import RosSenses
@@ -55,6 +56,18 @@ def wait_for_light(userdata: Any) -> bool:
         else:
             rospy.sleep(AGAIN_S)
     return True
+
+
+def right_hand_may_hold(userdata: Any) -> bool:
+    """Whether something may be in the right hand, as after a pick that was stopped.
+
+    No encoder readings are no reason to think so.
+    """
+    try:
+        return may_hold(_eyes().senses.joints(), 'right')
+    except RobotError as err:
+        rospy.logwarn('pr2: whether the right hand holds something is not known: %s', err)
+        return False
 
 
 @functools.lru_cache(maxsize=1)

@@ -43,6 +43,9 @@ from .work_costs import Work
 
 NO_SNAPSHOT = 'none'
 NO_PASS_TIME = 'none'
+# wall s in which a gripper that closes has closed. A PR2's gripper_action answers a cancel with the
+# present gap and no effort: what the hand holds would fall.
+CLOSING_S = 2.0
 CONNECTED_S = 60.0  # wall s that a simulated robot may take to be there
 
 
@@ -54,7 +57,7 @@ class RosRobot:
     :param snapshot: service smach_oracle/Snapshot of a simulated world, which gives joint states,
         transforms and images with one stamp; NO_SNAPSHOT: whatever comes next, as on a real robot.
     :param pass_time: service smach_oracle/PassTime of a simulated world, to which the time is
-        charged that planning and perception take; NO_PASS_TIME, or no such service: nothing is.
+        charged that planning and perception take. NO_PASS_TIME, or no such service: nothing is.
     :param timeout_s: wall s that the robot may be silent, or not there, before a call fails.
     """
 
@@ -101,7 +104,7 @@ class RosRobot:
         ]
 
     def abort(self) -> None:
-        """Stop what moves now, and refuse all further calls until resume(); from any thread.
+        """Stop what moves now, and refuse all further calls until resume(), from any thread.
 
         Calls raise RobotError meanwhile.
         """
@@ -148,12 +151,12 @@ class RosRobot:
         return image
 
     def spend(self, what: str, work: Work) -> None:
-        """See Robot; nothing is charged to a robot that was told to stop."""
+        """See Robot. Nothing is charged to a robot that was told to stop."""
         if not self._aborted.is_set():
             self._time.spend(work.seconds, what)
 
     def follow(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray) -> None:
-        """See Robot; all of the joints belong to one arm.
+        """See Robot. All of the joints belong to one arm.
 
         :raises RobotError: for other joints, for shapes that do not fit, and where the controller
             refuses or fails.
@@ -179,7 +182,7 @@ class RosRobot:
                                                           result.error_string))
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
-        """See Robot; a gripper that stalls has not failed.
+        """See Robot. A gripper that stalls has not failed.
 
         :raises RobotError: where it did not carry out the command.
         """
@@ -188,7 +191,7 @@ class RosRobot:
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = float(position), float(max_effort)
         result = self._do(arm[0] + '_gripper_controller/gripper_action', goal, arm + ' gripper',
-                          stalls=True)
+                          stalls=True, ends_within_s=0.0 if position > 0 else CLOSING_S)
         return GripperState(result.position, result.effort, result.stalled, result.reached_goal)
 
     def torso(self, height: float) -> None:
@@ -214,24 +217,28 @@ class RosRobot:
         self._do('move_base', MoveBaseGoal(target), 'base')
 
     def _do(self, name: str, goal: genpy.Message, what: str,
-            stalls: bool = False) -> genpy.Message:
+            stalls: bool = False, ends_within_s: float = 0.0) -> genpy.Message:
         """Send a goal and wait for its result.
 
         :param stalls: a goal that was aborted still has a result (a gripper that holds
             something).
+        :param ends_within_s: wall s for which abort() lets it go on.
         :raises RobotError: where no controller takes it, it fails, or abort() is called.
         """
         with self._calls:
             link = self._ready(name, what)
             sent = link.send(goal, time.monotonic())
             cancelled_at: Optional[float] = None
+            until = time.monotonic() + ends_within_s
             while True:
                 event = sent.poll()
                 if event is not None and event.status:
                     return self._result(event, what, stalls)
                 self._check(link, sent, what)
                 now = time.monotonic()
-                if self._aborted.is_set() and cancelled_at is None:
+                if not self._aborted.is_set():
+                    until = now + ends_within_s
+                elif cancelled_at is None and now >= until:
                     cancelled_at = now
                     sent.cancel()
                 if cancelled_at is not None and now - cancelled_at > self._timeout_s:

@@ -1,10 +1,10 @@
-"""A light in the camera is waited for, in the world's time, and not forever."""
+"""A light in the camera is waited for, not forever; the fingers tell whether a hand may hold."""
 import collections
 
 import pytest
 
 from smach_oracle.pr2 import checks
-from smach_oracle.pr2.robot import RobotError
+from smach_oracle.pr2.robot import FINGER_JOINTS, RobotError
 
 
 class FakeCamera:
@@ -54,6 +54,16 @@ def test_a_light_that_stays_is_waited_for_only_so_long(eyes):
     made = eyes(10**6)
     assert checks.wait_for_light(None)
     assert made.time.spent['waiting'] == checks.LIGHT_MOVES_S
+
+
+@pytest.mark.parametrize('gap, holds', [(0.0, False), (0.01, False), (0.05, True), (0.09, False)])
+def test_fingers_that_something_keeps_apart_may_hold_it(eyes, gap, holds):
+    made = eyes(0)
+    made.senses.joints = lambda: {name: gap / 2 for name in FINGER_JOINTS['right']}
+    assert checks.right_hand_may_hold(None) == holds
+    made.senses.joints = lambda: made.senses.see('', '')
+    made.senses.broken = True
+    assert not checks.right_hand_may_hold(None)
 
 
 def test_without_an_image_nothing_is_waited_for(eyes):

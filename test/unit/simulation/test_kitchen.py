@@ -189,13 +189,16 @@ def next_of(machine, label):
                 if edge[0] == 'succeeded' and edge[1] == label)
 
 
-def stopped_after(robot, motions):
-    """A robot that is told to stop in the motion after so many, and takes calls again then."""
+def stopped_after(robot, motions, for_good=False):
+    """A robot that is told to stop in the motion after so many, and takes calls again then.
+
+    :param for_good: it does not.
+    """
     do, left = robot._do, [motions]
 
     def count(make):
         left[0] -= 1
-        if left[0] == -1:
+        if left[0] == -1 or for_good and left[0] < 0:
             raise RobotError('the robot was told to stop')
         return do(make)
     robot._do = count
@@ -222,6 +225,30 @@ def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended
         world.reset(world.scene)
         with pytest.raises(SkillError):
             hand_over()
+    world.close()
+
+
+@pytest.mark.parametrize('motions', [3, 5, 7, 99])
+def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(motions):
+    """99: it had ended, and nobody was told."""
+    world = World(draw(1, benign=True))
+    trial = drink_rehearsal.DrinkRetrievalRehearsal(world)
+    for _, work in trial.states[:5]:
+        work()
+    pick, do = trial.states[5][1], trial.robot._do
+    stopped_after(trial.robot, motions, for_good=True)
+    if motions < 99:
+        with pytest.raises((RobotError, SkillError), match='told to stop'):
+            pick()
+    else:
+        pick()
+    trial.robot._do = do
+    assert bool(world.holding('drink_0')) == (motions > 3)
+    pick()
+    for _, work in trial.states[6:]:
+        work()
+    world.step(60)
+    assert judge(world, world.scene.goal).success
     world.close()
 
 
@@ -324,7 +351,7 @@ def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeyp
     skills = KitchenSkills(SkillContext(DirectRobot(world), installed_model()), Kitchen())
     efforts = []
 
-    def slip(*given):
+    def slip(*given, **_):
         efforts.append(given[-2])
         raise ObjectSlipped('it slipped')
     monkeypatch.setattr(kitchen_skills, 'pick_from_fridge', slip)

@@ -1,4 +1,8 @@
 """The skills of the second use case over messages: the door, picking inside it, handing over."""
+from functools import partial
+
+from smach_oracle.geometry.box import UprightBox
+from smach_oracle.geometry.links import link_pose
 from smach_oracle.geometry.transforms import inverse, transform
 from smach_oracle.msg import (
     CloseDoorGoal,
@@ -16,9 +20,23 @@ from smach_oracle.msg import (
 from ..kitchen import Kitchen, base_from_fridge
 from ..perception.drink import things_on_shelf
 from ..perception.own_limbs import limbs_of
-from ..planning.arm import Arm, SkillContext, encoder_readings, known_arm, seed_of
+from ..planning.arm import (
+    Arm,
+    SkillContext,
+    SkillError,
+    encoder_readings,
+    known_arm,
+    seed_of,
+)
+from ..robot import BASE_FRAME, GRIPPER_OPEN, TOOL_FRAME
 from ..skills.door import close_door, open_door
-from ..skills.fridge_pick import pick_from_fridge
+from ..skills.fridge_pick import (
+    come_near,
+    leave,
+    pick_from_fridge,
+    seen_again,
+    take_out,
+)
 from ..skills.hand_over import hand_over
 from ..skills.localise import localise_at_fridge
 from ..skills.pick import FIRM, HeldObject
@@ -44,7 +62,7 @@ class KitchenSkills(Manipulation):
         return LocaliseAtFridgeResult(x=found.x, y=found.y, yaw=found.yaw)
 
     def open_door(self, goal: OpenDoorGoal, report: ReportStatus) -> OpenDoorResult:
-        """Open the refrigerator; what slipped before that is forgotten."""
+        """Open the refrigerator. What slipped before that is forgotten."""
         self.forget_slips()
         report('opening the refrigerator')
         return OpenDoorResult(angle=open_door(self.context, self.kitchen, known_arm(goal.arm)))
@@ -56,22 +74,65 @@ class KitchenSkills(Manipulation):
         return CloseDoorResult()
 
     def pick(self, goal: PickGoal, report: ReportStatus) -> PickResult:
-        """Grasp an object and lift it; in the refrigerator, also take it out."""
+        """Grasp an object and lift it. In the refrigerator, also take it out.
+
+        What an earlier pick has closed on, and the hand still holds, is taken out.
+        """
         if goal.map_id != FRIDGE:
             return super().pick(goal, report)
         arm = known_arm(goal.arm)
-        target = box_in_base(goal.object, goal.size, self.context.robot, 'object')
+        robot = self.context.robot
+        target = box_in_base(goal.object, goal.size, robot, 'object')
+        if not self._taken_out(arm, report):
+            if self._is_inside(arm):
+                report('taking the hand out of the refrigerator')
+                leave(self.context, arm)
+            robot.gripper(arm, GRIPPER_OPEN)
+            there = come_near(self.context, self.kitchen, target, arm, goal.attempt)
+            self._pick_inside(goal, arm, there, there is not target, report)
+        return PickResult(grasp=pose_message(self.held[arm].grasp))
+
+    def _is_inside(self, arm: str) -> bool:
+        """Whether a hand is in the refrigerator."""
         fridge = base_from_fridge(self.kitchen, self.context.robot.odom_from_base())
+        joints = encoder_readings(self.context.robot)
+        tool = link_pose(self._links, BASE_FRAME, TOOL_FRAME[arm], joints)
+        return bool((inverse(fridge) @ tool)[0, 3] > 0.0)
+
+    def _taken_out(self, arm: str, report: ReportStatus) -> bool:
+        """Go on with an earlier pick, where the hand still holds what it has closed on."""
+        self.forget_let_go(arm)
+        if arm not in self.held:
+            return False
+        report('taking out what the {} hand holds'.format(arm))
+        try:
+            if take_out(self.context, self.kitchen, arm, self.held[arm]):
+                return True
+        finally:
+            self.forget_let_go(arm)
+        return False
+
+    def _pick_inside(self, goal: PickGoal, arm: str, target: UprightBox, driven: bool,
+                     report: ReportStatus) -> None:
+        """Pick a drink from where the base stands.
+
+        :param driven: whether the base has driven since the drink was seen.
+        """
         report('choosing a grasp in the refrigerator')
-        self.held.pop(arm, None)
-        limbs = limbs_of(self._links, encoder_readings(self.context.robot))
-        image = self.context.robot.see()
+        robot = self.context.robot
+        fridge = base_from_fridge(self.kitchen, robot.odom_from_base())
+        limbs = limbs_of(self._links, encoder_readings(robot))
+        image = robot.see()
         check_is_there(image, target)
         others = things_on_shelf(image, self.kitchen, fridge, limbs)
-        with self.firmer_after_slip(goal.attempt) as effort:
-            self.held[arm] = pick_from_fridge(self.context, self.kitchen, fridge, arm, target,
-                                              others, effort, elsewhere_of(goal.attempt))
-        return PickResult(grasp=pose_message(self.held[arm].grasp))
+        target = seen_again(target, others) if driven else target
+        try:
+            with self.firmer_after_slip(goal.attempt) as effort:
+                pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others, effort,
+                                 elsewhere_of(goal.attempt), grasped=partial(self.keep, arm))
+        except SkillError:
+            self.forget_let_go(arm)
+            raise
 
     def hand_over(self, goal: HandOverGoal, report: ReportStatus) -> HandOverResult:
         """Set down what is held on the palm that waits for it."""

@@ -1,5 +1,6 @@
 """The manipulation skills over messages: goals in, results out. The node gives them servers."""
 import contextlib
+from functools import partial
 from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Type
 
 import numpy as np
@@ -23,6 +24,7 @@ from smach_oracle.msg import (
 )
 from smach_oracle.oracle.number_checks import is_number
 
+from ..fingers import may_hold, stands_open
 from ..kitchen import MapBox
 from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
@@ -37,7 +39,6 @@ from ..planning.arm import (
     encoder_readings,
     known_arm,
     seed_of,
-    stands_open,
 )
 from ..planning.collision_map import (
     MOST_BOXES,
@@ -100,7 +101,7 @@ class Manipulation:
         self._links = read_joints(context.model.urdf)
 
     def move_arms_aside(self, goal: MoveArmsAsideGoal, report: ReportStatus) -> MoveArmsAsideResult:
-        """Move both arms, or those named, to the robot's sides; forget what slipped before.
+        """Move both arms, or those named, to the robot's sides. Forget what slipped before.
 
         What a hand still holds over the spot where it took it is put down there first.
         """
@@ -156,7 +157,7 @@ class Manipulation:
         with self._withdrawing(arm, boxes):
             with self.firmer_after_slip(goal.attempt) as effort:
                 self.held[arm] = pick(self.context, arm, target, boxes, effort,
-                                      elsewhere_of(goal.attempt))
+                                      elsewhere_of(goal.attempt), partial(self.keep, arm))
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
@@ -189,9 +190,9 @@ class Manipulation:
             raise
         self.held.pop(arm, None)
         report('looking whether it stands there')
-        boxes['placed'] = MapBox(stood, held.half, 0.0)
-        arms_aside(self.context, [arm], boxes)
-        if not stands_there(self.context.robot.see(), stood, held):
+        arms_aside(self.context, [arm], {**boxes, 'placed': MapBox(stood, held.half, 0.0)})
+        others = [box for name, box in boxes.items() if name != 'table']
+        if not stands_there(self.context.robot.see(), stood, held, others):
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
 
@@ -234,15 +235,24 @@ class Manipulation:
                 for name, other in boxes.items() if name.startswith('object'))
         }
 
+    def keep(self, arm: str, held: HeldObject) -> None:
+        """A hand holds this from now on, also where the skill is stopped before its end."""
+        self.held[arm] = held
+
+    def forget_let_go(self, arm: str) -> None:
+        """Forget what a hand has held, where its fingers show that it holds nothing."""
+        if not may_hold(encoder_readings(self.context.robot), arm):
+            self.held.pop(arm, None)
+
     def forget_slips(self) -> None:
         """The next grip is as gentle as the first."""
         self._effort = FEEL_EFFORT
 
     @contextlib.contextmanager
     def firmer_after_slip(self, attempt: int = 0) -> Iterator[float]:
-        """How firmly to grip, N; where it slips even so, the next grip is the firmest.
+        """How firmly to grip, N. Where it slips even so, the next grip is the firmest.
 
-        :param attempt: how often it has been tried before; after the first time, the grip is firm.
+        :param attempt: how often it has been tried before. After the first time, the grip is firm.
         """
         try:
             yield FIRM if attempt else self._effort
@@ -257,7 +267,7 @@ class Manipulation:
         try:
             yield
         except errors:
-            self.held.pop(arm, None)
+            self.forget_let_go(arm)
             try:
                 arms_aside(self.context, [arm], boxes)
             except SkillError:
@@ -277,7 +287,7 @@ class Manipulation:
                 self._put_back(arm, self._seen(own).boxes)
 
     def _put_back(self, arm: str, boxes: Dict[str, MapBox]) -> None:
-        """Put an object that the hand still holds straight down; a hand that stands open has none.
+        """Put an object that the hand still holds straight down. A hand that stands open has none.
 
         What was held may have been taken from the hand since then, or have been in another trial's
         world.

@@ -6,16 +6,15 @@ import numpy as np
 
 from smach_oracle.geometry.transforms import apply, from_rpy
 
+from ..fingers import LEAST_GAP
 from ..kitchen import MapBox
-from ..robot import ARM_JOINTS, ARMS, FINGER_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
+from ..robot import ARM_JOINTS, ARMS, GRIPPER_OPEN, GripperState, Robot, RobotError
 from ..work_costs import Work
 from .collision import CollisionModel, CollisionWorld
 from .planner import BUDGET, PlanningError, plan, straight, timed
 
 FAST, SLOW = 0.45, 0.2  # of the joints' velocity limits
 FEEL_EFFORT = 40.0  # N with which the gripper closes
-LEAST_GAP = 0.012  # m between the tips, below which there is nothing in the hand
-WIDE_OPEN = 0.0025  # m that the gap may lack
 READY = {
     'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
     'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])
@@ -24,7 +23,7 @@ ENOUGH = 3  # solutions of the inverse kinematics that are tried for one pose
 
 
 class SkillError(Exception):
-    """The robot could not do what it was asked to; the text is the reason, for people."""
+    """The robot could not do what it was asked to. The text is the reason, for people."""
 
 
 class SkillContext(NamedTuple):
@@ -49,9 +48,9 @@ def seed_of(*parts: object) -> int:
 
 
 class Arm:
-    """An arm at work among boxes. Use it in a `with`; it then drops its collision world.
+    """An arm at work among boxes. Use it in a `with`. It then drops its collision world.
 
-    Joint positions are (7,), rad; poses are 4x4, base_footprint from tool.
+    Joint positions are (7,), rad. Poses are 4x4, base_footprint from tool.
     """
 
     def __init__(self, context: SkillContext, arm: str, boxes: Mapping[str, MapBox],
@@ -105,7 +104,7 @@ class Arm:
         """Joint positions free of collision that take the tool to `pose`, nearest to `near` first.
 
         :param near: where None, the arm's usual posture.
-        :returns: (7,) each; [] where all of them collide.
+        :returns: (7,) each, or [] where all of them collide.
         :raises Unreachable: where no joint positions at all take it there.
         """
         seed = READY[self.name] if near is None else near
@@ -123,7 +122,7 @@ class Arm:
              budget: int = BUDGET) -> np.ndarray:
         """A path (m, 7) around the obstacles.
 
-        :param start: (7,); where None, where the arm is now.
+        :param start: (7,). Where None, where the arm is now.
         :param budget: collision checks at most.
         :raises PlanningError: where none is found.
         """
@@ -182,7 +181,7 @@ class Arm:
     def close(self, effort: float = FEEL_EFFORT) -> float:
         """Close the gripper with `effort` N.
 
-        :returns: m, the gap that something keeps open; 0 where there is nothing.
+        :returns: m, the gap that something keeps open, or 0 where there is nothing.
         :raises SkillError: where the gripper fails.
         """
         state = self._gripper(0.0, effort)
@@ -238,15 +237,6 @@ def arm_positions(joints: Mapping[str, float], arm: str) -> np.ndarray:
     if missing:
         raise SkillError('no encoder reading of {}'.format(', '.join(missing)))
     return np.array([joints[name] for name in ARM_JOINTS[arm]])
-
-
-def stands_open(joints: Mapping[str, float], arm: str) -> bool:
-    """Whether a gripper is as wide open as it gets, by its encoders.
-
-    Nothing that it can hold is as wide.
-    """
-    gap = sum(joints.get(name, 0.0) for name in FINGER_JOINTS[arm])
-    return gap > GRIPPER_OPEN - WIDE_OPEN
 
 
 def lifted(pose: np.ndarray, height: float) -> np.ndarray:

@@ -23,7 +23,7 @@ BELOW_TOP = 0.02  # m, hand level
 
 
 def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
-    """Ways to take a thing, the most natural first; [] where it is too wide from everywhere.
+    """Ways to take a thing, the most natural first, or [] where it is too wide from everywhere.
 
     :param box: in base_footprint.
     :returns: poses of the tool (4x4, in base_footprint) when the gripper closes.
@@ -34,18 +34,21 @@ def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
 
 
 def others_first(found: List[np.ndarray], failed: int) -> List[np.ndarray]:
-    """The same grasps, with those last that are like the first ones.
+    """The same grasps, with those last that are like the ones that have failed.
+
+    Then those come first that are least like the most natural one.
 
     :param found: as from grasps().
     :param failed: how many kinds of grasp have failed: as many inclinations of the hand come last.
     """
-    kinds: List[float] = []
-    for grasp in found:
-        if _inclination(grasp) not in kinds:
-            kinds.append(_inclination(grasp))
-    rank = {kind: number for number, kind in enumerate(kinds[failed % max(1, len(kinds)):] +
-                                                       kinds[:failed % max(1, len(kinds))])}
-    return sorted(found, key=lambda grasp: rank[_inclination(grasp)]) if failed else list(found)
+    if not failed or not found:
+        return list(found)
+    natural = _inclination(found[0])
+    kinds = sorted({_inclination(grasp) for grasp in found},
+                   key=lambda kind: (kind != natural, -abs(kind - natural)))
+    last = failed % len(kinds)
+    rank = {kind: number for number, kind in enumerate(kinds[last:] + kinds[:last])}
+    return sorted(found, key=lambda grasp: rank[_inclination(grasp)])
 
 
 def _inclination(grasp: np.ndarray) -> float:

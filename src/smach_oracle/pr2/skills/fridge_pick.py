@@ -1,59 +1,150 @@
-"""Take a drink out of the refrigerator: grasp, lift, back out with the base, carry it."""
-from typing import Sequence
+"""Take a drink out of the refrigerator: grasp, lift, back out with the base, carry it.
+
+Where the program that asked for it was stopped, the drink may be in the hand, in the refrigerator
+or before it. The skill goes on from there.
+"""
+from typing import Sequence, Tuple
 
 import numpy as np
 
 from smach_oracle.geometry.box import UprightBox
-from smach_oracle.geometry.transforms import from_rpy
+from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
 
-from ..kitchen import Kitchen, MapBox
-from ..planning.arm import FEEL_EFFORT, Arm, SkillContext, SkillError, seed_of
+from ..kitchen import Kitchen, MapBox, base_from_fridge, odom_from_pose
+from ..planning.arm import FEEL_EFFORT, SLOW, Arm, SkillContext, SkillError, seed_of
 from ..planning.travel import carry, drive, stow
 from ..robot import GRIPPER_OPEN
 from .door import WIDE, named_boxes
-from .pick import HeldObject, ObjectSlipped, pick
+from .pick import Grasped, HeldObject, ObjectSlipped, nobody_told, pick, way_up
 
+# x, y in m and yaw in rad of the base, in the fridge's frame: from there the right arm reaches
+# far in
+PICKING = (-0.60, -0.20, 0.0)
+# m beside that, least and most, for which the base drives there: less does not matter, and from
+# farther away there may be something in the way
+BESIDE_PICKING = (0.10, 0.70)
+# m ahead of the base, and from its middle towards the other arm: where a drink should stand for the
+# second try, the third and so on
+AHEAD = ((0.65, 0.21), (0.65, 0.11), (0.70, 0.11))
+# x, and least and most y, m in the fridge's frame: no nearer to the fridge, and to its open door
+NEAREST, BETWEEN = -0.53, (-0.40, -0.07)
+STANDS_THERE = 0.02  # m
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
 PADDING = 0.03  # m, for the fridge is not quite where the map has it
 BESIDE = 0.004  # m around things on the shelf
+DRAWN_OUT = 0.05  # m that the base need not draw back
+OFF_SHELF = 0.03  # m that a drink which is drawn out is lifted, at least
+UP = (0.05, 0.03)  # m that it is lifted otherwise
+SAME_SIZE = 0.02  # m between the sizes of two boxes that are the same thing
+MOVED = 0.08  # m that a drive may misjudge the place of a drink
 SAME = 0.03  # m between the middles of two boxes that are the same thing
 
 
-def pick_from_fridge(context: SkillContext, kitchen: Kitchen, base_from_fridge: np.ndarray,
+def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray,
                      arm: str, target: UprightBox, others: Sequence[UprightBox],
-                     effort: float = FEEL_EFFORT, elsewhere: int = 0) -> HeldObject:
-    """Pick a drink and take it out, upright; where that fails, the hand leaves the fridge empty.
+                     effort: float = FEEL_EFFORT, elsewhere: int = 0,
+                     grasped: Grasped = nobody_told) -> HeldObject:
+    """Pick a drink and take it out, upright. Where that fails, the hand leaves the fridge empty.
 
-    :param base_from_fridge: 4x4, where the fridge is.
-    :param others: what else stands on the shelf; the drink itself may be among it.
+    :param fridge: 4x4, where it is, in base_footprint.
+    :param others: what else stands on the shelf. The drink itself may be among it.
     :param effort: N, of the grip.
     :param elsewhere: as in pick().
-    :raises SkillError: with the reason; ObjectSlipped where the drink did not come along.
+    :param grasped: as in pick().
+    :raises SkillError: with the reason. ObjectSlipped where the drink did not come along.
     """
     boxes = {
         name: _padded(box)
-        for name, box in named_boxes(kitchen, base_from_fridge, WIDE).items()
+        for name, box in named_boxes(kitchen, fridge, WIDE).items()
     }
     boxes.update({
         'thing {}'.format(k): MapBox(box.centre, box.size / 2 + BESIDE, box.yaw)
         for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
     })
     try:
-        held = pick(context, arm, target, boxes, effort, elsewhere)
+        held = pick(context, arm, target, boxes, effort, elsewhere, grasped)
         _draw_out(context)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
-            hand.space.attach(held.half, held.tool_from_object)
-            carry(hand)
-            if hand.close(effort) == 0:
-                raise ObjectSlipped('the drink was lost on the way out of the refrigerator')
+            _carry(hand, held)
     except SkillError:
-        _leave(context, arm)
+        leave(context, arm)
         raise
     return held
 
 
+def take_out(context: SkillContext, kitchen: Kitchen, arm: str, held: HeldObject) -> bool:
+    """Go on with a pick that was stopped once the hand had closed on a drink.
+
+    :returns: False where the hand turns out to hold nothing; it is open then.
+    :raises SkillError: where the drink cannot be taken out. The hand keeps it.
+    """
+    here = inverse(base_from_fridge(kitchen, context.robot.odom_from_base()))
+    inside = float(here[0, 3]) - PICKING[0] + STEP_BACK  # m that the base has not drawn back yet
+    with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
+        if hand.close(held.effort) == 0:
+            hand.open()
+            return False
+        if inside > DRAWN_OUT and hand.pose()[2, 3] < held.grasp[2, 3] + OFF_SHELF:
+            path = way_up(hand, hand.now(), hand.pose(), UP)
+            if path is not None:
+                hand.follow(path, SLOW)
+        if inside > DRAWN_OUT:
+            drive(context, context.robot.odom_from_base() @ from_rpy((-inside, 0.0, 0.0)))
+        _carry(hand, held)
+    return True
+
+
+def _carry(hand: Arm, held: HeldObject) -> None:
+    """Take a drink that is out of the fridge to the robot's side, and feel whether it came along.
+
+    :raises ObjectSlipped: where it did not.
+    """
+    hand.space.attach(held.half, held.tool_from_object)
+    carry(hand)
+    if hand.close(held.effort) == 0:
+        raise ObjectSlipped('the drink was lost on the way out of the refrigerator')
+
+
+def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: str,
+              attempt: int) -> UprightBox:
+    """Drive to where drinks are picked from, where the base stands beside that. Look at a drink.
+
+    Each time that a drink is picked again, the base stands otherwise. What is out of reach from one
+    place, or behind something, is not so from another.
+
+    :param target: the drink, in base_footprint.
+    :param arm: 'left' or 'right'.
+    :param attempt: how often it has been tried before.
+    :returns: the drink in base_footprint as it is then.
+    :raises SkillError: where the base does not get there.
+    :raises RobotError: where the head does not turn.
+    """
+    robot = context.robot
+    before = robot.odom_from_base()
+    goal = odom_from_pose(kitchen, *_picking_pose(kitchen, before, target, arm, attempt))
+    least = STANDS_THERE if attempt else BESIDE_PICKING[0]
+    if not least < np.hypot(*(before - goal)[:2, 3]) < BESIDE_PICKING[1]:
+        return target
+    drive(context, goal)
+    moved = inverse(robot.odom_from_base()) @ before
+    there = UprightBox(apply(moved, target.centre), target.size, target.yaw + yaw_of(moved))
+    robot.look_at(there.centre)
+    return there
+
+
+def _picking_pose(kitchen: Kitchen, odom_from_base: np.ndarray, target: UprightBox, arm: str,
+                  attempt: int) -> Tuple[float, float, float]:
+    """x, y in m and yaw in rad of the base, in the fridge's frame, for a try at picking a drink."""
+    if not attempt:
+        return PICKING
+    drink = apply(inverse(base_from_fridge(kitchen, odom_from_base)), target.centre)
+    ahead, beside = AHEAD[(attempt - 1) % len(AHEAD)]
+    y = drink[1] - (beside if arm == 'right' else -beside)
+    return min(float(drink[0]) - ahead, NEAREST), float(np.clip(y, *BETWEEN)), 0.0
+
+
 def _padded(box: MapBox) -> MapBox:
-    """The box, wider by what may be wrong; not higher, for things stand on shelves."""
+    """The box, wider by what may be wrong, not higher, for things stand on shelves."""
     return box._replace(half=box.half + [PADDING, PADDING, 0.0])
 
 
@@ -62,7 +153,19 @@ def _draw_out(context: SkillContext) -> None:
     drive(context, context.robot.odom_from_base() @ from_rpy((-STEP_BACK, 0.0, 0.0)))
 
 
-def _leave(context: SkillContext, arm: str) -> None:
+def seen_again(target: UprightBox, things: Sequence[UprightBox]) -> UprightBox:
+    """The drink where it is seen now, if that is a little beside where it should be.
+
+    :param things: what is seen on the shelf.
+    """
+    beside = [(float(np.hypot(*(box.centre - target.centre)[:2])), number)
+              for number, box in enumerate(things)
+              if np.abs(box.size - target.size).max() < SAME_SIZE]
+    distance, number = min(beside, default=(np.inf, -1))
+    return things[number] if SAME < distance < MOVED else target
+
+
+def leave(context: SkillContext, arm: str) -> None:
     """Take hand and base out of the fridge, so that the shelf can be seen again."""
     here = context.robot.odom_from_base()
     context.robot.gripper(arm, GRIPPER_OPEN)

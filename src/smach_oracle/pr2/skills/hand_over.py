@@ -10,6 +10,7 @@ import numpy as np
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
 
+from ..fingers import stands_open
 from ..kitchen import MapBox
 from ..planning.arm import (
     SLOW,
@@ -19,7 +20,6 @@ from ..planning.arm import (
     encoder_readings,
     lifted,
     seed_of,
-    stands_open,
 )
 from ..planning.travel import carry, draw_back, stow
 from .pick import HeldObject
@@ -29,7 +29,7 @@ PALM = 'palm'
 NEAR = 0.16  # m around the place where the palm is expected, horizontally
 LEVEL = 0.06  # m, vertically
 LEAST_POINTS = 150
-LEAST_EXTENT = 0.09  # m that a palm extends; a sleeve is narrower
+LEAST_EXTENT = 0.09  # m that a palm extends. A sleeve is narrower
 LEAST_HALF = 0.11  # m: part of it may be hidden
 THICK = 0.03  # m of a hand
 COLUMNS = 320  # that are looked at
@@ -39,7 +39,7 @@ LEAST_TOP = 40  # points
 
 
 def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:
-    """Set the held object down on a palm; an empty one succeeds where it is seen to stand there.
+    """Set the held object down on a palm. An empty one succeeds where it is seen to stand there.
 
     :param expected: (3,) m in base_footprint, the middle of the palm's upper face, right to some
         0.1 m.
@@ -108,7 +108,7 @@ def middle_of_top(image: CameraImage, expected: np.ndarray, height: float) -> Op
     """The middle (3,) of the top of what stands on a palm, in m in base_footprint.
 
     :param expected: as for hand_over().
-    :param height: m, of what stands there; right to some LEVEL.
+    :param height: m, of what stands there, right to some LEVEL.
     :returns: None where nothing as high is seen.
     """
     points = _near(image, expected + [0.0, 0.0, height])

@@ -1,5 +1,5 @@
 """Pick an object: choose a grasp, go there, close, feel, lift, feel again."""
-from typing import List, Mapping, NamedTuple, Optional, Sequence
+from typing import Callable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -25,8 +25,8 @@ from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
 
 APPROACH = 0.10  # m, straight, towards the object
-LIFTS = (0.10, 0.05)  # m, straight up; the lower one where the arm cannot go as high
-LEAST_LIFTS = (0.03,)  # m; encoders err: what was planned may be a little too high in the end
+LIFTS = (0.10, 0.05)  # m, straight up. The lower one where the arm cannot go as high
+LEAST_LIFTS = (0.03,)  # m. Encoders err: what was planned may be a little too high in the end
 # N, the strongest grip there is: of what has slipped, and of what a person put into the hand
 FIRM = 100.0
 MISSES = 2  # grasps that may close on nothing before the skill fails
@@ -48,6 +48,13 @@ class HeldObject(NamedTuple):
     effort: float = FEEL_EFFORT  # N, of the grip
 
 
+Grasped = Callable[[HeldObject], None]
+
+
+def nobody_told(held: HeldObject) -> None:
+    """Where nobody wants to know what the hand has closed on."""
+
+
 class _GraspPath(NamedTuple):
     """How to get at a grasp."""
 
@@ -56,7 +63,8 @@ class _GraspPath(NamedTuple):
 
 
 def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
-         effort: float = FEEL_EFFORT, elsewhere: int = 0) -> HeldObject:
+         effort: float = FEEL_EFFORT, elsewhere: int = 0,
+         grasped: Grasped = nobody_told) -> HeldObject:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
@@ -64,6 +72,7 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
     :param boxes: obstacles without the object, in base_footprint.
     :param effort: N, of the grip.
     :param elsewhere: how many of the ways to grasp it have failed: they come last.
+    :param grasped: is told what the hand has closed on, before it is lifted.
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
     candidates = others_first(grasps(target, arm), elsewhere) if arm in ('left', 'right') else []
@@ -76,10 +85,11 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
                 'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
                     100 * target.size[0], 100 * target.size[1]))
         hand.open()
-        return _pick(hand, target, candidates, effort)
+        return _pick(hand, target, candidates, effort, grasped)
 
 
-def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float) -> HeldObject:
+def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float,
+          grasped: Grasped) -> HeldObject:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
@@ -91,7 +101,7 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: f
         gap = hand.close(effort)
         if gap > 0:
             _check_width(hand, target, gap)
-            return _lift(hand, target, effort)
+            return _lift(hand, target, effort, grasped)
         missed += 1
         hand.open()
         hand.follow(path.approach[::-1], SLOW)
@@ -118,7 +128,7 @@ def _check_width(hand: Arm, target: UprightBox, gap: float) -> None:
 
 
 def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_GraspPath]:
-    """A path to a grasp (4x4); where there is none, None and one more reason."""
+    """A path to a grasp (4x4). Where there is none, None and one more reason."""
     try:
         starts = hand.reach(backed_off(grasp, APPROACH))
     except Unreachable:
@@ -133,7 +143,7 @@ def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Gras
         if approach is None:
             reasons.append('no straight way to the object')
             continue
-        if _way_up(hand, approach[-1], grasp, LIFTS) is None:
+        if way_up(hand, approach[-1], grasp, LIFTS) is None:
             reasons.append('no straight way up with the object')
             continue
         try:
@@ -143,12 +153,13 @@ def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_Gras
     return None
 
 
-def _lift(hand: Arm, target: UprightBox, effort: float) -> HeldObject:
+def _lift(hand: Arm, target: UprightBox, effort: float, grasped: Grasped) -> HeldObject:
     """Lift what the gripper has closed on, and feel whether it came along."""
     grasp = hand.pose()
     held = HeldObject(grasp, inverse(grasp) @ target.matrix, target.size / 2, effort)
+    grasped(held)
     hand.space.remove(TARGET)
-    path = _way_up(hand, hand.now(), grasp, LIFTS + LEAST_LIFTS)
+    path = way_up(hand, hand.now(), grasp, LIFTS + LEAST_LIFTS)
     if path is None:
         hand.open(GRIPPER_OPEN)
         raise SkillError('the arm cannot lift the object from where it grasped it')
@@ -158,7 +169,7 @@ def _lift(hand: Arm, target: UprightBox, effort: float) -> HeldObject:
     return held
 
 
-def _way_up(hand: Arm, start: np.ndarray, grasp: np.ndarray,
+def way_up(hand: Arm, start: np.ndarray, grasp: np.ndarray,
             heights: Sequence[float]) -> Optional[np.ndarray]:
     """A straight path (m, 7) upwards, by the first of these heights (m) that the arm can do.
 

@@ -22,7 +22,7 @@ from ..planning.arm import (
 )
 from ..planning.planner import PlanningError
 from .pick import HeldObject
-from .spots import USUAL, free_spots
+from .spots import USUAL, beyond, free_spots
 
 EFFORT = 40000  # collision checks for the choice of a path, about 3 s
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
@@ -34,6 +34,7 @@ SLACK = 0.16  # m that the height asked for may differ from the one at which the
 
 NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
+BLUR = 0.005  # m by which an edge is seen beside where it is
 LEAST_POINTS = 40
 COLUMNS = 320  # of an image that are looked at
 
@@ -58,7 +59,7 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
     :param centre: (3,) m, where its centre should be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it should stand.
-    :param tolerance: m that it may stand beside its place; 0: 2 cm.
+    :param tolerance: m that it may stand beside its place. 0 means 2 cm.
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
@@ -88,7 +89,7 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
 
 def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[str,
                                                                                MapBox]) -> None:
-    """Let go of an object where it was taken, if the arm is above that; elsewhere, where it is.
+    """Let go of an object where it was taken, if the arm is above that, elsewhere, where it is.
 
     :raises SkillError: where the hand does not open, or the arm does not follow its path.
     """
@@ -107,10 +108,12 @@ def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[s
         hand.open()
 
 
-def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject) -> bool:
+def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
+                 others: Sequence[MapBox] = ()) -> bool:
     """Whether an image shows something as high as the object at its place.
 
     :param centre: (3,) m in base_footprint, where the object's centre should be.
+    :param others: what stands beside the place. It does not count.
     """
     stride = image.stride(COLUMNS)
     points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
@@ -119,6 +122,8 @@ def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject) -> bo
     bottom = centre[2] - held.half[2]
     there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) &
                    (points[:, 2] < bottom + 3 * held.half[2])]
+    for box in others:
+        there = there[(beyond(there, box) >= BLUR).any(axis=1)]
     return len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
                                                         90) > bottom + UPRIGHT * 2 * held.half[2]
 
@@ -126,8 +131,7 @@ def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject) -> bo
 def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.ndarray:
     """The place asked for, at the height at which the object stands."""
     top = support.centre[2] + support.half[2]
-    inside = np.abs(transform(rotation=from_rpy((0, 0, 0), yaw=-support.yaw)[:3, :3])[:2, :2]
-                    @ (centre[:2] - support.centre[:2])) - support.half[:2]
+    inside = beyond(centre, support)
     height = top + held.half[2]
     x, y, z = centre
     if max(inside) > 0 or abs(z - height) > SLACK:

@@ -3,6 +3,8 @@ from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
 
+from smach_oracle.geometry.transforms import from_rpy
+
 from ..kitchen import MapBox
 
 GRID = 0.02  # m between spots
@@ -12,7 +14,7 @@ FARTHEST = 0.5  # m, of a tolerance
 
 
 def spots(centre: np.ndarray, tolerance: float) -> Iterator[np.ndarray]:
-    """Places (3,) within `tolerance` m of a place, the nearest first; 0: within USUAL."""
+    """Places (3,) within `tolerance` m of a place, the nearest first. 0 means within USUAL."""
     reach = tolerance if tolerance > 0 else USUAL
     steps = int(np.floor(reach / GRID + 1e-9))
     beside = [(GRID * i, GRID * j) for i in range(-steps, steps + 1)
@@ -43,7 +45,13 @@ def _overlaps(spot: np.ndarray, half: np.ndarray, box: MapBox) -> bool:
     """Whether something round that stands at a spot meets a box."""
     if abs(spot[2] - box.centre[2]) > half[2] + box.half[2]:
         return False
-    turn = np.array([[np.cos(box.yaw), np.sin(box.yaw)], [-np.sin(box.yaw), np.cos(box.yaw)]])
-    beyond = np.abs(turn @ (spot - box.centre)[:2]) - box.half[:2]
-    # m; the narrower side, for what is long may be turned
-    return float(np.hypot(*np.maximum(beyond, 0.0))) < min(half[:2]) + ROOM
+    outside = np.maximum(beyond(spot, box), 0.0)
+    # m. The narrower side, for what is long may be turned
+    return float(np.hypot(*outside)) < min(half[:2]) + ROOM
+
+
+def beyond(points: np.ndarray, box: MapBox) -> np.ndarray:
+    """(..., 2) m by which points (..., 3) lie beyond a box's sides, below 0 between them."""
+    turn = from_rpy((0, 0, 0), yaw=box.yaw)[:2, :2]
+    found: np.ndarray = np.abs((points - box.centre)[..., :2] @ turn) - box.half[:2]
+    return found
