@@ -3,7 +3,7 @@
 
 A plain SMACH script over actions. It stops a trial at the first action that fails. Whoever has a
 state executed again, in the same trial, has it done otherwise: the robot looks into the fridge from
-another head pose, and grips the drink firmer.
+another place and head pose, and grips the drink firmer.
 """
 import argparse
 import math
@@ -44,13 +44,15 @@ MIN_HEIGHT = 0.05  # m above the shelf
 ORDERED = 'red'  # the colour of the drink that the person has ordered
 # x, y in m, yaw in rad, in odom_combined
 IN_THE_FRIDGE = (1.00, -0.20, 0.0)
+BESIDE_THE_DOOR = (1.00, -0.60, 0.0)  # from where the shelf is seen otherwise
+LOOK_FROM = (IN_THE_FRIDGE, IN_THE_FRIDGE, BESIDE_THE_DOOR)
 OUT_OF_THE_FRIDGE = (0.68, -0.30, 0.0)
 HOME = (0.0, 0.0, math.pi / 2)
-PALM = (0.0, 0.62, 0.85)  # m; the middle of the palm that waits for the drink
+PALM = (0.0, 0.62, 0.85)  # m. The middle of the palm that waits for the drink
 
 
 def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
-    """Remember nothing yet, at the beginning of a trial; one that goes on has its memory.
+    """Remember nothing yet, at the beginning of a trial. One that goes on has its memory.
 
     The userdata has it, so it survives a crash: looks that did not show the drink, and picks.
     """
@@ -59,7 +61,7 @@ def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
 
 
 def detect_goal(userdata: smach.UserData, goal: DetectDrinkGoal) -> DetectDrinkGoal:
-    """Look for the drink; from another head pose after each look that did not show it."""
+    """Look for the drink. From another head pose after each look that did not show it."""
     return DetectDrinkGoal(MIN_HEIGHT, ORDERED, userdata.missed % 256)
 
 
@@ -68,8 +70,16 @@ def detected(userdata: smach.UserData, status: int, result: DetectDrinkResult) -
     userdata.missed += status != GoalStatus.SUCCEEDED
 
 
+def move_in_goal(userdata: smach.UserData, goal: MoveBaseGoal) -> MoveBaseGoal:
+    """Drive before the shelf; after two looks that did not show the drink, to another place.
+
+    A light that falls into the camera does so from one place, and what hides a drink does too.
+    """
+    return MoveBaseGoal(pose_on_floor(*LOOK_FROM[userdata.missed % len(LOOK_FROM)]))
+
+
 def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
-    """Pick the drink with the right arm; the door stands open on the left."""
+    """Pick the drink with the right arm. The door stands open on the left."""
     userdata.picks += 1
     return PickGoal('right', userdata.drink, userdata.size, FRIDGE, min(userdata.picks - 1, 255))
 
@@ -85,7 +95,9 @@ def make_machine() -> smach.StateMachine:
         smach.StateMachine.add('OPEN_FRIDGE',
                                action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
                                {'succeeded': 'MOVE_IN'})
-        smach.StateMachine.add('MOVE_IN', drive(*IN_THE_FRIDGE), {'succeeded': 'DETECT_DRINK'})
+        smach.StateMachine.add('MOVE_IN', action('move_base', MoveBaseAction, goal_cb=move_in_goal,
+                                                 input_keys=['missed']),
+                               {'succeeded': 'DETECT_DRINK'})
         smach.StateMachine.add('DETECT_DRINK',
                                action('detect_drink', DetectDrinkAction,
                                       goal_cb=detect_goal, result_cb=detected,
@@ -120,9 +132,13 @@ def torso(height_m: float) -> SimpleActionState:
 
 def drive(x_m: float, y_m: float, yaw: float) -> SimpleActionState:
     """A state that drives the base to a pose in odom_combined."""
+    return action('move_base', MoveBaseAction, goal=MoveBaseGoal(pose_on_floor(x_m, y_m, yaw)))
+
+
+def pose_on_floor(x_m: float, y_m: float, yaw: float) -> PoseStamped:
+    """A pose in odom_combined."""
     heading = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
-    target = PoseStamped(Header(frame_id=ODOM), Pose(Point(x_m, y_m, 0.0), heading))
-    return action('move_base', MoveBaseAction, goal=MoveBaseGoal(target))
+    return PoseStamped(Header(frame_id=ODOM), Pose(Point(x_m, y_m, 0.0), heading))
 
 
 def palm() -> PoseStamped:

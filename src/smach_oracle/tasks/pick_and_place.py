@@ -4,7 +4,9 @@
 A plain SMACH script over actions. It stops a trial at the first action that fails. Whoever has a
 state executed again, in the same trial, has it done otherwise: the head looks from elsewhere after
 a look that saw too little, the object is known again by its colour and size, and the gripper holds
-it firmer.
+it firmer. An object that could not be placed is held otherwise, mostly from above. No transition
+leads to STEP_ASIDE: it is for those who recover, where light falls into the camera or the object is
+out of reach.
 """
 import argparse
 import sys
@@ -13,6 +15,7 @@ from typing import Any, List, Optional, Sequence
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from std_msgs.msg import ColorRGBA, Header
 
 import smach
@@ -24,6 +27,7 @@ from smach_oracle.msg import (
     MoveArmsAsideAction,
     PickAction,
     PickGoal,
+    PickResult,
     PlaceAction,
     PlaceGoal,
     PointHeadAction,
@@ -33,11 +37,15 @@ from smach_oracle.srv import ResetWorld, ResetWorldRequest
 from smach_ros import SimpleActionState
 
 SERVER_WAIT_S = 20.0
-BASE = 'base_link'
+ODOM = 'odom_combined'  # its origin is where the robot stands at the table
 MIN_HEIGHT = 0.02  # m above the table
-# m in BASE, what the head is pointed at: the middle of the table, then beyond and before it. Each
+# m in ODOM, what the head is pointed at: the middle of the table, then beyond and before it. Each
 # shows all places at which the nearest object can stand
-VIEWS = ((0.65, 0.0, 0.75), (0.85, 0.0, 0.75), (0.50, 0.0, 0.75))
+VIEWS = ((0.65, 0.0, 0.801), (0.85, 0.0, 0.801), (0.50, 0.0, 0.801))
+# m in ODOM: further left the light falls elsewhere, and the right arm reaches what stands on the
+# left as well as the goal
+ASIDE = Point(0.0, 0.3, 0.0)
+REACH_LEFT = 0.25  # m to the left of the robot's middle, which the right arm reaches with ease
 PLACE_TOLERANCE = 0.045  # m, of the area on which the object may stand
 
 
@@ -46,27 +54,28 @@ MEMORY = {'input_keys': ['memory'], 'output_keys': ['memory']}
 
 
 def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
-    """Remember nothing yet, at the beginning of a trial; one that goes on has its memory."""
+    """Remember nothing yet, at the beginning of a trial. One that goes on has its memory."""
     if 'memory' not in userdata:
         userdata.memory = {
             'missed': 0,  # looks that did not show the object
             'look_at': None,  # PointStamped, where the last one said there is more to see
             'picks': 0,
-            # what the object looked like when it was first seen; a 0: not seen yet
+            # what the object looked like when it was first seen, a 0: not seen yet
             'colour': ColorRGBA(), 'size': Vector3()
         }
 
 
 def head_goal(userdata: smach.UserData, goal: PointHeadGoal) -> PointHeadGoal:
-    """Look at the table; from another head pose after each look that showed too little."""
+    """Look at the table. From another head pose after each look that showed too little."""
     view = VIEWS[userdata.memory['missed'] % len(VIEWS)]
-    return PointHeadGoal(userdata.memory['look_at'] or PointStamped(Header(frame_id=BASE),
+    return PointHeadGoal(userdata.memory['look_at'] or PointStamped(Header(frame_id=ODOM),
                                                                     Point(*view)))
 
 
 def detect_goal(userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTabletopGoal:
-    """Find the nearest object, and from then on that one."""
-    return DetectTabletopGoal(MIN_HEIGHT, userdata.memory['colour'], userdata.memory['size'])
+    """Find the object that is nearest to where the trial began, and from then on that one."""
+    return DetectTabletopGoal(MIN_HEIGHT, userdata.memory['colour'], userdata.memory['size'],
+                              PointStamped(header=Header(frame_id=ODOM)))
 
 
 def detected(userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
@@ -88,14 +97,26 @@ def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
                     min(picks, 255))
 
 
+def picked(userdata: smach.UserData, status: int, result: PickResult) -> None:
+    """Hold the object otherwise next time: it is picked again where it could not be placed so."""
+    if status == GoalStatus.SUCCEEDED:
+        userdata.memory = dict(userdata.memory, picks=userdata.memory['picks'] + 1)
+
+
+def object_in_reach(userdata: smach.UserData) -> bool:
+    """Whether the right arm reaches the detected object from where the robot stood then."""
+    return bool(userdata.objects[0].pose.position.y < REACH_LEFT)
+
+
 def make_machine() -> smach.StateMachine:
-    """The state machine of Fig. 5 in the paper, without its oracle."""
+    """The state machine of Fig. 5 in the paper, and a step aside, without its oracle."""
     sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'],
                             input_keys=['place_pose'])
     sm.register_start_cb(begin)
     with sm:
         smach.StateMachine.add('MOVE_ARMS_ASIDE', action('move_arms_aside', MoveArmsAsideAction),
                                {'succeeded': 'POINT_HEAD'})
+        smach.StateMachine.add('STEP_ASIDE', drive(ASIDE), {'succeeded': 'POINT_HEAD'})
         smach.StateMachine.add('POINT_HEAD',
                                action('point_head', PointHeadAction, goal_cb=head_goal, **MEMORY),
                                {'succeeded': 'DETECT_TABLETOP'})
@@ -111,7 +132,7 @@ def make_machine() -> smach.StateMachine:
             {'succeeded': 'PICK'})
         smach.StateMachine.add(
             'PICK',
-            action('pick', PickAction, goal_cb=pick_goal, output_keys=['memory'],
+            action('pick', PickAction, goal_cb=pick_goal, result_cb=picked, output_keys=['memory'],
                    input_keys=['objects', 'sizes', 'map_id', 'memory'], result_slots=['grasp']),
             {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', action('place', PlaceAction, goal_cb=place_goal,
@@ -125,15 +146,21 @@ def action(name: str, spec: type, **options: Any) -> SimpleActionState:
                              **options)
 
 
+def drive(place: Point) -> SimpleActionState:
+    """A state that drives the base to a place in ODOM, without a turn."""
+    target = PoseStamped(Header(frame_id=ODOM), Pose(place, Quaternion(0.0, 0.0, 0.0, 1.0)))
+    return action('move_base', MoveBaseAction, goal=MoveBaseGoal(target))
+
+
 def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
     """Place what the right arm holds, at a free spot near enough."""
     return PlaceGoal('right', userdata.place_pose, userdata.grasp, userdata.map_id, PLACE_TOLERANCE)
 
 
 def place_pose() -> PoseStamped:
-    """Where the object should stand (m, in the robot's base frame)."""
-    return PoseStamped(Header(frame_id=BASE),
-                       Pose(Point(0.6, -0.35, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    """Where the object should stand, m, in ODOM."""
+    return PoseStamped(Header(frame_id=ODOM),
+                       Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
 
 def find_reset() -> rospy.ServiceProxy:

@@ -1,7 +1,8 @@
 """What the use cases' scripts do otherwise when a state is executed again in the same trial."""
 import pytest
 from actionlib_msgs.msg import GoalStatus
-from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
+from move_base_msgs.msg import MoveBaseGoal
 from std_msgs.msg import ColorRGBA, Header
 
 import smach
@@ -11,8 +12,10 @@ from smach_oracle.msg import (
     DetectTabletopGoal,
     DetectTabletopResult,
     PickGoal,
+    PickResult,
     PointHeadGoal,
 )
+from smach_oracle.pr2.nodes.manipulation import elsewhere_of
 from smach_oracle.ros.stored.ros_codecs import offer_ros_codecs
 from smach_oracle.store.codecs import CODECS
 from smach_oracle.tasks import drink_retrieval, pick_and_place
@@ -59,9 +62,29 @@ def test_what_was_seen_first_is_the_object_until_the_trial_ends(userdata):
     assert goal().colour.r == 0.8, 'a trial that goes on after a crash has its memory'
 
 
+def test_nearest_is_nearest_to_where_the_trial_began(userdata):
+    near = pick_and_place.detect_goal(userdata, DetectTabletopGoal()).nearest_to
+    assert (near.header.frame_id, near.point) == ('odom_combined', Point())
+
+
+@pytest.mark.parametrize('y, reached', [(-0.3, True), (0.2, True), (0.4, False)])
+def test_what_stands_far_to_the_left_is_out_of_reach(userdata, y, reached):
+    userdata.objects = [PoseStamped(pose=Pose(Point(0.55, y, 0.8), Quaternion()))]
+    assert pick_and_place.object_in_reach(userdata) is reached
+
+
 def test_each_pick_of_a_trial_says_how_many_there_were_before(userdata):
     userdata.objects, userdata.sizes, userdata.map_id = [PoseStamped()], [Vector3()], 'map'
     assert [pick_and_place.pick_goal(userdata, PickGoal()).attempt for _ in range(3)] == [0, 1, 2]
+
+
+def test_what_was_picked_and_could_not_be_placed_is_held_otherwise_at_once(userdata):
+    userdata.objects, userdata.sizes, userdata.map_id = [PoseStamped()], [Vector3()], 'map'
+    assert pick_and_place.pick_goal(userdata, PickGoal()).attempt == 0
+    pick_and_place.picked(userdata, GoalStatus.ABORTED, PickResult())
+    assert pick_and_place.pick_goal(userdata, PickGoal()).attempt == 1
+    pick_and_place.picked(userdata, GoalStatus.SUCCEEDED, PickResult())
+    assert elsewhere_of(pick_and_place.pick_goal(userdata, PickGoal()).attempt) == 2
 
 
 def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_firmer(userdata):
@@ -75,6 +98,17 @@ def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_fi
     assert [drink_retrieval.pick_goal(userdata, PickGoal()).attempt for _ in range(2)] == [0, 1]
     drink_retrieval.begin(userdata)
     assert userdata.picks == 2, 'a trial that goes on after a crash has its memory'
+
+
+def test_the_shelf_is_looked_at_from_another_place_after_two_misses(userdata):
+    def place():
+        target = drink_retrieval.move_in_goal(userdata, MoveBaseGoal()).target_pose
+        assert target.header.frame_id == drink_retrieval.ODOM
+        return target.pose.position.x, target.pose.position.y
+    usual, beside = drink_retrieval.IN_THE_FRIDGE[:2], drink_retrieval.BESIDE_THE_DOOR[:2]
+    for expected in (usual, usual, beside, usual):
+        assert place() == expected == place()
+        drink_retrieval.detected(userdata, GoalStatus.ABORTED, DetectDrinkResult())
 
 
 def test_what_a_trial_remembers_can_be_stored(userdata):

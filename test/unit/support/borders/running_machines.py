@@ -2,40 +2,22 @@
 import contextlib
 import threading
 from typing import Any, Callable, Iterator
-from unittest import mock
 
 from waiting import wait_for
 
-import smach
-from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.operator_hand import OperatorHand
-from smach_oracle.ros.hand import hand_server
-from smach_oracle.ros.hand.hand_server import HandServer
 from smach_oracle.srv import CommandMachineRequest, SendMachineRequest
 
 from .border import TAKEN, Border, refused
-from .fake_ros import Offered, SilentPublisher, fake_ros
+from .fake_ros import Offered
+from .kitchen_machine import kitchen_at_hand
 from .values import message, words
-
-
-def _nested() -> OracleContainer:
-    inner = smach.StateMachine(outcomes=['done'])
-    with inner:
-        smach.StateMachine.add('LOOK', smach.CBState(lambda ud: 'done', outcomes=['done']))
-    made = smach.StateMachine(outcomes=['done'])
-    with made:
-        smach.StateMachine.add('KITCHEN', inner, {'done': 'B'})
-        smach.StateMachine.add('B', smach.CBState(lambda ud: 'done', outcomes=['done']))
-    return OracleContainer.wrap(made, name='task')
 
 
 @contextlib.contextmanager
 def _waits(needs_confirmation: bool) -> Iterator[Offered]:
     """A machine that waits before task/KITCHEN/LOOK; in the end it is preempted."""
-    with fake_ros() as offered, mock.patch.multiple(
-            hand_server, ControlPublisher=SilentPublisher, ViewerCommands=SilentPublisher):
-        server, machine = HandServer(), _nested()
-        server.watch(machine)
+    with kitchen_at_hand() as (offered, machine):
         hand = OperatorHand(machine)
         if needs_confirmation:
             hand.set_autonomy('KITCHEN/LOOK', 'confirm', 'eva')
