@@ -37,7 +37,7 @@ Joints = Tuple[Tuple[str, float], ...]
 class LabRun(NamedTuple):
     """A run of trials in one lab."""
 
-    seed: int  # of its first trial; the next has the next
+    seed: int  # of its first trial. The next has the next
     slot_h: float  # from the begin of one trial to that of the next, where none takes longer
 
 
@@ -47,7 +47,8 @@ class LabState(NamedTuple):
     began: float  # h of the run
     ended: float
     things: Tuple[Body, ...]  # what stays, upright, at x and y of its position
-    # of torso and head, rad or m by joint; (): the robot was set right, and stands as at the begin
+    # of torso and head, rad or m by joint. () means the robot was set right, and stands as at the
+    # begin
     joints: Joints = ()
     base: Vector = (0.0, 0.0, 0.0)  # x, y (m) and yaw (rad) of the robot in the world
     localisation: Vector = (0.0, 0.0, 0.0)  # of the world in odom_combined, likewise
@@ -86,7 +87,7 @@ def lab_scene(task: str, run: LabRun, seed: int, state: Optional[LabState], beni
               lasting: float = LASTING_SHARE) -> Scene:
     """Return what a trial finds.
 
-    :param state: how the trial before left it; None: the run begins.
+    :param state: how the trial before left it. None means the run begins.
     :param benign: without any reason to fail that could be left out.
     :param lasting: the share of the causes that last, 0 to 1.
     """
@@ -107,7 +108,7 @@ class _Trial(NamedTuple):
 
     @property
     def as_it_was(self) -> Optional[LabState]:
-        """How it was left; None where it is set out afresh: at the begin, and once an hour."""
+        """How it was left, or None where it is set out afresh: at the begin, and once an hour."""
         passed = self.state is None or int(self.hour) > int(self.state.began)
         return None if passed else self.state
 
@@ -120,7 +121,8 @@ def _table(trial: _Trial, robot: RobotStart) -> Scene:
                                              generator.uniform(*tabletop_scene.NEAREST_Y),
                                              TABLE_TOP + 0.06]), generator))
         draft = with_table_causes(draft, trial.seed, trial.lasting, FROM_THE_HOUR)
-    robot = robot._replace(joints=_start_joints((('torso_lift_joint', TORSO),), trial.state))
+    robot = robot._replace(joints=_start_joints((('torso_lift_joint', TORSO),), trial.state),
+                           drive_error=_drive_error(robot))
     table = true_table(trial.run.seed, TABLE_TOP, tabletop_scene.TABLE_X, tabletop_scene.TABLE_SIZE)
     return tabletop_scene.composed(trial.seed, draft, table, robot)
 
@@ -145,12 +147,16 @@ def _things_on_table(trial: _Trial) -> Tuple[Body, ...]:
     return (put, *stayed)
 
 
+def _drive_error(robot: RobotStart) -> Vector:
+    return _vector([each * (1.0 + robot.tip_wear) for each in STEADY])
+
+
 def _kitchen(trial: _Trial, robot: RobotStart) -> Scene:
     kitchen, state = true_kitchen(trial.run.seed), trial.state
     stays = state if state and state.joints else None  # how the robot stands
     draft = kitchen_scene.drafted(kitchen, _drinks_in_fridge(trial, kitchen))
     draft = draft._replace(
-        drive_error=_vector([each * (1.0 + robot.tip_wear) for each in STEADY]),
+        drive_error=_drive_error(robot),
         localisation_error=stays.localisation if stays else localisation_error(trial.seed))
     if not trial.benign:
         draft = _lit(draft, trial, lambda generator: dazzling(

@@ -7,6 +7,7 @@ from .calibration import camera_error, encoder_errors
 from .cause_draws import LASTING_SHARE
 from .chance import generator_for
 from .clutter import another
+from .kitchen_causes import STEADY
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
 from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
 from .unlike_the_map import TrueTable, true_table
@@ -36,7 +37,7 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     if not benign:
         draft = with_causes(draft, seed, lasting)
     robot = RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
-                       camera_error=camera_error(seed))
+                       camera_error=camera_error(seed), drive_error=STEADY)
     return composed(seed, draft, true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE), robot)
 
 
@@ -48,7 +49,7 @@ def fresh_things(seed: int) -> Tuple[Body, ...]:
 
 
 def composed(seed: int, draft: TabletopDraft, table: TrueTable, robot: RobotStart) -> Scene:
-    """Return the scene of a draft; its things stand on the table as it is."""
+    """Return the scene of a draft. Its things stand on the table as it is."""
     target = min(draft.things, key=lambda thing: float(np.hypot(*thing.position[:2])))
     goal = Goal('stands_at', target.name, (*GOAL, table.height + target.size[2] / 2), TOLERANCE)
     return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal, robot,
