@@ -33,7 +33,9 @@ class InKitchen(unittest.TestCase):
         cls.states = drink_retrieval.make_machine().get_children()
 
     def run_state(self, label):
-        self.assertEqual(self.states[label].execute(smach.UserData()), 'succeeded', label)
+        userdata = smach.UserData()
+        drink_retrieval.begin(userdata)
+        self.assertEqual(self.states[label].execute(userdata), 'succeeded', label)
 
     def ask(self, state, outputs=()):
         """Ask about a state; the question and its answer."""

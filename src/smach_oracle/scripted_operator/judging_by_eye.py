@@ -6,7 +6,7 @@ import numpy as np
 from .clearing import in_the_way, on_place, within_reach
 from .ladder import Sight
 from .manoeuvres import HELD
-from .manual_task import AHEAD, point_in_base
+from .manual_task import AHEAD, place_in_base, point_in_base
 from .robot_means import RobotMeans
 from .seen_scene import SeenScene, SeenThing
 from .state_plans import PUT_DOWN, RETRY, TAKE, StatePlan
@@ -33,9 +33,11 @@ def look_about(plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene,
     holds = HELD[0] < means.gap(plan.arm) < HELD[1]
     if plan.means == PUT_DOWN:
         return _about_place(plan, userdata, means, holds)
-    scene, thing = _search(_where_to_look(plan, userdata), first, means)
+    points = _where_to_look(plan, userdata)
+    scene, thing = _search(points, first, means)
     if thing is None or thing.box is None:
         return Impression(Sight(seen=thing is not None, located=False, holds=holds,
+                                dazzled=means.look_at(points[0]).dazzled(),
                                 covered=thing is not None and scene.covered(thing)), AHEAD)
     reachable = plan.means != TAKE or _reaches(plan, thing.box.centre)
     sight = Sight(holds=holds, crowded=in_the_way(scene, thing) is not None,
@@ -63,7 +65,7 @@ def _moved(detected: Optional[np.ndarray], seen: np.ndarray) -> bool:
 
 def _search(points: Sequence[np.ndarray], first: SeenScene,
             means: RobotMeans) -> Tuple[SeenScene, Optional[SeenThing]]:
-    """The thing, with the head turned to it; else it is looked for here and there."""
+    """The thing, with the head turned to it, else it is looked for here and there."""
     scene, thing = first, first.wanted()
     if thing is not None and thing.box is not None:
         closer = means.look_at(thing.box.centre)
@@ -81,7 +83,7 @@ def _search(points: Sequence[np.ndarray], first: SeenScene,
 
 def _about_place(plan: StatePlan, userdata: Mapping[str, Any], means: RobotMeans,
                  holds: bool) -> Impression:
-    place = point_in_base(userdata.get(plan.place)) if plan.place else None
+    place = place_in_base(userdata.get(plan.place), means) if plan.place else None
     if place is None or not holds:
         return Impression(Sight(holds=holds), AHEAD)
     return Impression(Sight(holds=True, blocked=on_place(means.look_at(place), place) is not None),

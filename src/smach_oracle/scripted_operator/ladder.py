@@ -33,6 +33,7 @@ class Sight(NamedTuple):
     blocked: bool = False  # another thing stands where something should be put
     covered: bool = False  # a limb of the robot is right next to it, or before it
     moved: bool = False  # it stands elsewhere than where the robot has detected it
+    dazzled: bool = False  # light falls into the camera
     reachable: bool = True  # the hand of the plan reaches the thing
 
 
@@ -41,7 +42,7 @@ class Tried(NamedTuple):
 
     state: str
     act: str
-    worked: bool = False  # it came about what was meant; the state was not done by that
+    worked: bool = False  # it came about what was meant. The state was not done by that
 
 
 class NextAct(NamedTuple):
@@ -67,7 +68,7 @@ class Rung(NamedTuple):
     """Something to try."""
 
     act: str
-    most: int  # how often in one trial; 0: as often as the plan says
+    most: int  # how often in one trial. 0 means as often as the plan says
     when: Callable[[Sight], bool] = lambda sight: True
 
 
@@ -77,6 +78,7 @@ _LADDERS: Dict[str, List[Rung]] = {
         Rung(MARK, 1, lambda sight: sight.located),
         Rung(CLEAR, 1, lambda sight: sight.located and sight.crowded),
         Rung(MARK, 0, lambda sight: sight.seen),
+        Rung(BASE, 1, lambda sight: sight.dazzled),
         Rung(HIDDEN, 2, lambda sight: not sight.seen),
         Rung(WAIT, 1, lambda sight: not sight.located),
         Rung(BACK, 2),
@@ -155,13 +157,13 @@ def choose(plan: StatePlan, asked: Asked, sight: Sight, memory: TrialMemory) -> 
 
 
 def _made(act: str, plan: StatePlan, asked: Asked) -> Optional[NextAct]:
-    """The answer that does it; None where it cannot be done."""
+    """The answer that does it, or None where it cannot be done."""
     if act in BY_INTERFACE:
         interface = BY_INTERFACE[act]
         allowed = interface in asked.interfaces and not (act == CLEAR and plan.inside)
         return NextAct(act, interface=interface) if allowed else None
     goals = {HIDDEN: plan.hidden, LOST: plan.lost, BACK: plan.otherwise, LEAVE: plan.leave}
-    state = goals.get(act, asked.state)
+    state = goals.get(act, plan.again or asked.state)
     if not state or state not in asked.states:
         return None
     if act == BASE:

@@ -5,6 +5,8 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseStamped
 
+from smach_oracle.geometry.transforms import apply, inverse
+
 from .clearing import arm_for, free_spot, in_the_way, move_aside, move_to, on_place
 from .hand_driver import HandDriver, StuckError
 from .image_viewer import ImageViewer, ViewError
@@ -27,6 +29,7 @@ from .topic_hand import GoalEndedError, TeleoperationClient, TopicHand
 
 SUCCESS = 'succeeded'
 BASE = 'base_footprint'
+ODOM = 'odom_combined'
 BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
 AHEAD = np.array([0.65, 0.0, 0.75])  # m, where a person looks who knows nothing better
 _BEGIN_S = 30.0  # wall time in which an interface must begin
@@ -204,7 +207,7 @@ def place_of(plan: StatePlan, userdata: Mapping[str, Any],
             if support is not None and support.top is not None:
                 return support.top, float(support.top[2])
         raise ManoeuvreError('there is no {} to be seen to put it on'.format(plan.onto))
-    place = point_in_base(userdata.get(plan.place))
+    place = place_in_base(userdata.get(plan.place), means)
     if place is None:
         raise ManoeuvreError('userdata {} does not say where'.format(plan.place))
     seen = means.look_at(place)
@@ -212,12 +215,24 @@ def place_of(plan: StatePlan, userdata: Mapping[str, Any],
 
 
 def point_in_base(pose: object) -> Optional[np.ndarray]:
-    """(3,) m in base_footprint, of a PoseStamped in that frame or base_link; else None."""
+    """(3,) m in base_footprint, of a PoseStamped in that frame or base_link, else None."""
     heights = {BASE: 0.0, 'base_link': BASE_LINK_HEIGHT}
     if not isinstance(pose, PoseStamped) or pose.header.frame_id not in heights:
         return None
     at = pose.pose.position
     return np.array([at.x, at.y, at.z + heights[pose.header.frame_id]])
+
+
+def place_in_base(pose: object, means: RobotMeans) -> Optional[np.ndarray]:
+    """(3,) m in base_footprint, as point_in_base(); the pose may also be in the odometry's frame.
+
+    :raises ViewError: where the odometry does not come.
+    """
+    if not isinstance(pose, PoseStamped) or pose.header.frame_id != ODOM:
+        return point_in_base(pose)
+    at = pose.pose.position
+    found: np.ndarray = apply(inverse(means.odom_from_base()), np.array([at.x, at.y, at.z]))
+    return found
 
 
 class InterfaceNames(NamedTuple):

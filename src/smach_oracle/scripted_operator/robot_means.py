@@ -11,10 +11,12 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from control_msgs.msg import PointHeadAction, PointHeadGoal
+from smach_oracle.geometry.transforms import from_quaternion
 from smach_oracle.ros.goal_link import GoalLink
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import PassTime, PassTimeRequest, Snapshot, SnapshotRequest
@@ -36,6 +38,7 @@ class MeansNames(NamedTuple):
     head: str = 'head_traj_controller/point_head_action'
     base: str = 'move_base'
     joint_states: str = 'joint_states'
+    odometry: str = 'base_odometry/odom'
     snapshot: str = 'world/snapshot'  # or NONE
     pass_time: str = 'world/pass_time'  # or NONE: ROS time passes by itself
     camera_frame: str = 'wide_stereo_optical_frame'
@@ -58,6 +61,9 @@ class RobotMeans:
         self._tall: Dict[str, float] = {}  # m, of things that were seen standing
         self._heard = threading.Condition()
         self._states: 'OrderedDict[rospy.Time, Dict[str, float]]' = OrderedDict()
+        self._stands: Optional[Odometry] = None
+        self._odometry = rospy.Subscriber(names.odometry, Odometry, self._keep_odometry,
+                                          queue_size=100, tcp_nodelay=True)
         self._subscriber = rospy.Subscriber(names.joint_states, JointState, self._keep,
                                             queue_size=100, tcp_nodelay=True)
 
@@ -82,7 +88,7 @@ class RobotMeans:
         return self._tall.get(name)
 
     def turn_head(self, point: np.ndarray) -> None:
-        """Point the camera at (3,) m, base_footprint; a head that does not obey stays as it is."""
+        """Point the camera at (3,) m, base_footprint. A head that does not obey stays as it is."""
         goal = PointHeadGoal(
             target=PointStamped(Header(frame_id=self._names.base_frame), Point(*map(float, point))),
             pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=self._names.camera_frame)
@@ -91,11 +97,26 @@ class RobotMeans:
             rospy.logwarn('the head does not turn: %s', wrong)
 
     def drive(self, x: float, y: float, yaw: float) -> str:
-        """Drive the base by so much (m, rad) along its own axes; why not, or ''."""
+        """Drive the base by so much (m, rad) along its own axes. Return why not, or ''."""
         turn = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
         goal = MoveBaseGoal(PoseStamped(Header(frame_id=self._names.base_frame),
                                         Pose(Point(x, y, 0.0), turn)))
         return _moved(self._base, goal)
+
+    def odom_from_base(self) -> np.ndarray:
+        """4x4: where the robot stands by its odometry.
+
+        :raises ViewError: where that does not come.
+        """
+        stamp = self._snap() or rospy.Time()
+        with self._heard:
+            if not self._heard.wait_for(lambda: self._stands_at(stamp), _STATE_S):
+                raise ViewError('no odometry comes on {}'.format(self._names.odometry))
+            stands = self._stands
+        if stands is None:
+            raise ViewError('no odometry comes on {}'.format(self._names.odometry))
+        place, turn = stands.pose.pose.position, stands.pose.pose.orientation
+        return from_quaternion((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
 
     def gap(self, arm: str) -> float:
         """See Watcher.
@@ -124,7 +145,7 @@ class RobotMeans:
             raise ViewError('time does not pass: {}'.format(err)) from err
 
     def _snap(self) -> Optional[rospy.Time]:
-        """The stamp of the joint states to wait for; None: the newest."""
+        """The stamp of the joint states to wait for. None means the newest."""
         if self._names.snapshot == NONE:
             return None
         try:
@@ -138,7 +159,7 @@ class RobotMeans:
         return stamp
 
     def _awaited(self, stamp: Optional[rospy.Time]) -> Dict[str, float]:
-        """The joint states with a stamp; {} where they do not come."""
+        """The joint states with a stamp, or {} where they do not come."""
         with self._heard:
             self._heard.wait_for(lambda: self._state_at(stamp), _STATE_S)
             return self._state_at(stamp)
@@ -147,6 +168,14 @@ class RobotMeans:
         if stamp is None:
             return next(reversed(self._states.values()), {})
         return self._states.get(stamp, {})
+
+    def _stands_at(self, stamp: rospy.Time) -> bool:
+        return self._stands is not None and bool(self._stands.header.stamp >= stamp)
+
+    def _keep_odometry(self, message: Odometry) -> None:
+        with self._heard:
+            self._stands = message
+            self._heard.notify_all()
 
     def _keep(self, message: JointState) -> None:
         with self._heard:
@@ -157,7 +186,7 @@ class RobotMeans:
 
 
 def _moved(link: GoalLink, goal: genpy.Message) -> str:
-    """Send a goal and wait for its end; why it was not reached, or ''."""
+    """Send a goal and wait for its end. Return why it was not reached, or ''."""
     if not _within(link.ready):
         return 'no controller at {}'.format(link.name)
     sent = link.send(goal, time.monotonic())

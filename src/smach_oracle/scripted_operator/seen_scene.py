@@ -24,6 +24,8 @@ LEAST_LIMB = 0.0003  # of the image's pixels
 FLOOR = 0.25  # m: things are put on furniture, which is higher
 STANDING = 0.03  # m between the lowest point that is seen of a thing and what it stands on
 WELL_SEEN = 0.2  # of the points of the level with the most of them
+WHITE = 240  # each of a pixel's three values, of 255, where light is too bright
+LEAST_GLARE = 0.005  # of the image's pixels
 TOP_BAND = 0.02  # m below its highest point, that belongs to the top of a thing
 
 Region = Tuple[int, int, int, int]  # px: x, y, width, height
@@ -46,14 +48,14 @@ class SeenThing(NamedTuple):
     movable: bool
     region: Region
     mask: np.ndarray  # (h, w) bool
-    box: Optional[UprightBox]  # in base_footprint; None: nobody can tell where it is
+    box: Optional[UprightBox]  # in base_footprint. None means nobody can tell where it is
     top: Optional[np.ndarray] = None  # (3,) m, the middle of its top, as far as that is seen
     low: float = 0.0  # m above the floor, its lowest point that is seen
     stands: bool = False  # it is seen to stand on a surface
 
     @property
     def bottom(self) -> float:
-        """m above the floor; 0 where nobody can tell."""
+        """m above the floor, or 0 where nobody can tell."""
         return float(self.box.centre[2] - self.box.size[2] / 2) if self.box is not None else 0.0
 
 
@@ -80,6 +82,11 @@ class SeenScene(NamedTuple):
             thing.mask, iterations=max(1, round(BESIDE * thing.mask.shape[1])))
         return int((beside & self.limbs).sum()) > LEAST_LIMB * thing.mask.size
 
+    def dazzled(self) -> bool:
+        """Whether part of the image is white and without depth: light falls into the camera."""
+        white = self.image.colour.min(axis=-1) > WHITE
+        return float((white & ~np.isfinite(self.image.depth)).mean()) > LEAST_GLARE
+
     def heights(self) -> Dict[str, float]:
         """How tall (m) the things are that are seen standing, by name."""
         return {thing.name: float(thing.box.size[2]) for thing in self.things
@@ -105,7 +112,7 @@ class SeenScene(NamedTuple):
         """m above the floor of the level surface that is seen at a place (2,) or (3,) m.
 
         :param radius: m around the place that are looked at.
-        :param below: m; what is higher does not count.
+        :param below: m. What is higher does not count.
         :returns: None where too little of it is seen.
         """
         points = self._free_points()

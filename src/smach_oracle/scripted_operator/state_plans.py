@@ -14,7 +14,7 @@ DEFAULT = 'default'
 SHOW, TAKE, PUT_DOWN, RETRY = 'show', 'take', 'put_down', 'retry'
 # means, and the interface of each by the name under which the oracle's settings offer it
 MEANS = {SHOW: 'perception', TAKE: 'manipulation', PUT_DOWN: 'manipulation', RETRY: ''}
-_TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave')
+_TEXTS = ('means', 'arm', 'what', 'place', 'onto', 'hidden', 'lost', 'otherwise', 'leave', 'again')
 _MOST_POINTS = 10
 Point = Tuple[float, float, float]
 
@@ -24,7 +24,7 @@ class StatePlan(NamedTuple):
 
     means: str  # one of MEANS
     arm: str = 'right'  # take, put_down: with which
-    what: str = ''  # take: userdata key of the detected pose or poses; '' : whatever is nearest
+    what: str = ''  # take: userdata key of the detected pose or poses. '' : whatever is nearest
     place: str = ''  # put_down: userdata key of the pose where it should stand
     onto: str = ''  # put_down: or name of the body on whose top it should stand
     inside: bool = False  # take: out of a shelf, level and straight back
@@ -33,8 +33,12 @@ class StatePlan(NamedTuple):
     otherwise: str = ''  # state to go to after `tries` tries; '' : the failed one itself
     # state to go on to, this one left undone, where all that was tried twice; '' : never
     leave: str = ''
+    # state to go to where this one should be tried again, once somebody has looked about with the
+    # robot's head; '' : the failed one itself
+    again: str = ''
     tries: int = 2
-    # m, m, rad along its own axes, by which the base is driven, where nothing else helps; 0: never
+    # m, m, rad along its own axes, by which the base is driven, where nothing else helps. 0 means
+    # never
     base: Point = (0.0, 0.0, 0.0)
     look: Tuple[Point, ...] = ()  # m, base_footprint: where a person looks for the thing
     keep: Tuple[Point, ...] = ()  # likewise: where nothing is put that is moved aside

@@ -1,4 +1,6 @@
 """What the scripted operator knows when it decides, by looking about in the world, without ROS."""
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from direct_hand import DirectWatcher
@@ -7,8 +9,10 @@ from std_msgs.msg import Header
 
 from smach_oracle.scripted_operator.judging_by_eye import look_about
 from smach_oracle.scripted_operator.ladder import Sight
+from smach_oracle.scripted_operator.manual_task import place_in_base
 from smach_oracle.scripted_operator.state_plans import StatePlan
 from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.scenes.scene import RobotStart
 from smach_oracle.simulation.scenes.tabletop_scene import draw
 
 LOOK = ((0.65, 0.0, 0.75),)
@@ -56,6 +60,23 @@ def test_what_no_hand_reaches_is_known_before_one_tries(world):
     plan = TAKE._replace(look=((0.6, 0.4, 0.75),))
     assert not sight(world, plan).sight.reachable
     assert sight(world, plan._replace(arm='left')).sight.reachable
+
+
+def test_a_place_of_the_odometry_is_where_it_was_from_wherever_the_robot_stands(world):
+    world.reset(draw(2, benign=True)._replace(robot=RobotStart(base=(0.1, 0.3, 0.0))))
+    place = pose((0.6, -0.35, 0.85))
+    place.header.frame_id = 'odom_combined'
+    means = SimpleNamespace(odom_from_base=world.odom_from_base)
+    assert place_in_base(place, means) == pytest.approx([0.5, -0.65, 0.85], abs=1e-3)
+    assert place_in_base(pose((0.6, -0.35, 0.85)), means) == pytest.approx([0.6, -0.35, 0.85])
+
+
+def test_light_in_the_camera_is_noticed(world):
+    world.reset(draw(2, benign=True))
+    scene = DirectWatcher(world).look_at(np.array(LOOK[0]))
+    assert not scene.dazzled()
+    scene.image.colour[:60, :60], scene.image.depth[:60, :60] = 255, np.nan
+    assert scene.dazzled()
 
 
 def test_nothing_is_put_down_with_an_empty_hand(world):

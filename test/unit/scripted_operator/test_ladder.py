@@ -42,6 +42,17 @@ def course(state, sight, rounds, interfaces=BOTH, states=STATES, worked=False):
     return acts
 
 
+def test_a_person_whom_the_light_dazzles_drives_the_base_and_has_the_head_turned_again():
+    plan = PLANS['DETECT']._replace(base=(0.0, 0.3, 0.0), again='HEAD')
+    asked = Asked('DETECT', STATES + ['HEAD', 'DETECT'], BOTH)
+    memory = TrialMemory()
+    choice = choose(plan, asked, UNSEEN._replace(dazzled=True), memory)
+    assert (choice.act, choice.goto, choice.base) == (BASE, 'HEAD', plan.base)
+    memory.note('DETECT', BASE)
+    assert choose(plan, asked, UNSEEN._replace(dazzled=True), memory).act == HIDDEN
+    assert choose(plan, asked, UNSEEN, TrialMemory()).act == HIDDEN
+
+
 @pytest.mark.parametrize('state, sight', [
     ('DETECT', Sight()), ('DETECT', UNSEEN), ('PICK', Sight()), ('PICK', UNSEEN),
     ('PLACE', Sight(holds=True)), ('PLACE', Sight(holds=True, blocked=True)), ('DOOR', Sight())])
