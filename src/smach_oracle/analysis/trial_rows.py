@@ -13,12 +13,13 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Seq
 from .bag_events import BagError
 from .trial_counter import TrialEnding
 from .trials import TrialSummary
+from .truth import DAMAGE
 
 LOST = 'lost'  # an ending: the trial hung, or its processes died
 
 
 class TrialRow(NamedTuple):
-    """One trial of one variant; None: it is not known."""
+    """One trial of one variant. None means it is not known."""
 
     task: str
     variant: str
@@ -39,14 +40,14 @@ class TrialRow(NamedTuple):
     why: str = ''  # by the judge, or why it was lost
     version: str = ''  # of the code that ran it
     learned: str = ''  # rates at its end, as JSON
-    lasting_share: Optional[float] = None  # of the causes, that the world was given; None: its own
+    lasting_share: Optional[float] = None  # of the causes. None: as the world has it
     wall_s: Optional[float] = None  # of the machine, that the trial took
     hour: Optional[float] = None  # of a world that goes on, at which it began
     left: str = ''  # how it left a world that goes on, as JSON
 
     @property
     def succeeded(self) -> bool:
-        """Whether it truly ended in success: by machine and judge; by the machine if none judged.
+        """Whether it truly ended in success: by machine and judge, by the machine if none judged.
 
         Another object than the one that was meant is no success.
         """
@@ -79,10 +80,10 @@ class Pair(NamedTuple):
 class TruthDetails(NamedTuple):
     """What the truth on a trial tells beyond its end.
 
-    Lines of older worlds lack some of it; what they lack is not known, and None.
+    Lines of older worlds lack some of it. What they lack is not known, and None.
     """
 
-    wrong_object: Optional[str] = None  # brought to the goal in place of the target; '': none
+    wrong_object: Optional[str] = None  # brought to the goal in place of the target. '' means none
     damage: Optional[int] = None  # things knocked over, dropped, pushed off
     passed_s: Optional[Mapping[str, float]] = None  # s of the world's time, by what took them
     lasting: Optional[int] = None  # causes that last
@@ -118,7 +119,7 @@ def _as_json(data: Optional[Mapping[str, Any]]) -> str:
 
 
 def append_rows(path: Path, rows: Sequence[TrialRow]) -> None:
-    """Append rows; they are on the disk when this returns.
+    """Append rows. They are on the disk when this returns.
 
     :raises OSError: where they cannot be written.
     """
@@ -192,7 +193,7 @@ def _parsed(line: Sequence[str], where: str) -> TrialRow:
     if len(line) != len(TrialRow._fields):
         raise BagError('{}: {} cells, not {}'.format(where, len(line), len(TrialRow._fields)))
     cells: Dict[str, Any] = dict(zip(TrialRow._fields, line))
-    # '' is no object; a row that has the damage has this, too
+    # '' is no object. A row that has the damage has this, too
     cells['wrong_object'] = (None if cells['damage'] == '' and not cells['wrong_object']
                              else cells['wrong_object'])
     for name, parse in _PARSERS.items():
@@ -210,7 +211,7 @@ def _parsed(line: Sequence[str], where: str) -> TrialRow:
 # -- truth beyond the end
 
 def read_details(path: str) -> Dict[int, TruthDetails]:
-    """Return the details by seed; if a seed appears twice, the later line is used.
+    """Return the details by seed. If a seed appears twice, the later line is used.
 
     Lines that are not truth are skipped: `truth.read_truth` reports them.
 
@@ -248,14 +249,15 @@ def _number(value: object) -> Optional[float]:
 
 
 def _damage(by_kind: object) -> Optional[int]:
-    """Count the things; each kind lists them, or tells their number."""
+    """Count the things. Each kind lists them, or tells their number. The line has a sum, too."""
     if not isinstance(by_kind, dict):
         return None
-    return sum(len(each) if isinstance(each, list) else int(each) for each in by_kind.values())
+    told = [by_kind.get(kind, 0) for kind in DAMAGE]
+    return sum(len(each) if isinstance(each, list) else int(each) for each in told)
 
 
 def _lasting(causes: object) -> Optional[int]:
-    """Count the causes that last; None where they do not tell."""
+    """Count the causes that last. Return None where they do not tell."""
     if not isinstance(causes, list):
         return None
     told = [cause.get('lasting') for cause in causes if isinstance(cause, dict)]

@@ -97,7 +97,7 @@ def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
     path.write_text('{"seed": 1, "causes": [{"kind": "glare", "text": "t"}]}\n'
                     '{"seed": 2, "causes": [{"kind": "glare", "lasting": true}, '
                     '{"kind": "dim", "lasting": false}], "wrong_object": "cup", '
-                    '"damage": {"dropped": ["a", "b"], "pushed_off": []}, '
+                    '"damage": {"count": 2, "dropped": ["a", "b"], "pushed_off": []}, '
                     '"passed_s": {"expert": 12.5}, "wall_s": 9, "hour": 0.5, '
                     '"left": {"ended": 1}}\n{"se')
     details = read_details(str(path))
