@@ -152,7 +152,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         return self._access.from_own_page(self, must_say=True)
 
     def open(self, *_: str, **__: str) -> None:
-        """Begin; nothing is sent before the page has said hello."""
+        """Begin. Nothing is sent before the page has said hello."""
         self.set_nodelay(True)
         self._pages.open.add(self)
         asyncio.get_running_loop().call_later(HELLO_LIMIT_S, self._demand_hello)
@@ -180,7 +180,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._pages.teleoperation.leave(self._number)
 
     async def on_message(self, message: Union[str, bytes]) -> None:
-        """Carry out one command; ignore those of a page that is being closed."""
+        """Carry out one command. Ignore those of a page that is being closed."""
         if self._gone:
             return
         if not self._bucket(message).take():
@@ -218,7 +218,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._reply(command.number, reply)
 
     def end(self, code: int, why: str) -> None:
-        """Close it; what the page drives stops now, not when its browser has closed it, too."""
+        """Close it. What the page drives stops now, not when its browser has closed it, too."""
         self._pages.teleoperation.leave(self._number)
         self.close(code, why)
 
@@ -233,7 +233,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._number) else self._limits.commands
 
     def _at_once(self, command: PageCommand) -> Optional[CommandReply]:
-        """What needs no robot's word, and what is refused; None for the rest."""
+        """What needs no robot's word, and what is refused, or None for the rest."""
         if command.name == 'hello':
             return self._hello(command)
         if self._person is None:
@@ -324,9 +324,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if self._writing or self._person is None:
             return
         version, changed = self._pages.sections.since(self._sent_version)
-        events = self._pages.log.events(self._watched,
-                                         self._watched_from) if self._watched else None
-        new = events.events[:MOST_EVENTS_AT_ONCE] if events else []
+        new = self._pages.log.events(self._watched, self._watched_from,
+                                     MOST_EVENTS_AT_ONCE) if self._watched else []
         lists = self.lists.changes(self._pages.sections.lists)
         if not changed and not new and not lists:
             return
@@ -340,9 +339,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if lists:
             parts.append('"lists":' + lists)
         if new:
-            parts.append('"events":{}'.format(
-                json.dumps({'trial': self._watched, 'from': self._watched_from, 'events': new},
-                           allow_nan=False)))
+            parts.append('"events":{{"trial":{},"from":{},"events":[{}]}}'.format(
+                json.dumps(self._watched), self._watched_from, ','.join(new)))
         self._sent_version = version
         self._watched_from += len(new)
         self._writing = True

@@ -10,6 +10,7 @@ import rospy
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
 
+from ...robot_topics import READ_BYTES
 from ..feeds.views import event_of
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.robot_clocks import RobotClocks
@@ -29,7 +30,7 @@ _TOPICS: Dict[str, Tuple[Any, str]] = {
 
 
 class FollowedRobots:
-    """Follows all topics of four types and names; the name in front of them is the robot's."""
+    """Follows all topics of four types and names. The name in front of them is the robot's."""
 
     def __init__(self, sections: PageSections, log: TrialLog, layouts: LayoutWorker,
                  clocks: Optional[RobotClocks] = None) -> None:
@@ -44,7 +45,7 @@ class FollowedRobots:
         self._lock = threading.Lock()
 
     def discover(self) -> None:
-        """Ask the master once; call it in a thread of its own, since a master may hang."""
+        """Ask the master once. Call it in a thread of its own, since a master may hang."""
         master = rosgraph.Master(rospy.get_name())
         published = master.getPublishedTopics('')
         self.follow(published, dict(master.getSystemState()[0]))
@@ -106,7 +107,8 @@ class FollowedRobots:
         robot = FollowedRobot(name)
         self._subscribers[name] = [
             rospy.Subscriber(name + suffix, message, self._receiver(robot, method),
-                             queue_size=_QUEUE) for suffix, (message, method) in _TOPICS.items()
+                             queue_size=_QUEUE, buff_size=READ_BYTES)
+            for suffix, (message, method) in _TOPICS.items()
         ]
         with self._lock:
             self._robots[name] = robot

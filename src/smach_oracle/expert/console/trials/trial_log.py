@@ -5,7 +5,7 @@ Thread-safe, bounded.
 import json
 import threading
 from collections import OrderedDict
-from typing import Any, Dict, List, NamedTuple, Tuple
+from typing import Any, Dict, List, Tuple
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.records.events import Event, EventKind
@@ -13,12 +13,14 @@ from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 
 from ..feeds.views import event_view
 from .counts_table import counts_table, has_oracle
+from .packed_texts import PackedTexts
 from .recovery_statistics import RecoveryCounts, RecoveryStatistics
 
 MOST_TRIALS = 1000
-# of so many trials the events are kept, of the others the counts; those that run come first
+# of so many trials the events are kept, of the others the counts. Those that run come first
 MOST_DETAILED = 60
 MOST_EVENTS = 4000  # of a trial: the first ones
+MOST_BYTES = 16 * 2 ** 20  # of the events of all trials, as they are kept
 SHOWN_TRIALS = 300
 _FAILING = FailingNames()
 
@@ -30,20 +32,13 @@ class _LoggedTrial:
         self.robot = robot
         self.robot_gone = False
         self.counts = TrialCounter()
-        self.events: List[str] = []  # each as JSON, which takes half the memory of a dict
+        self.events = PackedTexts()  # each as JSON
         self.detailed = True  # whether the events are kept
 
     @property
     def ended(self) -> bool:
         """Whether its end was heard."""
         return self.counts.ending is not TrialEnding.UNFINISHED
-
-
-class EventSlice(NamedTuple):
-    """Events of a trial from some position on."""
-
-    start: int
-    events: List[Dict[str, Any]]
 
 
 class TrialLog:
@@ -54,11 +49,17 @@ class TrialLog:
         self._trials: 'OrderedDict[str, _LoggedTrial]' = OrderedDict()
         self._recoveries = RecoveryStatistics()
         self._version = 0
+        self._bytes = 0  # of the events of all trials
 
     @property
     def version(self) -> int:
         """Grows with every change."""
         return self._version
+
+    @property
+    def bytes_kept(self) -> int:
+        """What the events of all trials take."""
+        return self._bytes
 
     def add(self, robot: str, event: Event) -> None:
         """Take in one event of a robot."""
@@ -71,7 +72,11 @@ class TrialLog:
                 self._forget()
             trial.counts.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
-                trial.events.append(json.dumps(event_view(event)))
+                before = trial.events.size
+                trial.events.append(json.dumps(event_view(event), allow_nan=False))
+                self._bytes += trial.events.size - before
+                if self._bytes > MOST_BYTES:
+                    self._forget_events()
             self._recoveries.add(
                 robot, event, ended and (not event.outcome or event.outcome in _FAILING
                                          or event.outcome.lower() == 'preempted'))
@@ -96,12 +101,14 @@ class TrialLog:
                 'trials': trials[::-1], 'heard': len(self._trials)
             }
 
-    def events(self, trial_id: str, start: int) -> EventSlice:
-        """The events of a trial from a position on; none where it is not known."""
+    def events(self, trial_id: str, start: int, most: int = MOST_EVENTS) -> List[str]:
+        """Up to `most` events of a trial from a position on, each as JSON.
+
+        There are none where the trial is not known, or its events are not kept.
+        """
         with self._lock:
             trial = self._trials.get(trial_id)
-            kept = trial.events[start:] if trial else []
-        return EventSlice(start, [json.loads(event) for event in kept])
+            return trial.events.lines(start, most) if trial else []
 
     def recovery_counts(self, place: Tuple[str, str, str], target: str) -> RecoveryCounts:
         """How often going to `target` helped after a failure.
@@ -112,13 +119,23 @@ class TrialLog:
             return self._recoveries.recovery_counts(place, target)
 
     def _forget(self) -> None:
+        """Make room for a new trial; with the lock held."""
         while len(self._trials) > MOST_TRIALS:
-            self._trials.popitem(last=False)
+            self._drop_events(self._trials.popitem(last=False)[1])
+        self._forget_events()
+
+    def _forget_events(self) -> None:
+        """Drop the events of some trials where those of all are too many; with the lock held."""
         detailed = [trial for trial in self._trials.values() if trial.detailed]
-        if len(detailed) > MOST_DETAILED:
+        while len(detailed) > MOST_DETAILED or (detailed and self._bytes > MOST_BYTES):
             over = next((trial for trial in detailed if trial.ended), detailed[0])
-            over.detailed = False
-            over.events.clear()
+            self._drop_events(over)
+            detailed.remove(over)
+
+    def _drop_events(self, trial: _LoggedTrial) -> None:
+        trial.detailed = False
+        self._bytes -= trial.events.size
+        trial.events.clear()
 
 
 def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:

@@ -1,7 +1,10 @@
 """Robots are found by their topics, which become sections."""
 
 
+from waiting import wait_for
+
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from smach_oracle.expert import robot_topics
 from smach_oracle.expert.console.robots import followed_robots
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.sensors.robot_clocks import RobotClocks
@@ -61,8 +64,8 @@ def test_a_robot_that_waits_to_be_well_says_so_until_it_goes_on_or_its_trial_is_
 class FakeSubscriber:
     made, unregistered = [], []
 
-    def __init__(self, topic, message, callback, queue_size):
-        self.topic, self.callback = topic, callback
+    def __init__(self, topic, message, callback, queue_size, buff_size=65536, tcp_nodelay=False):
+        self.topic, self.callback, self.buff_size = topic, callback, buff_size
         self.made.append(self)
 
     def unregister(self):
@@ -106,3 +109,18 @@ def test_the_clock_of_a_robot_that_is_gone_is_forgotten(monkeypatch):
     for _ in range(2):
         found.follow(here)
     assert clocks.robots() == ['/here'] and clocks.shared_now_s() >= 9000.0
+
+
+def test_a_connection_waits_with_a_small_buffer(monkeypatch):
+    """What is left of large ones, one for each connection, comes to fill the heap."""
+    monkeypatch.setattr(followed_robots.rospy, 'Subscriber', FakeSubscriber)
+    monkeypatch.setattr(robot_topics.rosgraph, 'is_master_online', lambda: True)
+    monkeypatch.setattr(FakeSubscriber, 'made', [])
+    followed_robots.FollowedRobots(PageSections(), TrialLog(), NoLayouts()).follow(
+        [['/a/oracle/events', OracleEvent._type]])
+    topics = robot_topics.RobotTopics('/more', OracleEvent, lambda robot: print, queue_size=5)
+    topics.follow(['/a'])
+    assert wait_for(lambda: '/a/more' in [each.topic for each in FakeSubscriber.made])
+    topics.stop()
+    assert len(FakeSubscriber.made) == 6
+    assert {each.buff_size for each in FakeSubscriber.made} == {robot_topics.READ_BYTES}

@@ -2,6 +2,7 @@
 helped.
 """
 import itertools
+import json
 import random
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 import smach
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.analysis.trials import summarise
+from smach_oracle.expert.console.feeds.views import event_view
 from smach_oracle.expert.console.trials import recovery_statistics, trial_log
 from smach_oracle.expert.console.trials.counts_table import counts_table, has_oracle
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryStatistics
@@ -196,8 +198,8 @@ def test_the_log_is_bounded_and_forgets_details_first(monkeypatch):
         for seq in range(6):
             log.add('/robot', event(EventKind.STATE_START, trial=str(number))._replace(seq=seq))
     assert [trial['id'] for trial in log.overview()['trials']] == ['8', '7', '6', '5', '4']
-    assert [len(log.events(str(number), 0).events) for number in range(3, 9)] == [0, 0, 0, 0, 3, 3]
-    assert len(log.events('8', 2).events) == 1 and log.events('unknown', 0).events == []
+    assert [len(log.events(str(number), 0)) for number in range(3, 9)] == [0, 0, 0, 0, 3, 3]
+    assert len(log.events('8', 2)) == 1 and log.events('unknown', 0) == []
 
 
 def test_a_trial_that_runs_keeps_its_events_longer_than_those_that_are_over(monkeypatch):
@@ -209,7 +211,7 @@ def test_a_trial_that_runs_keeps_its_events_longer_than_those_that_are_over(monk
             log.add('/fast', event(kind, trial=str(number), outcome='succeeded'))
     assert [each['detailed']
             for each in log.overview()['trials']] == [True, False, False, False, True]
-    assert len(log.events('waits', 0).events) == 1
+    assert len(log.events('waits', 0)) == 1
 
 
 def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeypatch):
@@ -217,9 +219,36 @@ def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeyp
     log = TrialLog()
     for trial in ('long', 'short', 'long'):
         log.add('/robot', event(EventKind.STATE_START, trial=trial))
-    assert log.events('long', 0).events == []
+    assert log.events('long', 0) == []
     assert [(each['id'], each['detailed'])
             for each in log.overview()['trials']] == [('short', True), ('long', False)]
+
+
+def test_events_are_kept_in_little_memory_and_read_from_any_position():
+    log = TrialLog()
+    lines = []
+    for seq in range(1000):
+        told = event(EventKind.TRANSITION, trial='long', outcome='succeeded')._replace(seq=seq)
+        log.add('/robot', told)
+        lines.append(json.dumps(event_view(told)))
+        if seq % 37 == 0:
+            assert log.events('long', 0) == lines
+    for start, most in ((0, 5), (60, 10), (64, 64), (130, 500), (959, 3), (958, 100), (1000, 5)):
+        assert log.events('long', start, most) == lines[start:start + most]
+    assert log.bytes_kept < sum(map(len, lines)) / 5
+
+
+def test_the_events_of_all_trials_have_a_limit_in_bytes(monkeypatch):
+    monkeypatch.setattr(trial_log, 'MOST_BYTES', 100000)
+    log, draw = TrialLog(), random.Random(1)
+    for number in range(6):
+        for seq in range(100):
+            text = '{:0200x}'.format(draw.getrandbits(800))
+            log.add('/robot', event(EventKind.TRANSITION, trial=str(number))._replace(
+                seq=seq, text=text))
+            assert log.bytes_kept <= 100000
+    kept = [len(log.events(str(number), 0)) for number in range(6)]
+    assert kept[0] == 0 and kept[-1] == 100 and log.overview()['heard'] == 6
 
 
 def test_scores_of_robots_that_come_and_go_are_bounded(monkeypatch):

@@ -217,11 +217,13 @@ class TestPages(console_case.ConsoleCase):
     async def test_many_browsers_together_are_held_to_a_number(self):
         cookies = [(await self.signed('operator'))[0] for _ in range(5)]
         limit = page_socket.MOST_SOCKETS
-        pages = [await self.connect(cookies[number % 4]) for number in range(limit)]
-        assert await self.refused(cookies[4]) == 503
-        pages[0].close()
-        await self.until(lambda: len(self.pages.open) < limit)
-        await self.connect(cookies[4])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(page_socket, 'HELLO_LIMIT_S', 600.0)  # on a busy machine all stay, too
+            pages = [await self.connect(cookies[number % 4]) for number in range(limit)]
+            assert await self.refused(cookies[4]) == 503
+            pages[0].close()
+            await self.until(lambda: len(self.pages.open) < limit)
+            await self.connect(cookies[4])
 
     @tornado.testing.gen_test
     async def test_a_page_that_never_says_hello_is_closed(self):
