@@ -40,7 +40,7 @@ CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, at REAL NOT NULL, wh
 
 
 class NewTrial(NamedTuple):
-    """A trial about to begin; `structure`: id and description of its machine."""
+    """A trial about to begin. `structure`: id and description of its machine."""
 
     machine: str
     trial_id: str
@@ -126,7 +126,7 @@ class StoreFile:
     # -- writing
 
     def begin_trial(self, trial: NewTrial) -> int:
-        """Add a trial; return its number.
+        """Add a trial, and return its number.
 
         :raises sqlite3.Error: where it cannot be written.
         """
@@ -246,7 +246,7 @@ class StoreFile:
     def facts(self, trial: int, until: Optional[int] = None) -> Iterator[StoredFact]:
         """Yield the facts of a trial in the order in which they were written.
 
-        `until`: the last moment that counts; by default the last one of all. Of those before it
+        `until`: the last moment that counts. By default the last one of all. Of those before it
         the ones count that it has followed. A moment without any fact is yielded once, with an
         empty name. All names are those that the states have at the end.
 
@@ -329,13 +329,14 @@ class StoreFile:
 
     def _read(self, query: str, given: Tuple[object, ...]) -> Iterator[Tuple[Any, ...]]:
         try:
-            yield from self._db.execute(query, given)
+            for row in self._db.execute(query, given):
+                yield row  # not `yield from`, which closes the cursor, also of a closed database
         except sqlite3.Error as err:
             raise _told(self.path, err) from err
 
 
 def _try_to_write(database: sqlite3.Connection) -> None:
-    """Find out whether it can be written; changes nothing."""
+    """Find out whether it can be written. It changes nothing."""
     database.execute('BEGIN IMMEDIATE')
     try:
         database.execute('PRAGMA user_version = {}'.format(FORMAT))

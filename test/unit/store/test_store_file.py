@@ -1,6 +1,7 @@
 """The database of a store."""
 import os
 import sqlite3
+import sys
 
 import pytest
 
@@ -51,6 +52,19 @@ def test_every_moment_can_be_gone_back_to(path):
     assert held(store, number, first.number) == {'key:a': 1}
     assert held(store, number, second.number) == {'key:a': None}
     assert [each.seq for each in (first, second, third)] == [0, 1, 2]
+
+
+def test_who_stops_reading_may_close_the_store_first(path, monkeypatch):
+    printed = []
+    monkeypatch.setattr(sys, 'unraisablehook', printed.append)
+    store = StoreFile(path)
+    number = store.begin_trial(TRIAL)
+    store.add(number, [moment(0, ('key:a', 1), ('key:b', 2))])
+    facts = store.facts(number)
+    next(facts)
+    store.close()
+    del facts  # what is raised here is printed
+    assert not printed
 
 
 def test_large_values_are_kept_once(path):
