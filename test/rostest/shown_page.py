@@ -6,6 +6,7 @@ and some of the lines that they print. A comment above a block says what is spec
 * `test: this command goes on while the next ones run`. Later, above what it has printed since,
   `test: what the command that goes on has printed`.
 * `test: this command goes on until the end` of the page.
+* `test: this command ends with exit code 2`.
 * `test: type "A", at "PROMPT" "B", after "TEXT" "C", "D"`: what a person types at the block's
   prompt, at a later one, when any command has printed TEXT, and after what the next block shows.
 * `test: put above the last line of FILE`.
@@ -93,10 +94,10 @@ class Program:
             pass
         return self.process.wait(timeout=LIMIT_S)
 
-    def end_well(self):
+    def end_with(self, wanted=0):
         code = self.end()
-        assert code == 0, '{}: exit code {}, printed:\n{}'.format(self.command, code,
-                                                                 plain(self.text))
+        assert code == wanted, '{}: exit code {}, printed:\n{}'.format(self.command, code,
+                                                                      plain(self.text))
 
     def stop(self):
         """End it as Ctrl-C does, and if it does not end, by force."""
@@ -149,7 +150,7 @@ class ShownPage:
     def run_block(self, note, text):
         if note.startswith('what the command that goes on'):
             self.going_on.wait_for(text)
-            self.going_on.end_well()
+            self.going_on.end_with()
             self.going_on = None
         elif not text.startswith('$ '):
             self.answer(text)
@@ -170,7 +171,7 @@ class ShownPage:
         if note.startswith('this command goes on while'):
             self.going_on = program
         elif not note.startswith('this command goes on until'):
-            program.end_well()
+            program.end_with(int(note.split()[-1]) if 'ends with exit code' in note else 0)
 
     def answer(self, shown):
         """Type what the page says, and see what it shows then."""
@@ -179,7 +180,7 @@ class ShownPage:
             self.latest.type(line)
         self.latest.wait_for(shown)
         self.latest.type(self.typed[-1][-1])
-        self.latest.end_well()
+        self.latest.end_with()
 
     def wait_until(self, when, text):
         """Wait for a prompt of the latest command, or until any command has printed a text."""

@@ -77,7 +77,7 @@ LAYERS: Dict[str, List[Layer]] = {
     'pr2': [
         'nodes', {'skills', 'ros_robot', 'checks'},
         {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
-        'perception', {'model', 'robot', 'kitchen'}, 'work_costs'
+        {'perception', 'fingers'}, {'model', 'robot', 'kitchen'}, 'work_costs'
     ],
     'testing': [
         {'script_run', 'soak'}, {'bench', 'recorded', 'soak_report'}, 'observed_trial',

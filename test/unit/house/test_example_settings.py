@@ -1,5 +1,5 @@
 """launch/oracle.yaml, from which settings are copied, has them all with their defaults;
-doc/executive.md names them.
+doc/settings.md names them.
 """
 import re
 
@@ -56,8 +56,8 @@ def test_nothing_is_set_unless_somebody_removes_a_comment_sign():
     assert yaml.safe_load(TEXT) is None
 
 
-def test_the_page_of_the_executive_names_every_setting():
-    page = (ROOT / 'doc/executive.md').read_text(encoding='utf-8')
-    section = page[page.index('## Settings'):page.index('## Trials')]
+def test_the_page_of_the_settings_names_every_one():
+    page = (ROOT / 'doc/settings.md').read_text(encoding='utf-8')
+    section = page[page.index('## Every setting'):page.index('## Which setting takes effect')]
     named = set(re.findall(r'`([a-z_]+)', section))
     assert setting_names() | interface_keys() <= named | {'states'}

@@ -28,8 +28,10 @@ def test_the_page_names_the_command(command):
     assert command in (ROOT / 'doc' / (PAGES[command] + '.md')).read_text(encoding='utf-8')
 
 
-def test_the_help_ends_with_a_page_that_is_there():
-    more, path = printed(str(ROOT / 'scripts/oracle_state'), '--help').splitlines()[-1].split()
+def test_the_help_ends_with_the_version_and_a_page_that_is_there():
+    lines = printed(str(ROOT / 'scripts/oracle_state'), '--help').splitlines()
+    assert any(line.split()[:1] == ['--version'] for line in lines)
+    more, path = lines[-1].split()
     assert more == 'More:' and Path(path).is_file() and Path(path).stem == 'survive'
 
 
@@ -43,9 +45,9 @@ def test_the_site_is_preferred_where_it_is_installed(tmp_path):
     code, doc = tmp_path / CODE, tmp_path / 'share/smach_oracle/doc'
     assert page_of('what_if', code) is None
     (doc / 'html').mkdir(parents=True)
-    for name in ('index.md', 'statistics.md'):
+    for name in ('index.md', 'comparing.md'):
         (doc / name).write_text('')
-    assert page_of('what_if', code) == doc / 'statistics.md'
-    (doc / 'html/statistics.html').write_text('')
-    assert page_of('what_if', code) == doc / 'html/statistics.html'
+    assert page_of('what_if', code) == doc / 'comparing.md'
+    (doc / 'html/comparing.html').write_text('')
+    assert page_of('what_if', code) == doc / 'html/comparing.html'
     assert page_of('my_command', code) is None

@@ -1,10 +1,8 @@
 """The texts for people keep the rules of doc/style.md, and the rules find what they are for."""
-from pathlib import Path
 
 import pytest
 from house import ROOT, shown
 from plain_words import (
-    NOT_YET,
     STYLE,
     TERMS,
     Prose,
@@ -12,10 +10,8 @@ from plain_words import (
     faults,
     faults_of,
     interface_prose,
-    is_checked,
     page_prose,
     python_prose,
-    tracked_text,
 )
 
 LONG = ' '.join(['The machine goes on'] + ['and on'] * 16) + '.'
@@ -86,10 +82,3 @@ def test_the_texts_in_the_code_keep_the_rules():
     found = {shown(path): faults_of(path) for path in checked_files() if path.suffix != '.md'}
     assert len(found) > 300
     assert not {name: each for name, each in found.items() if each}
-
-
-@pytest.mark.parametrize('prefix', NOT_YET)
-def test_what_is_not_mended_yet_has_faults(prefix):
-    """A page that has none any more is taken from the list."""
-    paths = [path for path in tracked_text() if shown(path).startswith(prefix) and is_checked(path)]
-    assert any(faults_of(Path(path)) for path in paths)

@@ -59,6 +59,26 @@ def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
         assert (tmp_path / './scripts/furo.js').read_text() == 'window.Gumshoe = 1;\nmain()'
 
 
+def test_the_site_is_dark_where_the_system_is():
+    style = ('@media not print {\n  body[data-theme="dark"] {\n    --color: #fff; }\n'
+             '    body[data-theme="dark"] .only-dark {\n      display: block } }\nbody {}\n')
+    added = theme.followed(style)
+    assert added == ('\n@media not print {\n@media (prefers-color-scheme: dark) {\n'
+                     'body:not([data-theme="light"]) {\n    --color: #fff; }\n'
+                     '    body:not([data-theme="light"]) .only-dark {\n'
+                     '      display: block }\n}\n}\n')
+    assert not theme.followed(style + added)
+
+
+def test_a_link_shows_the_title_of_a_page(tmp_path):
+    build.write_sources(tmp_path / 'source', quick=True)
+    pages = {page.stem: page.read_text(encoding='utf-8')
+             for page in (tmp_path / 'source').glob('*.md')}
+    assert '[Troubleshooting](troubleshooting.md)' in pages['index']
+    assert '[Settings](settings.md)' in pages['readme']
+    assert not [name for name, text in pages.items() if build.NAMED.search(text)]
+
+
 def test_a_link_into_the_repository_leads_to_a_copy(tmp_path):
     build.write_sources(tmp_path / 'source', quick=True)
     page = (tmp_path / 'source' / 'testing.md').read_text(encoding='utf-8')
