@@ -31,6 +31,8 @@ API = [
     ('Front ends', 'smach_oracle.expert.front_end', ['FrontEnd', 'wait_for_question']),
     ('Tests of your machines', 'smach_oracle.testing', []),
 ]
+# links that show the name of a page's file, where a site shows its title
+NAMED = re.compile(r'\[(?:doc/)?(\w+)\.md\](?=\(\1\.md[#)])')
 # links of a page to files that are not pages: to the repository's files, copied beside the pages
 FILES = re.compile(r'(\]\()\.\./((?:launch|examples|msg|srv|action)/[\w./]+|LICENSE)\)')
 
@@ -110,9 +112,12 @@ def write_sources(folder: Path, quick: bool) -> None:
         (folder / name).write_text(text, 'utf-8')
     index = folder / 'index.md'
     index.write_text(index.read_text('utf-8') + contents(index.read_text('utf-8')), 'utf-8')
+    titles = {page.stem: page.read_text('utf-8').split('\n', 1)[0].lstrip('# ')
+              for page in folder.glob('*.md')}
     for page in folder.glob('*.md'):
-        page.write_text(FILES.sub(lambda link: _copied(link, folder), page.read_text('utf-8')),
-                        'utf-8')
+        text = FILES.sub(lambda link: _copied(link, folder), page.read_text('utf-8'))
+        text = NAMED.sub(lambda link: '[{}]'.format(titles[link.group(1)]), text)
+        page.write_text(text, 'utf-8')
 
 
 def _copied(link: 're.Match[str]', folder: Path) -> str:

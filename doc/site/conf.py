@@ -7,6 +7,8 @@ html_theme = 'furo'
 html_title = 'smach_oracle'
 html_show_sphinx = False
 html_copy_source = False
+html_static_path = ['static']
+html_css_files = ['site.css']
 # summaries are fetched, which a browser refuses where the site is opened as a file
 html_show_search_summary = False
 # headings down to #### are targets of links, under the same names as on GitHub

@@ -10,9 +10,13 @@ from smach_oracle import __version__
 from smach_oracle.documentation import page_of
 
 HELP = (['-h'], ['--help'])
+VERSION_HELP = """
+without any other option:
+  --version             print the version and exit
+"""
 LACKING = 2  # exit code where a package is missing
 NO_READER = 141  # exit code where nobody reads the output any more, as a shell gives it for SIGPIPE
-# rooms whose commands print a result; the others have nodes, which go on without a reader of
+# rooms whose commands print a result. The others have nodes, which go on without a reader of
 # their log
 PRINTING = ('analysis.', 'experiment.', 'store.', 'ros.disk.', 'simulation.rehearsal.')
 
@@ -62,7 +66,7 @@ def run(module: str) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
     The process ends with the code that it returns. `--version` alone prints the version. Below its
-    --help is the page that has more.
+    --help are a line about that and the page that has more.
 
     Where a package is missing that the module imports, one line says which, and what installs it.
     """
@@ -82,7 +86,7 @@ def run(module: str) -> None:
         sys.stderr.write('{}: {}\n'.format(os.path.basename(sys.argv[0]), told))
         sys.exit(LACKING)
     try:
-        with _page_below_the_help():
+        with _more_below_the_help():
             code = main()
     finally:
         if isinstance(sys.stdout, _Printed):
@@ -92,12 +96,15 @@ def run(module: str) -> None:
 
 
 @contextmanager
-def _page_below_the_help() -> Iterator[None]:
-    """Say below what --help prints which page has more. A script's own --help has no such line."""
+def _more_below_the_help() -> Iterator[None]:
+    """Say below what --help prints how to see the version, and which page has more.
+
+    A script's own --help has no such lines.
+    """
     try:
         yield
     except SystemExit as end:
         page = page_of(os.path.basename(sys.argv[0])) if sys.argv[1:2] in HELP else None
         if page is not None and not end.code:
-            sys.stdout.write('\nMore: {}\n'.format(page))
+            sys.stdout.write(VERSION_HELP + '\nMore: {}\n'.format(page))
         raise

@@ -5,9 +5,9 @@ from typing import Optional
 # command: page of doc/
 PAGES = {
     'bag_statistics': 'statistics',
-    'compare_oracles': 'statistics',
-    'compare_variants': 'statistics',
-    'draw_results': 'statistics',
+    'compare_oracles': 'comparing',
+    'compare_variants': 'comparing',
+    'draw_results': 'comparing',
     'expert_console': 'console',
     'expert_query_server': 'expert',
     'expert_terminal': 'expert',
@@ -25,12 +25,12 @@ PAGES = {
     'pr2_perception': 'perception',
     'pr2_world': 'simulation',
     'run_trials': 'use_cases',
-    'same_trials': 'statistics',
+    'same_trials': 'comparing',
     'scripted_expert': 'expert',
     'scripted_operator': 'shared_autonomy',
-    'what_if': 'statistics',
+    'what_if': 'comparing',
 }
-# the folder of the pages, below a checkout or the prefix of an install space; the site, where it
+# the folder of the pages, below a checkout or the prefix of an install space, the site, where it
 # has been built, is below that of a checkout in build/
 _INSTALLED, _CHECKOUT = 'share/smach_oracle/doc', 'doc'
 
