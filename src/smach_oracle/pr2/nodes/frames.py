@@ -96,6 +96,6 @@ def box_messages(box: UprightBox, stamp: Optional[object] = None) -> Tuple[PoseS
 
 def _near(pose: np.ndarray, what: str) -> np.ndarray:
     if np.abs(pose[:3, 3]).max() > FARTHEST:
-        raise SkillError('{}: {} is more than {} m away'.format(what, list(np.round(pose[:3, 3],
-                                                                                    2)), FARTHEST))
+        raise SkillError('{}: ({}) m is more than {} m away'.format(
+            what, ', '.join('{:.6g}'.format(each) for each in pose[:3, 3]), FARTHEST))
     return pose
