@@ -16,14 +16,26 @@ class OracleError(Exception):
 
 
 class SettingsError(OracleError, ValueError):
-    """A setting is wrong. The text names the key, the value and what is allowed, or is `text`."""
+    """A setting is wrong. The text names the key, the value and what is allowed, or is `text`.
 
-    def __init__(self, key: str, value: object, allowed: str, text: str = '') -> None:
+    `problem` stands after the value and says what is wrong with it.
+    """
+
+    def __init__(self, key: str, value: object, allowed: str, text: str = '',
+                 problem: str = 'is not allowed') -> None:
         super().__init__(
-            text or '{}: {!r} is not allowed; allowed: {}'.format(key, value, allowed))
+            text or '{}: {!r} {}; allowed: {}'.format(key, value, problem, allowed))
         self.key = key
         self.value = value
         self.allowed = allowed
+        self._text = text
+        self._problem = problem
+
+    def set_at(self, origin: str) -> 'SettingsError':
+        """Return the same error with the file, line or parameter that set the key before it."""
+        text = '{}: {}'.format(origin, self._text) if self._text else ''
+        return SettingsError('{}: {}'.format(origin, self.key), self.value, self.allowed, text,
+                             self._problem)
 
 
 class AnswerError(OracleError, ValueError):

@@ -5,8 +5,9 @@ by key, everything else is replaced. `smach_oracle.oracle` checks the values. He
 learns where the key came from.
 """
 import importlib
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 import rospy
 import yaml
@@ -38,9 +39,14 @@ class LoadedSettings(Dict[str, Any]):
         :param lines: dotted key -> line number, where the source is a file.
         """
         _merge_into(self, values)
+        lines = lines or {}
         for key in _dotted_keys(values):
-            line = (lines or {}).get(key)
-            self._origins[key] = '{} line {}'.format(origin, line) if line else origin
+            items = [item for item in lines if item.startswith(key + '[')]
+            for replaced in [known for known in self._origins if known.startswith(key + '[')]:
+                del self._origins[replaced]
+            for each in [key] + items:
+                line = lines.get(each)
+                self._origins[each] = '{} line {}'.format(origin, line) if line else origin
 
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """What `put` would replace by something else, as "max_recoveries: 5, now 0"."""
@@ -59,8 +65,7 @@ class LoadedSettings(Dict[str, Any]):
     def located(self, err: SettingsError) -> SettingsError:
         """The same error, naming the source as well."""
         origin = self.origin(err.key)
-        return SettingsError('{}: {}'.format(origin, err.key), err.value,
-                           err.allowed) if origin else err
+        return err.set_at(origin) if origin else err
 
 
 def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PARAM,
@@ -147,21 +152,30 @@ def read_checkpoint() -> Tuple[Dict[str, Any], str]:
 
 
 def resolve_python(name: str) -> object:
-    """What `python:module:attribute` names, e.g. `python:my_robot.checks:view_is_clear`.
+    """Import the object that `python:module:attribute` names.
 
-    A dotted attribute is followed. The class of a state is instantiated without arguments.
+    An example is `python:my_robot.checks:view_is_clear`. A dotted attribute is followed. The class
+    of a state is instantiated without arguments.
 
     :raises ValueError: where the form is wrong or the module has no such attribute.
-    :raises ImportError: where the module cannot be imported. Whatever else the module raises
+    :raises ImportError: where the module cannot be imported. Any other exception of the module
         surfaces as it is.
     """
     module, attributes = split_python_name(name)
     found: object = importlib.import_module(module)
     for attribute in attributes.split('.'):
         if not hasattr(found, attribute):
-            raise ValueError('{} has no {!r}'.format(module, attribute))
+            raise ValueError(missing_attribute(module, attribute, dir(found)))
         found = getattr(found, attribute)
     return found() if isinstance(found, type) and hasattr(found, 'execute') else found
+
+
+def missing_attribute(module: str, attribute: str, names: Iterable[str]) -> str:
+    """Return what to say where a module lacks an attribute. `names`: those that it has."""
+    close = get_close_matches(attribute, sorted(set(names)), 1)
+    hint = ' (did you mean {!r}?)'.format(close[0]) if close else ''
+    owner = 'the script' if module == '__main__' else 'the module ' + module
+    return '{} has no {!r}{}'.format(owner, attribute, hint)
 
 
 def split_python_name(name: str) -> Tuple[str, str]:
@@ -221,7 +235,7 @@ def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tupl
 
 
 def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
-    """Dotted key -> line, from 1, of every key in the file.
+    """Dotted key -> line, from 1, of every key in the file, and of each item of a list.
 
     :raises SettingsError: where a key is given twice in one mapping, which YAML readers otherwise
         pass over.
@@ -235,8 +249,10 @@ def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
             continue
         seen.add(id(node))
         if isinstance(node, yaml.SequenceNode):
-            open_nodes += [('{}[{}].'.format(prefix[:-1], index), item)
-                           for index, item in enumerate(node.value)]
+            for index, item in enumerate(node.value):
+                place = '{}[{}]'.format(prefix[:-1], index)
+                lines[place] = item.start_mark.line + 1
+                open_nodes.append((place + '.', item))
         elif isinstance(node, yaml.MappingNode):
             open_nodes += _entries(path, prefix, node, lines)
     return lines

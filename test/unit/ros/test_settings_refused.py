@@ -38,8 +38,8 @@ def precondition(given, state='PICK'):
 
 @pytest.mark.parametrize('name, why', [
     ('python:no_such_module:clear', "No module named 'no_such_module'"),
-    ('python:checks:claer', "checks has no 'claer'"),
-    ('python:__main__:raedy', "__main__ has no 'raedy'"),
+    ('python:checks:claer', "the module checks has no 'claer' (did you mean 'clear'?)"),
+    ('python:__main__:raedy', "the script has no 'raedy' (did you mean 'ready'?)"),
     ('python:json.no_such_module:x', "No module named 'json.no_such_module'"),
     ('python:checks', 'the form is python:module:attribute'),
 ])
@@ -48,6 +48,48 @@ def test_a_wrong_python_name_is_told_before_the_script_runs(run, name, why):
     assert (code, out) == (2, '')
     assert errors.startswith('oracle_run: oracle.yaml line 3: states.PICK.preconditions')
     assert name in errors and why in errors and 'Traceback' not in errors
+    assert 'Error(' not in errors, 'in the words of Python'
+    assert 'allowed: \'python:module:attribute\', which names a function or state' in errors
+
+
+def test_the_line_of_the_wrong_item_of_a_list_is_told(run):
+    settings = ('states:\n  PICK:\n    preconditions:\n    - HOME\n'
+                '    - check: "python:__main__:ready"\n      achieve: "python:__main__:raedy"\n')
+    code, _, errors = run(settings)
+    assert code == 2
+    assert errors.startswith(
+        "oracle_run: oracle.yaml line 6: states.PICK.preconditions[1].achieve: "
+        "'python:__main__:raedy' cannot be found: the script has no 'raedy'"), errors
+
+
+def test_a_module_that_fails_to_import_is_told_with_its_error(run, tmp_path):
+    (tmp_path / 'broken.py').write_text('def ok(userdata):\n    return True\n1 / 0\n')
+    code, _, errors = run(precondition('"python:broken:ok"'))
+    assert code == 2
+    assert errors.splitlines()[-1].startswith(
+        "oracle_run: oracle.yaml line 3: states.PICK.preconditions[0]: 'python:broken:ok' cannot "
+        'be found: importing it raised ZeroDivisionError: division by zero; allowed: '), errors
+
+
+def test_a_python_name_of_a_value_is_told_by_its_name(run):
+    code, _, errors = run(precondition('"python:json.decoder:NaN"'))
+    assert code == 2
+    assert errors.splitlines()[-1].endswith(
+        "states.PICK.preconditions[0]: 'python:json.decoder:NaN' names a value of type float; "
+        'allowed: the name of a callable or a smach.State'), errors
+
+
+@pytest.mark.parametrize('settings, why', [
+    ('max_recovries: 3\n', 'line 1: max_recovries: no such setting (did you mean max_recoveries?)'),
+    ('preconditions: {PICK: [HOME]}\n', 'line 1: preconditions: no such setting here (it belongs '
+     'to a state: below states: LABEL:)'),
+    ('states:\n  PICK:\n    policy: prose\n', 'line 3: states.PICK.policy: no such setting of a '
+     'state (it holds for the whole machine: move it to the top of the settings)'),
+])
+def test_an_unknown_key_is_told_with_the_one_that_may_be_meant(run, settings, why):
+    code, out, errors = run(settings)
+    assert (code, out) == (2, '')
+    assert errors.startswith('oracle_run: oracle.yaml {}; allowed: one of the keys '.format(why))
 
 
 @pytest.mark.parametrize('name, why', [
@@ -58,7 +100,7 @@ def test_a_wrong_python_name_is_told_before_the_script_runs(run, name, why):
 def test_a_wrong_function_of_health_is_told_before_the_script_runs(run, name, why):
     code, out, errors = run('policy: prose\nhealthy:\n- {{function: "{}"}}\n'.format(name))
     assert (code, out) == (2, '')
-    assert errors.startswith('oracle_run: oracle.yaml line 2: healthy[0].function: ')
+    assert errors.startswith('oracle_run: oracle.yaml line 3: healthy[0].function: ')
     assert why in errors and 'Traceback' not in errors
 
 

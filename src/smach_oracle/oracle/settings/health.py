@@ -10,7 +10,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tup
 
 from ..errors import SettingsError
 from . import checks as values
-from .preconditions import PYTHON, Resolver
+from .python_names import PYTHON, Resolver, named_object
 
 # no arguments. True or '' is well, else what is wrong
 HealthFunction = Callable[[], Union[bool, str]]
@@ -155,11 +155,7 @@ def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, 
         raise SettingsError(key, given, "'python:module:attribute'")
     if resolver is None:
         raise SettingsError(key, given, 'a function, since names cannot be imported here')
-    try:
-        return given.rpartition(':')[2], resolver(given)
-    except Exception as err:
-        raise SettingsError(
-            key, given, 'python:module:attribute that can be imported ({!r})'.format(err)) from err
+    return given.rpartition(':')[2], named_object(key, given, 'function', resolver)
 
 
 def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:

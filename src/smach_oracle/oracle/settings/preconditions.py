@@ -11,9 +11,7 @@ from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from .checks import is_state
-
-PYTHON = 'python:'
-Resolver = Callable[[str], Any]
+from .python_names import PYTHON, Resolver, named_object
 
 
 class PreconditionKind(Enum):
@@ -102,15 +100,10 @@ def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> Precondit
         return PreconditionSpec(PreconditionKind.LABEL, given, given)
     if resolver is None:
         raise SettingsError(key, given, 'an object, since names cannot be imported here')
-    try:
-        found = resolver(given)
-    except SettingsError:
-        raise
-    except Exception as err:
-        raise SettingsError(
-            key, given, 'python:module:attribute that can be imported ({!r})'.format(err)) from err
-    if isinstance(found, (str, list, tuple, Mapping)):
-        raise SettingsError(key, given, 'the name of a callable or a smach.State')
+    found = named_object(key, given, 'function or state', resolver)
+    if not callable(found) and not is_state(found):
+        raise SettingsError(key, given, 'the name of a callable or a smach.State',
+                            problem='names a value of type {}'.format(type(found).__name__))
     return parse_precondition(key, found)._replace(name=given[len(PYTHON):].rpartition(':')[2])
 
 

@@ -5,6 +5,7 @@ a SettingsError that names the dotted key, the value and what is allowed.
 """
 import math
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
@@ -18,7 +19,8 @@ from .interfaces import checked_interfaces
 from .on_resume import checked_on_resume, checked_resume_map
 from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .policy_choice import checked_policy
-from .preconditions import PreconditionSpec, Resolver, parse_preconditions
+from .preconditions import PreconditionSpec, parse_preconditions
+from .python_names import Resolver
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
 RUN, ANNOUNCE, CONFIRM_FIRST = 'run', 'announce', 'confirm'  # autonomy
@@ -60,6 +62,7 @@ _STATE_CHECKS: Dict[str, values.Check] = {
     'time_limit_s': values.time_limit,
     'grace_period_s': values.number(0, math.inf, 'seconds from 0'),
 }
+_TOP_KEYS = ('states', 'interfaces', 'healthy')
 _MACHINE_CHECKS: Dict[str, values.Check] = {
     'policy': checked_policy,
     'budget': checked_budget,
@@ -145,7 +148,7 @@ class Settings:
         :raises SettingsError: naming key, value and what is allowed.
         """
         given = values.mapping('settings', given)
-        allowed = sorted([*_STATE_CHECKS, *_MACHINE_CHECKS, 'states', 'interfaces', 'healthy'])
+        allowed = sorted([*_STATE_CHECKS, *_MACHINE_CHECKS, *_TOP_KEYS])
         _refuse_unknown('', given, allowed)
         defaults = _checked_defaults(given)
         machine = {
@@ -193,7 +196,19 @@ class Settings:
 def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
     for key in given:
         if key not in allowed:
-            raise SettingsError(prefix + key, given[key], 'one of the keys ' + ', '.join(allowed))
+            keys = 'one of the keys ' + ', '.join(allowed)
+            raise SettingsError(prefix + key, given[key], keys, '{}: no such setting{}; allowed: {}'
+                                .format(prefix + key, _hint(prefix, key, allowed), keys))
+
+
+def _hint(prefix: str, key: str, allowed: List[str]) -> str:
+    """Where the key belongs, or the one that may be meant."""
+    if not prefix and key == 'preconditions':
+        return ' here (it belongs to a state: below states: LABEL:)'
+    if prefix and (key in _MACHINE_CHECKS or key in _TOP_KEYS):
+        return ' of a state (it holds for the whole machine: move it to the top of the settings)'
+    close = get_close_matches(key, allowed, 1)
+    return ' (did you mean {}?)'.format(close[0]) if close else ''
 
 
 def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:

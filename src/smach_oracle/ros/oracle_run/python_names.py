@@ -9,7 +9,7 @@ import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from typing import Iterator, List, Optional, Sequence, Set
 
-from ..loaded_settings import split_python_name
+from ..loaded_settings import missing_attribute, split_python_name
 
 _CHANGES_PATH = ('sys.path', 'load_manifest', 'addsitedir', 'import_module', 'exec')
 _EXTENDS_PATH = ('__path__', 'extend_path', 'declare_namespace', 'exec')
@@ -30,7 +30,7 @@ def check_python_name(script: str, name: str) -> None:
         source = _source_of(script, module, attribute)
     names = _names_in(source) if source else None
     if names is not None and attribute not in names and not names.intersection(_MAKES_NAMES):
-        raise ValueError('{} has no {!r}'.format(module, attribute))
+        raise ValueError(missing_attribute(module, attribute, names))
 
 
 def _source_of(script: str, module: str, attribute: str) -> Optional[str]:
