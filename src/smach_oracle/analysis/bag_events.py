@@ -29,7 +29,7 @@ class SkippedBag(NamedTuple):
 
 
 class RecordedCause(NamedTuple):
-    """What a simulated world was given to fail with (TrialCause)."""
+    """The cause of failure that a simulated world was given for a trial (TrialCause)."""
 
     seed: int
     task: str
@@ -46,7 +46,7 @@ class BagContent(NamedTuple):
 
 
 def find_bags(places: Sequence[str]) -> List[str]:
-    """Paths of all bags in folders and below, also unfinished ones (`.bag.active`), sorted.
+    """Return the paths of all bags, also `.bag.active`, in folders and below, sorted.
 
     Each is there once. A path of a file is taken as it is. Left out: the backups `X.orig.bag` that
     `rosbag reindex` makes of `X.bag`.
@@ -65,7 +65,7 @@ def find_bags(places: Sequence[str]) -> List[str]:
 
 
 def walk_bags(folder: str) -> Iterator[str]:
-    """Paths of what has the name of a bag, in a folder and below. Links to folders are left out."""
+    """Yield the paths with the name of a bag in a folder and below. Links are left out."""
     for parent, _, names in os.walk(folder):
         for name in names:
             backup_of = name[:-len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
@@ -86,7 +86,7 @@ class MessageStores:
         self._stores: Dict[str, Any] = {}
 
     def read(self, connection: Any, data: bytes) -> Any:
-        """One message of a connection. It raises whatever a damaged one makes rosbags raise."""
+        """Read one message of a connection. A damaged one raises whatever rosbags raises."""
         definition = connection.msgdef
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
         if text not in self._stores:
@@ -110,7 +110,7 @@ class EventReader:
         self._most_events = most_events
 
     def read(self, path: str) -> BagContent:
-        """All events in a bag, and the cause of each trial. The topics' names do not matter.
+        """Read all events in a bag, and the cause of each trial. The topics' names do not matter.
 
         A cause is latched: a bag may begin with that of the trial before. The last one before a
         trial's end counts.

@@ -66,7 +66,7 @@ class BagReadError(BagError):
 
 
 def reply_of(text: bytes) -> BagReply:
-    """The reply of a worker.
+    """Return the reply of a worker.
 
     :raises BagReadError: where the worker says that it could not read a bag.
     :raises ValueError: for what is no reply.
@@ -92,7 +92,7 @@ def _summary(fields: Dict[str, Any]) -> TrialSummary:
 
 
 def read(request: BagRequest) -> Dict[str, Any]:
-    """The reply to a request, as plain data.
+    """Return the reply to a request, as plain data.
 
     :raises BagReadError: where a bag cannot be used.
     """

@@ -1,4 +1,4 @@
-"""How trials went by the causes that a simulated world was given to fail with."""
+"""Tables of how trials went by the cause that a simulated world was given to fail with."""
 from typing import Dict, List, NamedTuple, Sequence
 
 from .trials import TrialSummary
@@ -22,7 +22,7 @@ class CauseRow(NamedTuple):
 
 
 def cause_rows(trials: Sequence[TrialSummary]) -> List[CauseRow]:
-    """One row for each variant and kind of cause, in alphabetical order.
+    """Return one row for each variant and kind of cause, in alphabetical order.
 
     A trial is in the row of each of its kinds.
     """
@@ -47,7 +47,7 @@ def _row(experiment: str, variant: str, kind: str, trials: Sequence[TrialSummary
 
 
 def format_causes(rows: Sequence[CauseRow]) -> str:
-    """The rows as text, a table for each variant, or '' where no trial has a cause."""
+    """Return the rows as text, a table for each variant, or '' where no trial has a cause."""
     lines: List[str] = []
     width = max([len(row.kind) for row in rows] + [5])
     heading = '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(

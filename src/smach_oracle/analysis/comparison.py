@@ -44,7 +44,7 @@ class Share(NamedTuple):
 
     @property
     def share(self) -> float:
-        """0 to 1."""
+        """Return the share, 0 to 1."""
         return self.trials / self.of
 
 

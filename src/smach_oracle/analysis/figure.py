@@ -44,7 +44,7 @@ class VariantSeries(NamedTuple):
     x_end: float
 
     def steps(self, happened: Callable[[TrialSummary], bool]) -> Tuple[List[float], List[int]]:
-        """Cumulative number of trials in which something happened, as corners for a step line."""
+        """Return the running count of trials in which it happened, as corners of a step line."""
         xs, ys = [0.0], [0]
         for x, trial in zip(self.x, self.trials):
             xs.append(x)
@@ -71,7 +71,7 @@ def save_time_series(trials: Sequence[TrialSummary], stem: str, columns: int = 1
 
 def draw_time_series(trials: Sequence[TrialSummary], columns: int = 1,
                      x_axis: str = 'trials') -> Figure:
-    """Events in each trial with the oracle (above), and trials that needed help or failed (below).
+    """Draw events of trials with the oracle above, trials that needed help or failed below.
 
     The lower axes count the trials so far, in both variants. To be drawn and saved under
     `rc_context(STYLE)`: matplotlib makes ticks only when it draws.

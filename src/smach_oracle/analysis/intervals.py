@@ -12,7 +12,7 @@ Interval = Tuple[float, float]
 
 
 def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
-    """Wilson score interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
+    """Return the Wilson interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
 
     (0, 1) where there are no trials.
 
@@ -31,7 +31,10 @@ def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
 
 
 def t_quantile(freedom: int) -> float:
-    """Two-sided 95% quantile of Student's t distribution, for 1 degree of freedom or more."""
+    """Return the two-sided 95% quantile of Student's t distribution.
+
+    It is for 1 degree of freedom or more.
+    """
     if freedom <= len(T_95):
         return T_95[freedom - 1]
     # the first three terms of its expansion: within 0.0001
@@ -40,7 +43,10 @@ def t_quantile(freedom: int) -> float:
 
 
 def replicate_interval(shares: Sequence[float]) -> Optional[Interval]:
-    """Student's t interval of the mean of replicates' shares, cut to 0 to 1, or None for one."""
+    """Return Student's t interval of the mean of replicates' shares.
+
+    It is cut to 0 to 1. None for one replicate.
+    """
     count = len(shares)
     if count < 2:
         return None

@@ -18,7 +18,7 @@ class PairedCounts(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """Two-sided p-value of McNemar's exact test."""
+        """Return the two-sided p-value of McNemar's exact test."""
         return mcnemar_exact(self.first_alone, self.second_alone)
 
 

@@ -1,4 +1,4 @@
-"""How every command here reads folders of bags.
+"""Reads folders of bags for all commands of the analysis.
 
 A bag that cannot be used is skipped and named, and the exit code is 1.
 """
@@ -14,7 +14,7 @@ ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
 
 
 def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
-    """Path and content of every bag in folders and below. Unusable ones are added to `skipped`.
+    """Yield path and content of all bags in folders and below. Adds unusable ones to `skipped`.
 
     :raises BagError: where a place does not exist, or there are no bags.
     """
@@ -40,7 +40,7 @@ def report_skipped(skipped: Sequence[SkippedBag]) -> int:
 
 
 def plain(skipped: Sequence[SkippedBag]) -> List[Dict[str, str]]:
-    """What was skipped, for JSON."""
+    """Return what was skipped, for JSON."""
     return [item._asdict() for item in skipped]
 
 

@@ -44,7 +44,7 @@ class SweepPoint(NamedTuple):
 
 
 def find_points(variants: Sequence[VariantTrials]) -> List[SweepPoint]:
-    """The variants with an oracle, by experiment, label and memory."""
+    """Return the variants with an oracle, by experiment, label and memory."""
     variants = [variant for variant in variants if variant.recovers]
     points = []
     for variant in variants:
@@ -69,7 +69,7 @@ def _label(variant: VariantTrials, variants: Sequence[VariantTrials]) -> str:
 
 
 def format_points(points: Sequence[SweepPoint]) -> str:
-    """A table for each experiment and label."""
+    """Return a table for each experiment and label."""
     lines: List[str] = []
     for experiment, label in _parts(points):
         chosen = [
@@ -113,7 +113,7 @@ def save_figure(points: Sequence[SweepPoint], stem: str) -> List[str]:
 
 
 def by_label(points: Sequence[SweepPoint]) -> Dict[str, List[SweepPoint]]:
-    """Points with a memory, by what the figure's legend calls them."""
+    """Return the points with a memory, by what the figure's legend calls them."""
     several = len({point.experiment for point in points}) > 1
     series: Dict[str, List[SweepPoint]] = {}
     for point in points:

@@ -28,7 +28,7 @@ def save(series: Mapping[str, Sequence[Any]], stem: str) -> List[str]:
 
 
 def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
-    """Shares with 95% Wilson intervals, by series.
+    """Draw shares with 95% Wilson intervals, by series.
 
     Series are shifted a little beside each other, so that none hides another.
     """

@@ -24,7 +24,7 @@ _INDENTED = (ANSWERED, NOT_ANSWERED)
 
 
 def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary] = ()) -> str:
-    """The table in the paper's form, each variant in full, and the causes.
+    """Return the table in the paper's form, each variant in full, and the causes.
 
     It ends with a newline.
     """
@@ -100,7 +100,7 @@ def _count_line(count: Count) -> str:
 
 
 def over_replicates(count: Count) -> str:
-    """The interval over replicates in words.
+    """Return the interval over replicates in words.
 
     Replicates that all agree do not show how much others would differ.
     """
@@ -111,13 +111,13 @@ def over_replicates(count: Count) -> str:
 
 
 def percent(interval: Sequence[float]) -> str:
-    """An interval of shares in words, e.g. " 1.8 to  8.5%"."""
+    """Return an interval of shares in words, e.g. " 1.8 to  8.5%"."""
     return '{:5.1f} to {:5.1f}%'.format(*(100 * bound for bound in interval))
 
 
 def as_data(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary],
             skipped: Sequence[SkippedBag]) -> Dict[str, Any]:
-    """All of it as plain data, for JSON."""
+    """Return all of it as plain data, for JSON."""
     return {
         'groups': [_variant_data(variant) for variant in variants],
         'causes': [dict(row._asdict(), arm=row.variant) for row in cause_rows(trials)],

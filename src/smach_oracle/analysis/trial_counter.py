@@ -53,7 +53,7 @@ class TrialCounter:
 
     @property
     def recovers(self) -> Optional[bool]:
-        """With or without the oracle, as TRIAL_START has it.
+        """Return whether the trial ran with the oracle, as TRIAL_START has it.
 
         It is True where an oracle was at work.
 
@@ -66,18 +66,21 @@ class TrialCounter:
 
     @property
     def settings(self) -> Tuple[Tuple[str, Any], ...]:
-        """The oracle's settings, sorted, or () where they are not recorded."""
+        """Return the oracle's settings, sorted, or () where they are not recorded."""
         stated = self._start.get('settings')
         return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
     @property
     def duration_s(self) -> float:
-        """s from the first to the last recorded event. `down_s` of it its program did not run."""
+        """Return s from the first to the last recorded event.
+
+        During `down_s` of them its program did not run.
+        """
         return self._latest_s - self._earliest_s
 
     @property
     def ending(self) -> TrialEnding:
-        """How it ended."""
+        """Return how it ended."""
         end = self._end
         if end is None or ended_by(end, self._state_seen) is TrialEnd.KEPT:
             return TrialEnding.UNFINISHED
@@ -88,32 +91,35 @@ class TrialCounter:
 
     @property
     def outcome(self) -> str:
-        """Outcome of the top machine, or '' where it ended in an exception or is unfinished."""
+        """Return the top machine's outcome, '' where it raised or is unfinished."""
         return self._end.outcome if self._end is not None else ''
 
     @property
     def failures(self) -> int:
-        """How often a state failed."""
+        """Return how often a state failed."""
         return sum(self._failures.values())
 
     @property
     def failures_by_state(self) -> Tuple[Tuple[str, int], ...]:
-        """How often each state failed, by 'PATH/STATE', sorted."""
+        """Return how often each state failed, by 'PATH/STATE', sorted."""
         return tuple(sorted(self._failures.items()))
 
     @property
     def questions(self) -> int:
-        """How many questions were put to the expert."""
+        """Return how many questions were put to the expert."""
         return len(self._asked)
 
     @property
     def answered(self) -> int:
-        """How many of these questions were answered."""
+        """Return how many of these questions were answered."""
         return len(self._asked & self._answered)
 
     @property
     def lost_events(self) -> int:
-        """Gaps in the numbering: events that were lost, or that came before the first one added."""
+        """Return how many numbers are missing.
+
+        Their events were lost, or came before the first one added.
+        """
         return self._last_seq + 1 - self._count - self._left_out
 
     def add(self, event: Event) -> None:

@@ -66,7 +66,7 @@ class TrialRow(NamedTuple):
 
     @property
     def pair(self) -> 'Pair':
-        """What the same trial has in common under every variant."""
+        """Return what the same trial has in common under every variant."""
         return Pair(self.task, self.seed)
 
 

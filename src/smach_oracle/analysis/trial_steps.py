@@ -31,7 +31,7 @@ class TrialSteps(NamedTuple):
 
 
 def steps_of(events: Iterable[Event]) -> Tuple[TrialStep, ...]:
-    """The steps of one trial: kind, container, state, outcome, target, judgement of a failure."""
+    """Return the trial's steps: kind, container, state, outcome, target, judgement of a failure."""
     return tuple(
         (str(getattr(event.kind, 'name', event.kind)), event.path, event.state, event.outcome,
          event.target, event.failure_kind, event.failure_class, repr(event.rate), event.continuous,
@@ -40,7 +40,7 @@ def steps_of(events: Iterable[Event]) -> Tuple[TrialStep, ...]:
 
 
 def load_trial_steps(place: str, skipped: List[SkippedBag]) -> Dict[TrialKey, TrialSteps]:
-    """The trials in a folder by experiment, variant and seed.
+    """Read the trials in a folder, by experiment, variant and seed.
 
     Bags that cannot be used go to `skipped`.
 
@@ -58,7 +58,7 @@ def load_trial_steps(place: str, skipped: List[SkippedBag]) -> Dict[TrialKey, Tr
 
 
 def differences(first: Dict[TrialKey, TrialSteps], second: Dict[TrialKey, TrialSteps]) -> List[str]:
-    """In words, the first difference of each two trials that are in both and not the same."""
+    """Describe the first difference of each two trials that are in both and not the same."""
     texts = []
     for key in sorted(set(first) & set(second), key=repr):
         ours, theirs = first[key], second[key]

@@ -38,7 +38,7 @@ class TrialSummary(NamedTuple):
 
     @property
     def replicate(self) -> str:
-        """The folder it was recorded in: trials that learn from each other share one."""
+        """Return the folder of its bag: trials that learn from each other share one."""
         return os.path.dirname(self.bags[0]) if self.bags else ''
 
     @property
@@ -117,7 +117,7 @@ def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
 
 def load_replicates(places: Sequence[str],
                     skipped: List[SkippedBag]) -> Dict[str, List[List[Event]]]:
-    """The trials with an oracle, by the folder they were recorded in, in order.
+    """Return the trials with an oracle, by the folder they were recorded in, in order.
 
     Bags that cannot be used go to `skipped`.
 

@@ -43,7 +43,7 @@ class Truth(NamedTuple):
 
 
 def read_truth(path: str) -> Dict[int, Truth]:
-    """The lines of a truth file by seed. If a seed appears twice, the later line is used.
+    """Read a truth file by seed. If a seed appears twice, the later line is used.
 
     A last line that was cut off in its writing is skipped.
 
@@ -120,7 +120,7 @@ class TruthFiles:
         self._read: Dict[str, Dict[int, Truth]] = {}
 
     def of(self, folder: str, seed: Optional[int]) -> Optional[Truth]:
-        """The truth of the trial with that seed in that folder, or None where there is none.
+        """Return the truth of the trial with that seed in that folder, None where there is none.
 
         :raises BagError: where the file cannot be used.
         """

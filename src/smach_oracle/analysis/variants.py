@@ -64,7 +64,7 @@ class VariantCounts(NamedTuple):
     down_s: float = 0.0  # in which it did not run, all together
 
     def of(self, name: str) -> Count:
-        """The count of that name."""
+        """Return the count of that name."""
         return next(item for item in self.counts if item.name == name)
 
 
@@ -78,7 +78,7 @@ class VariantTrials(NamedTuple):
     trials: Tuple[TrialSummary, ...]
 
     def replicates(self) -> List[Tuple[TrialSummary, ...]]:
-        """Its trials by the folder they were recorded in."""
+        """Return its trials by the folder they were recorded in."""
         return _by_replicate(self.trials)
 
 
@@ -90,7 +90,7 @@ def _by_replicate(trials: Sequence[TrialSummary]) -> List[Tuple[TrialSummary, ..
 
 
 def find_variants(trials: Sequence[TrialSummary]) -> List[VariantTrials]:
-    """Trials by experiment (in alphabetical order), with or without oracle, and its settings."""
+    """Group trials by experiment (alphabetical), with or without oracle, and its settings."""
     variants = []
     for experiment in sorted({trial.experiment for trial in trials}):
         for recovers, name in KINDS:
@@ -120,7 +120,7 @@ def _named(settings: Dict[str, Any], keys: Sequence[str]) -> List[str]:
 
 def time_series(
         trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
-    """The trials of each figure: one replicate of one oracle, and trials without an oracle.
+    """Return the trials of each figure: a replicate of an oracle, and trials without an oracle.
 
     Returns with each the words that distinguish it from the others: experiment, oracle, replicate,
     as far as there are several.
@@ -156,7 +156,7 @@ def _differing(settings: Sequence[Dict[str, Any]]) -> List[str]:
 
 
 def count_variants(trials: Sequence[TrialSummary]) -> List[VariantCounts]:
-    """Count, by experiment and variant."""
+    """Count the trials of each experiment and variant."""
     return [count_variant(variant) for variant in find_variants(trials)]
 
 
@@ -192,7 +192,10 @@ def _found(holds: Callable[[bool, bool], bool]) -> Callable[[TrialSummary], bool
 
 def make_count(name: str, happened: Callable[[TrialSummary], bool], trials: Sequence[TrialSummary],
                parts: Sequence[Sequence[TrialSummary]]) -> Count:
-    """In how many trials something happened, of at least one. `parts`: the same by replicate."""
+    """Count the trials in which something happened.
+
+    There is at least one. `parts`: the same by replicate.
+    """
     number = sum(map(happened, trials))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
     return Count(name, number, number / len(trials), wilson_interval(number, len(trials)), None,

@@ -128,7 +128,7 @@ class Replay:
         return tried
 
     def rate(self, event: Event) -> float:
-        """What it has learned of the event's state."""
+        """Return what it has learned of the event's state."""
         return self._state(event).estimator.rate
 
     def _state(self, event: Event) -> _LearnedState:
@@ -189,7 +189,7 @@ class Replay:
                                           self._conditioned.get((event.path, event.state), False))
 
     def begin_visit(self, event: Event) -> None:
-        """A state is about to run."""
+        """Note that a state is about to run."""
         state = self._state(event)
         state.context, state.interrupted = None, False
 
@@ -320,7 +320,7 @@ def _outcome(recorded: str, tried: str) -> str:
 
 
 def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
-    """A line for each oracle that was tried."""
+    """Return a line for each oracle that was tried."""
     names = [
         ', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded'
         for row in rows
@@ -339,7 +339,7 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
 
 
 def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
-    """The table of a folder as plain data, with the decisions counted by what became of them."""
+    """Return a folder's table as plain data, decisions counted by what became of them."""
     return {'folder': folder, 'tried': [{
         'settings': row.settings, 'decisions': sum(row.counts.values()),
         'outcomes': {name: row.counts[name] for name in OUTCOMES + (GIVES_UP,)},

@@ -24,7 +24,7 @@ class BackgroundCall:
                                         name=name, daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Begin the call in its thread."""
         self._thread.start()
 
     def leave(self) -> bool:

@@ -135,7 +135,7 @@ class OracleContainer(smach.StateMachine):
 
     @property
     def expert(self) -> Optional[Expert]:
-        """The expert whom every container of the tree asks."""
+        """Return the expert whom every container of the tree asks."""
         return oracle_of(self).expert
 
     @expert.setter

@@ -12,7 +12,7 @@ import warnings
 
 
 class OracleError(Exception):
-    """Root of all errors raised by smach_oracle."""
+    """The root of all errors that smach_oracle raises."""
 
 
 class SettingsError(OracleError, ValueError):

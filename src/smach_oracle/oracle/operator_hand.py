@@ -29,7 +29,7 @@ class ActiveState(NamedTuple):
 
 
 class HandStatus(NamedTuple):
-    """How the machine stands, and what is set."""
+    """The status of a machine under an operator's hand: where it stands, and what is set."""
 
     path: str  # of the top machine
     running: bool

@@ -37,7 +37,7 @@ class StateProspect(NamedTuple):
 
 
 class ContainerProspect(NamedTuple):
-    """One wrapped container. `initial` is '' where it has no state.
+    """One wrapped container, as `--check` shows it. `initial` is '' where it has no state.
 
     `guarded`: the states at or below it that the oracle repeats by no decision of its own. A
     Concurrence or an Iterator whose plain states have oracles `has_branches`: it is no wrapped

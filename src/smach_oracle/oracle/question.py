@@ -1,4 +1,4 @@
-"""The old place of `smach_oracle.oracle.asking.question`, kept as an alias."""
+"""The former place of `smach_oracle.oracle.asking.question`, kept as an alias."""
 import warnings
 
 from .asking.question import (

@@ -9,7 +9,7 @@ _LOOK_S = 0.05  # how soon a shutdown, or the end of a trial's minutes, is notic
 
 
 class Waiting(Protocol):
-    """Lets time pass. Called in the machine's thread."""
+    """Lets time pass. The machine's thread calls it."""
 
     def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
         """Return after so many seconds, or soon after `stopped()` is true.
@@ -22,7 +22,7 @@ class MonotonicWaiting:
     """Lets monotonic time pass."""
 
     def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
-        """Wait."""
+        """Wait so many seconds, or until `stopped()` is true."""
         until_s = time.monotonic() + seconds
         while not stopped():
             left_s = until_s - time.monotonic()

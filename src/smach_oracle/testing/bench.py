@@ -38,7 +38,7 @@ _GRACE_S = 5.0  # from the preempt of a trial that takes too long until it is le
 
 
 class Bench:
-    """A machine on the test bench.
+    """Runs trials of one machine with faults and an expert by script.
 
     The machine is wrapped when the bench is made, where it is not wrapped already, and comes out of
     it at `close` or the end of a `with` block. Faults are in it during a trial alone.

@@ -1,10 +1,10 @@
-"""What the test kit raises.
+"""The errors that the test kit raises.
 
-    OracleError
-    +-- FaultError (also a ValueError): a fault fits no state of the machine
-    AssertionError
-    +-- ScriptError: a question came that the script of the expert does not expect
-    +-- TrialLimitError: a trial did not end in time
+OracleError
++-- FaultError (also a ValueError): a fault fits no state of the machine
+AssertionError
++-- ScriptError: a question came that the script of the expert does not expect
++-- TrialLimitError: a trial did not end in time
 """
 from smach_oracle.oracle.errors import OracleError
 

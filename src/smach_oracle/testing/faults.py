@@ -9,7 +9,7 @@ Visits = Union[int, Iterable[int], None]
 
 
 class FaultKind(str, Enum):
-    """How a state goes wrong."""
+    """The ways in which a state goes wrong."""
 
     OUTCOME = 'outcome'  # it ends in a given outcome without doing anything
     EXCEPTION = 'exception'  # it raises

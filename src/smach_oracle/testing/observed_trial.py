@@ -10,7 +10,7 @@ from .trial_text import ProbedStep, TrialStep, jump_from, jump_to, lines_of, pla
 
 
 class TrialEvidence(NamedTuple):
-    """What was seen of one trial."""
+    """Everything that a bench has seen of one trial."""
 
     outcome: Optional[str]  # of the machine. None means it has none
     error: Optional[BaseException]  # what left the machine
@@ -22,7 +22,7 @@ class TrialEvidence(NamedTuple):
 
 
 class ObservedTrial:
-    """One trial of a machine.
+    """One trial of a machine, with assertions about what happened in it.
 
     Its assertions take states as LABEL or PATH/LABEL, the path below the top machine. One that
     fails shows the course of the trial, as `str` does. Each returns the trial itself.
@@ -55,7 +55,7 @@ class ObservedTrial:
 
     @property
     def decisions(self) -> List[str]:
-        """The sentences of all decisions."""
+        """Return the sentences of all decisions."""
         return [event.text for event in self.events if event.kind is EventKind.DECISION]
 
     @property

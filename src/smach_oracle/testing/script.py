@@ -18,7 +18,7 @@ BY = 'script'
 
 
 class ScriptedAnswer(NamedTuple):
-    """What the script says to one question. `goto` and the like make it."""
+    """One reply of the script to a question. `goto` and the like make it."""
 
     answer: Optional[Answer]  # None: nobody answers
     about: str = ''  # the state, LABEL or PATH/LABEL, that the question must be about. '' means any

@@ -22,7 +22,7 @@ class ScriptRun:
 
     @property
     def trial(self) -> ObservedTrial:
-        """The last trial.
+        """Return the last trial.
 
         :raises AssertionError: where the script has executed no machine.
         """

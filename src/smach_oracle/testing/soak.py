@@ -24,7 +24,7 @@ KINDS = (FaultKind.OUTCOME, FaultKind.EXCEPTION)
 
 
 class SoakPlan(NamedTuple):
-    """What a soak does. Each of its trials follows from this and its number."""
+    """The plan of a soak. Each of its trials follows from this and its number."""
 
     machine: MachineOrFactory
     seed: int = 0

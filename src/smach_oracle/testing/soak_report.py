@@ -1,4 +1,4 @@
-"""What a soak found, as a text that people read and as a thing that tests assert on."""
+"""The result of a soak, as a text that people read and an object that tests assert on."""
 from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 from .faults import Fault
@@ -8,7 +8,7 @@ _MOST_NUMBERS = 5
 
 
 class SoakTrial(NamedTuple):
-    """How one trial of a soak went."""
+    """The course of one trial of a soak."""
 
     number: int
     state: str  # PATH/LABEL
@@ -44,7 +44,7 @@ class SoakRow(NamedTuple):
 
 
 class SoakReport:
-    """What a soak found. `str` gives it as text."""
+    """The result of a soak. `str` gives it as text."""
 
     def __init__(self, seed: int, trials: Sequence[SoakTrial], not_visited: Sequence[str],
                  again: Callable[[int], ObservedTrial]) -> None:
@@ -56,17 +56,17 @@ class SoakReport:
 
     @property
     def never_recovered(self) -> List[SoakRow]:
-        """The failures that no trial recovered from."""
+        """Return the failures that no trial recovered from."""
         return [row for row in self.rows if not row.recovered]
 
     @property
     def sometimes_recovered(self) -> List[SoakRow]:
-        """The failures that some trials recovered from, and some did not."""
+        """Return the failures that some trials recovered from, and some did not."""
         return [row for row in self.rows if 0 < row.recovered < row.trials]
 
     @property
     def always_recovered(self) -> List[SoakRow]:
-        """The failures that all trials recovered from."""
+        """Return the failures that all trials recovered from."""
         return [row for row in self.rows if row.recovered == row.trials]
 
     def again(self, number: int) -> ObservedTrial:

@@ -8,7 +8,7 @@ _FIRST_LINES = 20
 
 
 class ProbedStep(NamedTuple):
-    """What the kit itself saw of a state: its visits and the faults in it."""
+    """The visits and faults of a state that the kit itself saw."""
 
     path: str  # PATH/LABEL below the top machine
     visit: int
@@ -45,7 +45,7 @@ def jump_to(event: Event) -> str:
 
 
 def lines_of(steps: Sequence[TrialStep]) -> List[str]:
-    """Return the lines. Those in the middle are left out where there are very many."""
+    """Return the lines of a trial. Those in the middle are left out where there are very many."""
     begin = steps[0].wall_time if steps else 0.0
     told = [(step, _place(step), _text(steps, index)) for index, step in enumerate(steps)]
     width = min(30, max([len(place) for _, place, text in told if text] + [0]))

@@ -42,7 +42,7 @@ class Percent:
 
     @property
     def reach(self) -> Tuple[float, float]:
-        """How far the interval goes below and above."""
+        """Return how far the interval goes below and above."""
         return max(0.0, self.share - self.interval[0]), max(0.0, self.interval[1] - self.share)
 
 

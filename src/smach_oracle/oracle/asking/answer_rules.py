@@ -37,7 +37,7 @@ class _NamedInterface(Protocol):
 
 
 class AskedQuestion(Protocol):
-    """What a Question and the ExpertQuery goal that carries it have in common."""
+    """The fields that a Question and the ExpertQuery goal that carries it have in common."""
 
     @property
     def container_path(self) -> str: ...
@@ -65,7 +65,7 @@ class AskedQuestion(Protocol):
 
 
 class AnswerChoices(NamedTuple):
-    """What an answer may choose from."""
+    """The states, outcomes and interfaces that an answer may choose from."""
 
     container: str  # path
     failed_state: str

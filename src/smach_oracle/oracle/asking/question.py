@@ -10,7 +10,7 @@ from ..settings.interfaces import InterfaceOffer
 
 
 class AnswerKind(IntEnum):
-    """What an expert may decide. The numbers are those of ExpertDecision.msg."""
+    """The kinds of decision of an expert. The numbers are those of ExpertDecision.msg."""
 
     GOTO = 1
     SUPERSEDE = 2
@@ -52,7 +52,7 @@ class LevelOutcome(NamedTuple):
 
 
 class PreconditionStatus(NamedTuple):
-    """How a precondition stands."""
+    """The status of a precondition: whether it holds, and why."""
 
     holds: Optional[bool]  # None: it cannot be told
     text: str  # why, for people
@@ -72,7 +72,7 @@ class PreconditionProbe:
 
 
 class Question(NamedTuple):
-    """Everything that an expert is shown.
+    """A question to the expert, with everything that the expert is shown.
 
     The fields are those of the ExpertQuery goal, where `question_id` is called `query_id`.
     """
@@ -113,7 +113,7 @@ class Question(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What an expert decided."""
+    """The decision of an expert."""
 
     kind: AnswerKind
     state: str = ''  # GOTO
@@ -143,7 +143,7 @@ Progress = Callable[[str, str, str], None]
 
 
 class Expert:
-    """Where questions go.
+    """The port through which a machine asks. Derive from it to answer questions yourself.
 
     ros/ implements it with the ExpertQuery action. Tests implement it in a few lines.
     """
@@ -173,5 +173,5 @@ class Expert:
 
 
 def names(items: Iterable[object]) -> str:
-    """A list for an error text. Outcomes and labels need not be strings."""
+    """Return a list for an error text. Outcomes and labels need not be strings."""
     return ', '.join(sorted(map(str, items))) or '(none)'

@@ -205,7 +205,7 @@ class IteratorBorder(Border):
 
     @property
     def item_number(self) -> int:
-        """Number of the item under way, from 1. 0 means none is."""
+        """Return the number of the item under way, from 1. 0 means none is."""
         return self._items.number if self._is_in_use and self._items is not None else 0
 
     # -- going on

@@ -44,7 +44,7 @@ class Resumption(NamedTuple):
 
     @property
     def age_s(self) -> float:
-        """How long ago that was, s."""
+        """Return how long ago that was, s."""
         return max(0.0, time.time() - self.at)
 
 
@@ -84,7 +84,7 @@ class EntryPoint:
 
     @property
     def label(self) -> str:
-        """The state in which it goes on."""
+        """Return the state in which it goes on."""
         return self._stored.label
 
     def take_over_records(self, node: TreeNode) -> None:

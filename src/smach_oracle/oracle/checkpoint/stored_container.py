@@ -40,7 +40,7 @@ class StoredContainer:
 
     @property
     def phase(self) -> str:
-        """The phase, '' where it has not begun."""
+        """Return the phase, '' where it has not begun."""
         return str(self.at[1]) if self.at else ''
 
     @property
@@ -59,5 +59,5 @@ class StoredContainer:
 
     @property
     def label(self) -> str:
-        """The state where it stands, '' where it has not begun."""
+        """Return the state where it stands, '' where it has not begun."""
         return str(self.at[0]) if self.at else ''

@@ -36,7 +36,7 @@ class StoredTree(NamedTuple):
 
     @property
     def goals(self) -> Dict[str, str]:
-        """Servers of the goals that ran, by goal id."""
+        """Return the servers of the goals that ran, by goal id."""
         return {name[len(GOAL):]: str(server) for name, server in self.whole.items()
                 if name.startswith(GOAL) and server}
 

@@ -13,7 +13,7 @@ class KeepingRecovery(ArrivalRecovery):
     """Asks before anything moves, whatever `on_no_answer` says of other questions."""
 
     def say_that_it_waits(self, question: Question) -> None:
-        """In the log, with what happens without an answer."""
+        """Log that it waits, and what happens without an answer."""
         self._say_that_it_waits(question, 'the trial is kept')
 
     def _fallback_in_words(self) -> str:

@@ -66,7 +66,7 @@ class Control:
     # -- of the machines
 
     def begin_trial(self) -> None:
-        """A pause, breakpoints and levels stay from the trial before. Jumps do not."""
+        """Drop the jumps of the trial before. Its pause, breakpoints and levels stay."""
         with self._changed:
             self._jumps.clear()
             self._moving.clear()

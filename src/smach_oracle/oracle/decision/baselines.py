@@ -18,15 +18,15 @@ class Baseline(Policy):
     """What they have in common."""
 
     def is_continuous(self, context: FailureContext) -> bool:
-        """The failure before this one was of the same state, which has not succeeded since."""
+        """Return whether the last failure was of the same state, which has not succeeded since."""
         return context.failing_since
 
     def runs_preconditions(self, failure_class: FailureClass) -> bool:
-        """Never."""
+        """Return False: a baseline never runs preconditions."""
         return False
 
     def step_back_target(self, context: FailureContext) -> str:
-        """The last successful state before the failed one, as in `prose`."""
+        """Return the last successful state before the failed one, as `prose` does."""
         return context.initial if context.succeeded_before is None else context.succeeded_before
 
 
@@ -42,7 +42,7 @@ class Repeating(Baseline):
         self.times = int(times)
 
     def spent(self, situation: Situation) -> int:
-        """How often it was done before."""
+        """Return how often it was done before."""
         return situation.past.recoveries
 
     def decide(self, situation: Situation) -> Action:
@@ -82,7 +82,7 @@ class Restart(Repeating):
     done = ('restart', 'restarts')
 
     def spent(self, situation: Situation) -> int:
-        """How often the top machine was started over."""
+        """Return how often the top machine was started over."""
         return situation.past.restarts
 
     def why(self, situation: Situation) -> str:
@@ -96,7 +96,7 @@ class AlwaysAsk(Baseline):
     name = 'always_ask'
 
     def decide(self, situation: Situation) -> Action:
-        """Ask."""
+        """Return `Action.ASK`, whatever has failed."""
         return Action.ASK
 
 
@@ -115,13 +115,13 @@ class Random(Baseline):
         self.seed = int(seed)
 
     def decide(self, situation: Situation) -> Action:
-        """Draw."""
+        """Return an action that is drawn at random."""
         past = situation.past
         drawn = random.Random('{} {}'.format(self.seed + past.trial, past.place)).random()
         return self.actions[int(drawn * len(self.actions))]
 
     def may_do(self, situation: Situation) -> Tuple[Action, ...]:
-        """Any of the three."""
+        """Return all three: any of them can be drawn."""
         return self.actions
 
 

@@ -15,7 +15,7 @@ _ROUNDING = 1e-9  # a rate that equals a threshold except for binary rounding ha
 
 
 class FailureClass(IntEnum):
-    """Class of a state by its failure rate. The numbers are those of OracleEvent.msg."""
+    """The class of a state by its failure rate. The numbers are those of OracleEvent.msg."""
 
     NO_CLASS = 0
     LOW = 1
@@ -43,7 +43,9 @@ def _checked(memory: int, prior: float) -> None:
 
 
 class FailureRate:
-    """Window of the last `memory` results, filled with `prior` to start with.
+    """The failure rate of a state over its last results.
+
+    The window holds the last `memory` results. It starts filled with `prior`.
 
     rate = (failures in the window + prior * (memory - n)) / memory, with n results seen and n <
     memory. `successes` and `failures` count all results ever added.
@@ -96,13 +98,13 @@ class FailureRate:
 
     @property
     def rate(self) -> float:
-        """Failure rate, 0 to 1."""
+        """Return the failure rate, 0 to 1."""
         failures, results = self.recent
         return (failures + self.prior * (self.memory - results)) / self.memory
 
     @property
     def recent(self) -> Tuple[int, int]:
-        """How many failures there are among how many latest results, in O(1)."""
+        """Return the number of failures among the latest results, and of those results, in O(1)."""
         failures = len(self._failed)
         if failures and self._failed[0] < self._results - self.memory:
             failures -= 1
@@ -141,7 +143,7 @@ class FailureRate:
 
 
 class ExponentialFailureRate:
-    """Exponentially weighted mean of the results, beginning with the prior.
+    """The exponentially weighted mean of a state's results, beginning with the prior.
 
     Each result replaces a share 1/memory of the estimate.
 
@@ -183,12 +185,12 @@ class ExponentialFailureRate:
 
     @property
     def rate(self) -> float:
-        """Failure rate, 0 to 1."""
+        """Return the failure rate, 0 to 1."""
         return self._rate
 
     @property
     def recent(self) -> Tuple[int, int]:
-        """Nothing: it does not know single results."""
+        """Return 0, 0: it does not know single results."""
         return 0, 0
 
     def snapshot(self) -> Dict[str, Any]:

@@ -14,12 +14,12 @@ __all__ = ['Action', 'Algorithm1', 'FailureContext', 'POLICIES', 'Past', 'Policy
 
 
 class Algorithm1(Policy):
-    """The paper's listing, to the letter."""
+    """The policy of the paper's listing, Algorithm 1, to the letter."""
 
     name = 'algorithm1'
 
     def is_continuous(self, context: FailureContext) -> bool:
-        """The listing's Attempt: the failure before this one was of the same state."""
+        """Return whether the failure before was of the same state, the listing's Attempt."""
         return context.failed_last
 
     def decide(self, situation: Situation) -> Action:
@@ -40,7 +40,7 @@ class Algorithm1(Policy):
 
 
 class Prose(Policy):
-    """Section IV-C of the paper.
+    """The policy that the text of section IV-C of the paper describes.
 
     Preconditions that cannot be met count as continuous: our reading, the prose is silent.
     """
@@ -48,7 +48,7 @@ class Prose(Policy):
     name = 'prose'
 
     def is_continuous(self, context: FailureContext) -> bool:
-        """The failure before this one was of the same state, which has not succeeded since."""
+        """Return whether the last failure was of the same state, which has not succeeded since."""
         return context.failing_since
 
     def decide(self, situation: Situation) -> Action:
@@ -61,7 +61,7 @@ class Prose(Policy):
         return Action.STEP_BACK if failure_class is FailureClass.LOW else Action.ASK
 
     def step_back_target(self, context: FailureContext) -> str:
-        """The last successful state before the failed one."""
+        """Return the last successful state before the failed one."""
         return context.initial if context.succeeded_before is None else context.succeeded_before
 
 

@@ -59,10 +59,10 @@ class Situation(NamedTuple):
 
 
 class Policy:
-    """Base of the policies. They hold no state.
+    """The base of the policies. They hold no state.
 
-    `asks`: whether it may ask. Where it may not, the container ends wherever else an expert would
-    be asked. `parameters`: what may be set, with the defaults.
+    `asks`: whether it may ask. A policy that may not ask ends the container where others would ask.
+    `parameters`: the values that may be set, with their defaults.
     """
 
     name = ''

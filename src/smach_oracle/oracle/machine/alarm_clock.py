@@ -9,7 +9,7 @@ Ring = Callable[[], None]
 
 
 class AlarmClock:
-    """One for each tree of containers. Safe to use from several threads."""
+    """Calls functions after a time. One serves each tree of containers, from any thread."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()

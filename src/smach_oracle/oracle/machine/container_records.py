@@ -11,7 +11,10 @@ from ..settings.settings import StateSettings
 
 
 class ContainerRecords:
-    """`by_label` holds the records of the states that were needed so far."""
+    """The records of one container.
+
+    `by_label` holds the records of the states that were needed so far.
+    """
 
     def __init__(self, history_length: int) -> None:
         self.by_label: Dict[str, StateRecord] = {}

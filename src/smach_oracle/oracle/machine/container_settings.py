@@ -7,7 +7,10 @@ from ..settings.settings import ALLOW, RUN, Settings, StateSettings
 
 
 class ContainerSettings:
-    """Those of the whole machine, those given with `add()`, and what follows from them."""
+    """The settings of one container.
+
+    They are those of the whole machine, those given with `add()`, and what follows from them.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self.given_with_add: Dict[str, Dict[str, Any]] = {}  # by label

@@ -7,7 +7,7 @@ from .protocols import Machine
 
 
 class EngineProbe:
-    """Looked at when an execution comes to its first state.
+    """Finds out how the SMACH engine steps, when an execution comes to its first state.
 
     `lock_is_held`: whether the engine holds the machine's lock around a step. `attentive`: whether
     a step begins with a closer look at preempt requests and at what an operator wants.

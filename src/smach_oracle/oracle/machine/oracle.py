@@ -54,7 +54,7 @@ class Oracle:
 
     @property
     def name(self) -> str:
-        """Name of the machine where it is the top one, else its label."""
+        """Return the name of the machine where it is the top one, else its label."""
         return self._node.below[-1] if self._node.below else self._node.name
 
     @property
@@ -68,22 +68,25 @@ class Oracle:
 
     @property
     def path(self) -> str:
-        """Container path, such as TOP/PICK."""
+        """Return the container's path, such as TOP/PICK."""
         return self._node.path
 
     @property
     def settings(self) -> Settings:
-        """Settings in force."""
+        """Return the settings in force."""
         return self._node.settings
 
     @property
     def events(self) -> EventSource:
-        """The events of the whole tree. Append to `events.observers` to be told."""
+        """Return the events of the whole tree.
+
+        Append a function to `events.observers` to be called with each.
+        """
         return self._node.events
 
     @property
     def expert(self) -> Optional[Expert]:
-        """The expert whom any container of the tree asks."""
+        """Return the expert whom any container of the tree asks."""
         return self._node.tree.expert
 
     @expert.setter
@@ -123,7 +126,7 @@ class Oracle:
 
     @property
     def trial_id(self) -> str:
-        """Id of the present or latest trial, '' before the first."""
+        """Return the id of the present or latest trial, '' before the first."""
         return self._node.tree.trial_id
 
     @property

@@ -21,7 +21,7 @@ class _Done(NamedTuple):
 
 
 def begin_watching(node: TreeNode) -> None:
-    """At the beginning of a trial: number the visits where a state of the tree is guarded."""
+    """Begin a trial: number the visits where a state of the tree is guarded."""
     nodes = list(nodes_of(node.machine))
     node.tree.numbers_visits = node.tree.recover and any(
         each.in_force.guards_states() for each in nodes)

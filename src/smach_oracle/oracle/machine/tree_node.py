@@ -150,7 +150,7 @@ class TreeNode:
 
     @property
     def path(self) -> str:
-        """Container path: the top machine's name and the labels below it, joined by '/'."""
+        """Return the path: the top machine's name and the labels below it, joined by '/'."""
         if self.parent is None:
             return self.name
         return '/'.join((self.parent.path,) + self.below)
@@ -164,7 +164,7 @@ class TreeNode:
 
     @property
     def relative_path(self) -> str:
-        """Path below the top machine, '' for itself."""
+        """Return the path below the top machine, '' for itself."""
         if self.parent is None:
             return ''
         above = self.parent.relative_path
@@ -236,7 +236,7 @@ class TreeNode:
 
     @property
     def settings(self) -> Settings:
-        """Settings of the whole machine in force here."""
+        """Return the settings of the whole machine in force here."""
         return self.in_force.of_machine
 
     def configure(self, settings: Settings) -> None:
@@ -311,7 +311,7 @@ class TreeNode:
         self.emit(EventKind.WARNING, state=label, text=text)
 
     def tell_preempt(self) -> None:
-        """PREEMPT, once for each request."""
+        """Emit PREEMPT, once for each request."""
         if not self.preempt_told:
             self.preempt_told = True
             self.emit(EventKind.PREEMPT, state=self.machine._current_label or '')

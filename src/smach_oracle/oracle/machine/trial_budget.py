@@ -94,7 +94,7 @@ class TrialBudget:
         return _spent(self._limits.recoveries, self._recoveries, 'recovery', 'recoveries')
 
     def take_recovery(self) -> str:
-        """Spend one, or say that they are spent."""
+        """Spend one recovery, or say that all are spent."""
         with self._lock:
             why_not = self.why_no_recovery()
             self._recoveries += not why_not
@@ -105,7 +105,7 @@ class TrialBudget:
         return _spent(self._limits.questions, self._questions, 'question', 'questions')
 
     def take_question(self) -> str:
-        """Spend one, or say that they are spent."""
+        """Spend one question, or say that all are spent."""
         with self._lock:
             why_not = self.why_no_question()
             self._questions += not why_not

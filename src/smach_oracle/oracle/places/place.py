@@ -14,7 +14,7 @@ class Place(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of the container, and the label."""
+        """Return the path of the container, and the label."""
         return '{}/{}'.format(self.node.path, self.label)
 
 

@@ -23,7 +23,7 @@ class Way(NamedTuple):
 
     @property
     def first(self) -> str:
-        """Label of the state of `meets` that is entered."""
+        """Return the label of the state of `meets` that is entered."""
         return self.down[0].label
 
 

@@ -16,7 +16,7 @@ NO_OUTCOME = 'ended without an outcome: inconsistent, or shut down'
 
 
 class EventKind(IntEnum):
-    """Kinds of step. The numbers are those of OracleEvent.msg."""
+    """The kinds of step. The numbers are those of OracleEvent.msg."""
 
     TRIAL_START = 1
     TRIAL_END = 2
@@ -52,7 +52,7 @@ class EventKind(IntEnum):
 
 
 class FailureKind(IntEnum):
-    """How a state failed. The numbers are those of OracleEvent.msg."""
+    """The kinds of failure of a state. The numbers are those of OracleEvent.msg."""
 
     NOT_A_FAILURE = 0
     FAILING_OUTCOME = 1
@@ -115,7 +115,7 @@ class EventSource:
 
     @property
     def last_seq(self) -> int:
-        """Number of the last event, or -1 before the first."""
+        """Return the number of the last event, or -1 before the first."""
         return self._seq - 1
 
     def go_on_behind(self, seq: int) -> None:

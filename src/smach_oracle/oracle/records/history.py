@@ -90,7 +90,7 @@ class History:
 
     @property
     def visits_of_execution(self) -> int:
-        """Number of visits of this execution, where they are counted, else of those kept."""
+        """Return the number of visits of this execution, where counted, else of those kept."""
         return (self.visits.added if isinstance(self.visits, _CountedVisits)
                 else len(self.visits))
 

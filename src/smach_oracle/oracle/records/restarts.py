@@ -3,7 +3,7 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 
 
 class Restarts:
-    """Of one trial of a tree.
+    """The restarts of one trial of a tree.
 
     `count`: how often its top machine was started over. `is_due`: whether the userdata of the start
     is wanted, and not kept yet.

@@ -201,7 +201,7 @@ class StateRecord:
 
     @property
     def rate(self) -> float:
-        """Learned failure rate, 0 to 1."""
+        """Return the learned failure rate, 0 to 1."""
         with self._lock:
             return self._up_to_date().rate
 
@@ -213,19 +213,19 @@ class StateRecord:
 
     @property
     def failure_class(self) -> FailureClass:
-        """Class by the learned rate."""
+        """Return the class by the learned rate."""
         return classify(self.rate, self.settings.moderate_from, self.settings.high_from)
 
     @property
     def totals(self) -> Tuple[int, int]:
-        """Successes and failures in all."""
+        """Return the numbers of successes and failures in all."""
         with self._lock:
             estimator = self._up_to_date()
             return estimator.successes, estimator.failures
 
     @property
     def visits(self) -> int:
-        """Visits of this trial that have ended."""
+        """Return the visits of this trial that have ended."""
         return self._visits + self._by_edges() - self._visits_before
 
     def begin_trial(self) -> None:
@@ -237,7 +237,7 @@ class StateRecord:
 
     @property
     def most_repeats(self) -> int:
-        """How often it is repeated in a trial where no failure is counted, at least once."""
+        """Return how often it is repeated in a trial without a counted failure, at least once."""
         return max(1, self.settings.max_recoveries)
 
     def left_by(self, outcome: str, target: str) -> None:

@@ -6,7 +6,7 @@ from typing import Dict
 
 
 class VisitMark:
-    """Of one state in one trial.
+    """The marks of one state in one trial.
 
     `reached`: number of its latest visit, over the whole tree. 0 means none. `executed`: number of
     the latest visit in which it was executed, and not held back. 0 means none. `done`: whether it

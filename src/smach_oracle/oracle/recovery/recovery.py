@@ -73,7 +73,7 @@ class Recovery:
         return self._stop.stopped()
 
     def run(self) -> Verdict:
-        """Decide, and ask where the policy says so. Neither where the trial's time is over."""
+        """Decide, and ask where the policy says so. Do neither where the trial's time is over."""
         if self._budget.why_over():
             return self._end_unaided()
         decided = self._deciding.decide(self._why_left_to_others)
@@ -233,7 +233,7 @@ class Recovery:
         return make_question(self._node, self._record, self._failure, account, deadline_s)
 
     def say_that_it_waits(self, question: Question) -> None:
-        """In the log: a machine that stands still for minutes looks as if it hung."""
+        """Log that the machine waits: for minutes it would look as if it hung."""
         self._say_that_it_waits(question, ' '.join(self._node.settings.on_no_answer).strip())
 
     def _say_that_it_waits(self, question: Question, fallback: str) -> None:

@@ -34,7 +34,7 @@ class Verdict(NamedTuple):
 
     @property
     def arrives_at(self) -> Optional[TreeNode]:
-        """The level above that goes on, once the containers below it are left.
+        """Return the level above that goes on, once the containers below it are left.
 
         None means no other.
         """

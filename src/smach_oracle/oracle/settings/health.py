@@ -159,6 +159,6 @@ def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, 
 
 
 def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:
-    """What is to be listened to, in words. Functions are called instead."""
+    """Return what must be listened to, in words. Functions are called instead."""
     return ['{} {}'.format(condition.kind.value, condition.source) for condition in conditions
             if condition.kind is not HealthKind.FUNCTION]

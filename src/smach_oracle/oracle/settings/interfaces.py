@@ -41,7 +41,7 @@ Offers = Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]
 
 
 def checked_interfaces(given: object) -> Offers:
-    """Each offer with the states it serves, () for all of them.
+    """Return each offer with the states it serves, () for all of them.
 
     :raises SettingsError: naming key, value and what is allowed.
     """

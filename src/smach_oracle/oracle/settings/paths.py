@@ -25,7 +25,7 @@ def check_writable(key: str, path: str, replaced: bool = False) -> None:
 
 
 def why_not_writable(path: str, replaced: bool = False) -> str:
-    """Why a file cannot be written, '' where it can. See `check_writable`."""
+    """Return why a file cannot be written, '' where it can. See `check_writable`."""
     folder = os.path.dirname(os.path.abspath(path))
     if os.path.isdir(path):
         return 'it is a folder'

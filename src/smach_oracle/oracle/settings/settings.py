@@ -31,7 +31,7 @@ _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
 
 @dataclass(frozen=True)
 class StateSettings:
-    """Settings of one state: the machine's defaults, unless set for the state."""
+    """The settings of one state: the machine's defaults, unless set for the state."""
 
     memory: int = 10  # results
     prior: float = 0.1  # failure rate, 0 to 1
@@ -93,7 +93,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a wrapped machine.
+    """The settings of a wrapped machine.
 
     `states` holds what is set for single states, by LABEL or PATH/LABEL, or by a pattern of them.
     """
