@@ -219,11 +219,11 @@ class Concurrence(Container):
         return self._states[key]
 
     def get_children(self) -> Dict[str, State]:
-        """The states by label."""
+        """Return the states by label."""
         return self._states
 
     def get_initial_states(self) -> List[str]:
-        """All labels."""
+        """Return all labels."""
         return list(self._states)
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
@@ -237,12 +237,12 @@ class Concurrence(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> List[str]:
-        """The labels of the children that are running."""
+        """Return the labels of the children that are running."""
         run = self._run
         return [] if run is None else run.active()
 
     def get_internal_edges(self) -> List[Edge]:
-        """Each condition of the outcome map as (child outcome, label, container outcome)."""
+        """Return each condition of the outcome map as (child outcome, label, container outcome)."""
         return [(outcome, label, container_outcome)
                 for container_outcome, conditions in _entries(self._outcome_map)
                 for label, outcome in _entries(conditions)]

@@ -135,11 +135,11 @@ class Container(State):
         raise NotImplementedError()
 
     def get_children(self) -> Dict[str, State]:
-        """The states of this container by label."""
+        """Return the states of this container by label."""
         raise NotImplementedError()
 
     def get_initial_states(self) -> List[str]:
-        """The labels at which execution begins."""
+        """Return the labels at which execution begins."""
         raise NotImplementedError()
 
     def set_initial_state(self, initial_states: List[str], userdata: Any) -> None:
@@ -149,11 +149,11 @@ class Container(State):
         raise NotImplementedError()
 
     def get_active_states(self) -> List[str]:
-        """The labels of the states that are being executed."""
+        """Return the labels of the states that are being executed."""
         raise NotImplementedError()
 
     def get_internal_edges(self) -> List[Edge]:
-        """All transitions, as (outcome, from label, to label or container outcome)."""
+        """Return all transitions, as (outcome, from label, to label or container outcome)."""
         raise NotImplementedError()
 
     # -- callbacks

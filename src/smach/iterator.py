@@ -72,7 +72,10 @@ class Iterator(Container):
         iterator._final_outcome_map = dict(final_outcome_map or {})
 
     def check_consistency(self) -> None:
-        """An iterator is always consistent. One without a state can only be run over no items."""
+        """Do nothing: an iterator is always consistent.
+
+        One without a state can only be run over no items.
+        """
 
     # -- execution
 
@@ -182,11 +185,11 @@ class Iterator(Container):
         return self._state
 
     def get_children(self) -> Dict[str, State]:
-        """The contained state under its label."""
+        """Return the contained state under its label."""
         return {} if self._state is None else {self._state_label: self._state}
 
     def get_initial_states(self) -> List[str]:
-        """The label of the contained state, in a list."""
+        """Return the label of the contained state, in a list."""
         return [self._state_label]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any = None) -> None:
@@ -202,12 +205,14 @@ class Iterator(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> List[str]:
-        """The label of the contained state while it is iterated over, else nothing."""
+        """Return the label of the contained state while it is iterated over, else nothing."""
         return [self._state_label] if self._is_running else []
 
     def get_internal_edges(self) -> List[Edge]:
-        """Loop outcomes lead back to the state, break outcomes to what the final outcome map says,
-        or None.
+        """Return the edges of the loop, the breaks and the end.
+
+        Loop outcomes lead back to the state, break outcomes to the final outcome map's value, or to
+        None.
         """
         label = self._state_label
         edges: List[Edge] = [(outcome, label, label) for outcome in self._loop_outcomes]

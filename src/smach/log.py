@@ -14,22 +14,22 @@ Logger = Callable[[str], object]
 
 
 def loginfo(msg: object) -> None:
-    """Default info logger: standard output."""
+    """Log an info message to standard output, by default."""
     sys.stdout.write('[  INFO ] : %s\n' % (msg,))
 
 
 def logwarn(msg: object) -> None:
-    """Default warning logger: standard output."""
+    """Log a warning to standard output, by default."""
     sys.stdout.write('[  WARN ] : %s\n' % (msg,))
 
 
 def logdebug(msg: object) -> None:
-    """Default debug logger: standard output."""
+    """Log a debug message to standard output, by default."""
     sys.stdout.write('[ DEBUG ] : %s\n' % (msg,))
 
 
 def logerr(msg: object) -> None:
-    """Default error logger: standard output."""
+    """Log an error to standard output, by default."""
     sys.stdout.write('[ ERROR ] : %s\n' % (msg,))
 
 

@@ -49,7 +49,7 @@ class ParallelRun(object):
         self._left_behind = False
 
     def active(self) -> List[str]:
-        """The labels of the states that are running, in the order in which they were added."""
+        """Return the labels of the running states, in the order in which they were added."""
         return [label for label in self._states if label in self._running]
 
     def run(self) -> None:

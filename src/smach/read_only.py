@@ -135,7 +135,10 @@ def _behind(obj: Any) -> Any:
 
 
 def get_const(obj: Any) -> Any:
-    """A read-only view of ``obj``, or ``obj`` itself where it has no attributes of its own."""
+    """Return a read-only view of ``obj``.
+
+    It is ``obj`` itself where that has no attributes of its own.
+    """
     if type(obj) in PLAIN_TYPES or issubclass(type(obj), Const) or isinstance(
             obj, _COME_AS_THEY_ARE):
         return obj

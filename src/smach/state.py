@@ -32,7 +32,7 @@ class State(object):
         self._outcomes = self._outcomes.union(new_outcomes)
 
     def get_registered_outcomes(self) -> Tuple[str, ...]:
-        """The names ``execute`` may return."""
+        """Return the names ``execute`` may return."""
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
@@ -46,7 +46,7 @@ class State(object):
         self._input_keys = self._input_keys.union(keys)
 
     def get_registered_input_keys(self) -> Tuple[str, ...]:
-        """The keys ``execute`` reads."""
+        """Return the keys ``execute`` reads."""
         return tuple(self._input_keys)
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
@@ -54,7 +54,7 @@ class State(object):
         self._output_keys = self._output_keys.union(keys)
 
     def get_registered_output_keys(self) -> Tuple[str, ...]:
-        """The keys ``execute`` writes."""
+        """Return the keys ``execute`` writes."""
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:

@@ -350,11 +350,11 @@ class StateMachine(Container):
         return self._states[key]
 
     def get_children(self) -> Dict[str, State]:
-        """The states by label."""
+        """Return the states by label."""
         return self._states
 
     def get_initial_states(self) -> List[str]:
-        """The label at which execution begins, in a list."""
+        """Return the label at which execution begins, in a list."""
         return [str(self._initial_state_label)]
 
     def set_initial_state(self, initial_states: Sequence[str],
@@ -374,11 +374,14 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> List[str]:
-        """The label of the current state, in a list. 'None' while there is none."""
+        """Return the label of the current state, in a list. 'None' while there is none."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> List[Edge]:
-        """All transitions as (outcome, from, to). To is None where the outcome falls through."""
+        """Return all transitions as (outcome, from, to).
+
+        To is None where the outcome falls through.
+        """
         return [(outcome, label, to) for label, transitions in self._transitions.items()
                 for outcome, to in transitions.items()]
 

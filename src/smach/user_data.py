@@ -57,7 +57,7 @@ class UserData(object):
         return key in self._data
 
     def keys(self) -> List[str]:
-        """All keys, in the order in which they were first written."""
+        """Return all keys, in the order in which they were first written."""
         return list(self._data)
 
     def update(self, other_userdata: Union['UserData', Mapping[str, Any]]) -> None:
@@ -65,8 +65,9 @@ class UserData(object):
         self._data.update(_as_dict(other_userdata))
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> 'UserData':
-        """A new userdata with shallow copies of the given keys. ``remapping`` maps new names to
-        keys of this one.
+        """Return a new userdata with shallow copies of the given keys.
+
+        ``remapping`` maps new names to keys of this one.
         """
         new_names = {old: new for new, old in remapping.items()}
         extracted = UserData()
@@ -153,7 +154,7 @@ class Remapper(object):
         return key in _parts_of(self)[1] and self._remap(key) in _parts_of(self)[0]
 
     def keys(self) -> List[str]:
-        """The input keys that have a value, under the state's names for them."""
+        """Return the input keys that have a value, under the state's names for them."""
         ud, input_keys = _parts_of(self)[:2]
         names: Dict[str, List[str]] = {}
         for name in _listed(input_keys):

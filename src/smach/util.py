@@ -41,21 +41,22 @@ class CBInterface(object):
         return self._cb(*args, **kwargs)
 
     def get_registered_outcomes(self) -> Tuple[str, ...]:
-        """The outcomes the callback may return."""
+        """Return the outcomes the callback may return."""
         return tuple(self._outcomes)
 
     def get_registered_input_keys(self) -> Tuple[str, ...]:
-        """The keys the callback reads."""
+        """Return the keys the callback reads."""
         return tuple(self._input_keys)
 
     def get_registered_output_keys(self) -> Tuple[str, ...]:
-        """The keys the callback writes."""
+        """Return the keys the callback writes."""
         return tuple(self._output_keys)
 
 
 class cb_interface(object):
-    """Decorator that gives a callback an interface: ``@cb_interface(outcomes=['done'],
-    input_keys=['x'])``.
+    """Decorate a callback with an interface.
+
+    An example: ``@cb_interface(outcomes=['done'], input_keys=['x'])``.
     """
 
     def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),

@@ -30,7 +30,7 @@ class StateVisit(object):
         self.remapper = Remapper(userdata, self.input_keys, self.output_keys, remapping)
 
     def text_of(self, label: str, outcome: str, target: Optional[str]) -> str:
-        """The log line of a transition, made once and kept."""
+        """Return the log line of a transition, made once and kept."""
         text = "State machine transitioning '%s':'%s'-->'%s'" % (label, outcome, target)
         self.texts[outcome] = (target, text)
         return text

@@ -30,8 +30,9 @@ _links_lock = threading.Lock()
 
 
 def link_to(action_name: str, action_spec: Any) -> 'ActionLink':
-    """The process's link to the action, opened in the background if this is the first call for
-    it.
+    """Return the process's link to the action.
+
+    The first call for it opens the link in the background.
     """
     key = (rospy.resolve_name(action_name), action_spec)
     with _links_lock:
@@ -145,7 +146,7 @@ class ActionLink(object):
                                            for topic in told) else ()
 
     def problem(self, frozen_after_s: float) -> Optional[str]:
-        """Why the server must be regarded as lost, or None. See ServerWatch."""
+        """Return why the server must be regarded as lost, or None. See ServerWatch."""
         return self.watch.problem(frozen_after_s) if self.watch is not None else None
 
     def send_goal(self, goal: Any, on_transition: Callable[[Any], None],

@@ -89,7 +89,7 @@ class ActionServerWrapper(object):
 
     def termination_cb(self, userdata: Any, terminal_states: List[str], container_outcome: str,
                        *args: Any) -> None:
-        """The container has ended with ``container_outcome``. To be overridden."""
+        """Note that the container has ended with ``container_outcome``. Override it."""
 
     def publish_feedback(self, userdata: Any) -> None:
         """Publish the feedback found in ``userdata``, if a goal is active and there is any."""

@@ -63,18 +63,19 @@ class GoalRun(object):
             smach.logwarn('Could not cancel the goal: %r' % err)
 
     def close(self) -> None:
-        """The state has what it needs: a shutdown need not cancel this goal any more."""
+        """Note that the state has what it needs. A shutdown need not cancel this goal any more."""
         self._link.active_runs.discard(self)
 
     def abandon(self) -> None:
-        """Track the goal no more. It counts as lost, without a result."""
+        """Stop tracking the goal. It counts as lost, without a result."""
         self._listener = None
         self.handle = None
         self.status, self.result = GoalStatus.LOST, None
 
     def problem(self, frozen_after_s: float) -> Optional[str]:
-        """Why the goal will never end: the server is lost, or never took notice of it. None as long
-        as it may.
+        """Return why the goal will never end, None as long as it may.
+
+        The server is lost, or never took notice of the goal.
         """
         return self._link.problem(frozen_after_s) or self._never_received() or self._result_lost()
 

@@ -19,8 +19,9 @@ class IntrospectionClient(object):
     """Talks to the introspection servers of this master."""
 
     def get_servers(self) -> List[str]:
-        """Names of all servers that publish now. It raises what rospy raises if the master does not
-        answer.
+        """Return the names of all servers that publish now.
+
+        It raises what rospy raises if the master does not answer.
         """
         return sorted(topic[:-len(STATUS_TOPIC)] for topic, kind in rospy.get_published_topics()
                       if kind == SmachContainerStatus._type and topic.endswith(STATUS_TOPIC))

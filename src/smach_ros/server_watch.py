@@ -50,7 +50,7 @@ class ServerWatch(object):
         self._said_silent = False
 
     def note_status(self, message: Any) -> None:
-        """To be called for every status message."""
+        """Take note of a status message. Call it for every one."""
         self.server_id = message._connection_header['callerid']
         self._last_status_at = self._clock()
         self.status_count += 1
@@ -66,8 +66,9 @@ class ServerWatch(object):
                 and getattr(connection, 'socket', None) is not None]
 
     def problem(self, frozen_after_s: float = FROZEN_AFTER_S) -> Optional[str]:
-        """Why the server must be regarded as lost, or None while it lives or nothing is certain
-        yet. Never blocks.
+        """Return why the server must be regarded as lost.
+
+        None means that it lives, or that nothing is certain yet. It never blocks.
         """
         now = self._clock()
         connections = self.connections()

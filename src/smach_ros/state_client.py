@@ -23,12 +23,12 @@ class StateClient(actionlib.SimpleActionClient):
         self.done_cb = self.active_cb = self.feedback_cb = None
 
     def follow(self, handle: Any) -> None:
-        """Mean the goal of this handle from now on."""
+        """Follow the goal of this handle from now on."""
         self.gh = handle
         self.simple_state = SimpleGoalState.ACTIVE
 
     def ended(self) -> None:
-        """The state's goal has ended, or is tracked no more."""
+        """Note that the state's goal has ended, or is tracked no more."""
         with self.done_condition:
             self.simple_state = SimpleGoalState.DONE
             self.done_condition.notify_all()

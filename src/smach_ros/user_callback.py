@@ -45,8 +45,9 @@ class UserCallback(object):
 
 
 def checked_slots(what: str, slots: Iterable[str], message: Any) -> Tuple[str, ...]:
-    """``slots`` as a tuple. It raises ``smach.InvalidStateError`` for one that is no field of
-    ``message``.
+    """Return ``slots`` as a tuple.
+
+    It raises ``smach.InvalidStateError`` for one that is not a field of ``message``.
     """
     slots = tuple(slots)
     unknown = [slot for slot in slots if slot not in message.__slots__]

@@ -21,7 +21,7 @@ def shutting_down() -> bool:
 
 
 def seconds(duration: Any) -> Optional[float]:
-    """A ``rospy.Duration``, a number of seconds or None (no limit), in seconds.
+    """Return a ``rospy.Duration``, a number of seconds or None (no limit), in seconds.
 
     :raises InvalidStateError: for anything else.
     """
@@ -38,7 +38,7 @@ def seconds(duration: Any) -> Optional[float]:
 
 
 def deadline_after(timeout_s: Optional[float]) -> Optional[float]:
-    """The monotonic time (s) ``timeout_s`` from now. None stays None."""
+    """Return the monotonic time (s) ``timeout_s`` from now. None stays None."""
     return None if timeout_s is None else time.monotonic() + timeout_s
 
 

@@ -36,10 +36,10 @@ class QuestionSource(Protocol):
     """The open questions and their servers, such as a FrontEnd knows them."""
 
     def find(self, key: str) -> Optional[ListedQuestion]:
-        """One open question by its key, or None where it is open no longer."""
+        """Return one open question by its key, or None where it is open no longer."""
 
     def server(self, listed: ListedQuestion) -> ClaimServer:
-        """The server of a question.
+        """Return the server of a question.
 
         :raises ServerGoneError: if it is followed no longer.
         """
@@ -68,7 +68,7 @@ class ClaimKeeper:
 
     @property
     def held(self) -> Dict[Claim, ListedQuestion]:
-        """The claims that are renewed, and their questions."""
+        """Return the claims that are renewed, and their questions."""
         with self._lock:
             return {claim: kept.listed for claim, kept in self._kept.items()}
 

@@ -35,7 +35,7 @@ class ListedQuestion(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Tells questions of all servers apart."""
+        """Return a key that tells questions of all servers apart."""
         return '{} {}'.format(self.server, self.goal.query_id)
 
 
@@ -73,14 +73,14 @@ class FollowedServer:
 
     @property
     def news(self) -> Optional[ListNews]:
-        """When its list came last, or None before the first.
+        """Return when its list came last, or None before the first.
 
         While a question is open the list comes every second.
         """
         return self._news
 
     def questions(self) -> List[ListedQuestion]:
-        """The open questions, oldest first. None while the server is gone."""
+        """Return the open questions, oldest first. The list is empty while the server is gone."""
         known = self._questions
         if self.connected:
             return list(known)

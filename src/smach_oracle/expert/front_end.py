@@ -47,7 +47,7 @@ class FrontEnd:
 
     @property
     def servers(self) -> List[str]:
-        """Names of the servers followed, sorted."""
+        """Return the names of the servers followed, sorted."""
         return sorted(self._servers)
 
     def connected(self, server: str) -> bool:
@@ -56,7 +56,7 @@ class FrontEnd:
         return followed is not None and followed.connected
 
     def news(self, server: str) -> Optional[ListNews]:
-        """When the server's list came last, or None before the first."""
+        """Return when the server's list came last, or None before the first."""
         followed = self._servers.get(server)
         return followed.news if followed is not None else None
 
@@ -66,7 +66,7 @@ class FrontEnd:
         return sorted(found, key=lambda listed: (listed.asked_s, listed.key))
 
     def find(self, key: str) -> Optional[ListedQuestion]:
-        """One open question by its key, None where it is open no longer."""
+        """Return one open question by its key, None where it is open no longer."""
         return next((listed for listed in self.questions() if listed.key == key), None)
 
     def wait_for_change(self, version: int, timeout_s: float) -> int:
@@ -127,7 +127,7 @@ class FrontEnd:
             server.stop()
 
     def server(self, listed: ListedQuestion) -> FollowedServer:
-        """The server of a question, for front ends that serve several experts.
+        """Return the server of a question, for front ends that serve several experts.
 
         :raises ServerGoneError: where it has been gone for so long that it is followed no longer.
         """

@@ -25,7 +25,7 @@ class InterfaceOutputs:
         self._topics.follow(robots)
 
     def newest(self, query_id: str) -> Optional[InterfaceOutput]:
-        """The newest message about a question, or None where nothing was started for it."""
+        """Return the newest message about a question, or None where nothing was started for it."""
         with self._lock:
             return next((each for each in self._newest.values() if each.query_id == query_id), None)
 
@@ -34,7 +34,7 @@ class InterfaceOutputs:
         self._topics.stop()
 
     def taker(self, robot: str) -> Callable[[InterfaceOutput], None]:
-        """The function that takes a robot's messages."""
+        """Return the function that takes a robot's messages."""
         def take(message: InterfaceOutput) -> None:
             if self._query_id in ('', message.query_id):
                 self._keep(robot, message)

@@ -59,7 +59,7 @@ class Rule(NamedTuple):
     container: str = ''  # goto, give_up: path of another container than that of the failed state
 
     def why_not(self, choices: Iterable[_Choice]) -> str:
-        """Why it must not answer a question with these choices, '' where it may."""
+        """Return why it must not answer a question with these choices, '' where it may."""
         repeats = self.kind == 'goto' and any(
             self._names(choice) and any(
                 (each + '/').endswith('/{}/'.format(choice.state)) or each == choice.state
@@ -73,7 +73,7 @@ class Rule(NamedTuple):
         return choice.state == self.state and self.container in ('', choice.container)
 
     def answer(self, by: str) -> Answer:
-        """The answer. A rule that ignores has none.
+        """Return the answer. A rule that ignores has none.
 
         :raises KeyError: for a rule that ignores.
         """
@@ -90,7 +90,7 @@ class Rules:
 
     @classmethod
     def parse(cls, settings: Mapping[str, Any]) -> 'Rules':
-        """Rules from a dictionary as YAML gives it.
+        """Make rules from a dictionary as YAML gives it.
 
         :raises SettingsError: naming the key, the value and what is allowed.
         """
@@ -99,7 +99,7 @@ class Rules:
         return cls({state: _parse_rules(state, value) for state, value in settings.items()})
 
     def next(self, robot: str, trial_id: str, container_path: str, state: str) -> Rule:
-        """The rule for one more question. Each call counts."""
+        """Return the rule for one more question. Each call counts."""
         path = '{}/{}'.format(container_path, state)
         keys = (path, '/'.join([OLD_NAME] + path.split('/')[1:]), state, DEFAULT)
         rules = next((self._by_state[key] for key in keys if key in self._by_state), ())
@@ -125,7 +125,7 @@ class RuleExpert(Expert):
 
     def ask(self, question: Question, cancelled: threading.Event,
             progress: Progress) -> Optional[Answer]:
-        """The rule's answer after its delay.
+        """Return the rule's answer after its delay.
 
         None by the deadline where the rule ignores or comes too late, or would have a state
         repeated that it does not confirm.

@@ -121,7 +121,7 @@ class ScriptedExpert:
 
 
 def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
-    """Rules from a dictionary, else from a YAML file.
+    """Make rules from a dictionary, else from a YAML file.
 
     :raises SettingsError: naming what is wrong with them, or with the file.
     """
@@ -140,7 +140,9 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
 
 
 def servers_of(value: object) -> List[str]:
-    """Names of servers from a text, separated by spaces, or a list. None for all that there are.
+    """Return the names of servers from a text, separated by spaces, or from a list.
+
+    None means all that there are.
 
     :raises SettingsError: for anything else.
     """

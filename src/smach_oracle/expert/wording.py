@@ -26,14 +26,14 @@ def still_runs(goal: ExpertQueryGoal) -> bool:
 
 
 def standing_words(goal: ExpertQueryGoal) -> str:
-    """How the state of a question stands, to follow its name."""
+    """Return how the state of a question stands, to follow its name."""
     return {ExpertQueryGoal.STILL_RUNNING: 'still runs',
             OracleEvent.INTERRUPTED: 'was interrupted',
             ExpertQueryGoal.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
 
 
 def failure_words(goal: ExpertQueryGoal) -> str:
-    """How the state of a question failed, or that it still runs."""
+    """Return how the state of a question failed, or that it still runs."""
     outcome = clean(goal.outcome)
     return {
         ExpertQueryGoal.STILL_RUNNING: 'still runs',
@@ -59,7 +59,7 @@ def _jumps_to(event: Union[OracleEvent, Event]) -> str:
 
 
 def next_step_words(event: Union[OracleEvent, Event]) -> str:
-    """An event that follows an answer, as a sentence, or '' for events of other kinds."""
+    """Return an event that follows an answer, as a sentence, or '' for events of other kinds."""
     state, outcome, target = clean(event.state), clean(event.outcome), clean(event.target)
     path = clean(event.path)
     return {
@@ -84,7 +84,7 @@ def next_step_words(event: Union[OracleEvent, Event]) -> str:
 
 
 def event_words(event: Event) -> str:
-    """Any event as a sentence."""
+    """Return any event as a sentence."""
     by = ' by ' + event.by if event.by else ''
     sentence = {
         EventKind.TRIAL_START: lambda: 'The trial of {} began.'.format(event.path),

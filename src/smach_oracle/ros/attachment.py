@@ -323,7 +323,7 @@ _attachments = Attachments()
 
 
 def attachments() -> Attachments:
-    """Those of this process."""
+    """Return the attachments of this process."""
     return _attachments
 
 

@@ -24,7 +24,10 @@ TOPIC_ERRORS = (AttributeError, TypeError, rospy.ROSException)
 
 
 def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
-    """Its connections, without those whose socket is gone, which only wait to be made again."""
+    """Return its connections, without those whose socket is gone.
+
+    The latter only wait to be made again.
+    """
     if subscriber.impl is None:
         return []
     return [

@@ -114,7 +114,7 @@ class OracleContainer(BareContainer):
 
 
 def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> Settings:
-    """Settings with all names of Python objects resolved.
+    """Return settings with all names of Python objects resolved.
 
     :raises SettingsError: naming key, value and what is allowed, and where the key was set if that
         is known.

@@ -47,7 +47,7 @@ class SentGoal:
         self._handle = handle
 
     def poll(self, timeout_s: float = POLL_S) -> Optional[GoalEvent]:
-        """The next event, or None where there is none within the time."""
+        """Return the next event, or None where there is none within the time."""
         try:
             return self._events.get(timeout=timeout_s)
         except queue.Empty:
@@ -69,7 +69,7 @@ class SentGoal:
                 rospy.logdebug('A goal could not be cancelled while the node goes down.')
 
     def on_transition(self, handle: actionlib.ClientGoalHandle) -> None:
-        """actionlib's callback."""
+        """Take a transition. This is actionlib's callback."""
         state = handle.get_comm_state()
         self._acknowledged = self._acknowledged or state != actionlib.CommState.WAITING_FOR_GOAL_ACK
         if state == actionlib.CommState.WAITING_FOR_RESULT:
@@ -80,7 +80,7 @@ class SentGoal:
                           text=handle.get_goal_status_text()))
 
     def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: genpy.Message) -> None:
-        """actionlib's callback."""
+        """Take feedback. This is actionlib's callback."""
         self._events.put(GoalEvent(feedback=feedback))
 
 

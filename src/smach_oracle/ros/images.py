@@ -20,7 +20,7 @@ class ImageError(ValueError):
 
 
 def colour_of(image: Image) -> np.ndarray:
-    """(h, w, 3) uint8 RGB of a colour or grey image.
+    """Return (h, w, 3) uint8 RGB of a colour or grey image.
 
     :raises ImageError: where the message is not such an image.
     """
@@ -29,7 +29,7 @@ def colour_of(image: Image) -> np.ndarray:
 
 
 def depth_of(image: Image) -> np.ndarray:
-    """(h, w) float32 in m, NaN where nothing was measured.
+    """Return (h, w) float32 in m, NaN where nothing was measured.
 
     REP 118 allows float metres or integer millimetres.
 
@@ -42,7 +42,7 @@ def depth_of(image: Image) -> np.ndarray:
 
 
 def intrinsics_of(info: CameraInfo) -> np.ndarray:
-    """(3, 3): the camera matrix of a rectified image.
+    """Return the (3, 3) camera matrix of a rectified image.
 
     :raises ImageError: where the camera is not calibrated.
     """
@@ -57,23 +57,23 @@ def intrinsics_of(info: CameraInfo) -> np.ndarray:
 
 
 def colour_image(colour: np.ndarray, header: Header) -> Image:
-    """rgb8 message of (h, w, 3) uint8."""
+    """Make an rgb8 message of (h, w, 3) uint8."""
     return _image(np.ascontiguousarray(colour, np.uint8), 'rgb8', header)
 
 
 def depth_image(depth: np.ndarray, header: Header) -> Image:
-    """32FC1 message of (h, w) in m."""
+    """Make a 32FC1 message of (h, w) in m."""
     return _image(np.ascontiguousarray(depth, '<f4'), '32FC1', header)
 
 
 def mask_image(mask: np.ndarray, header: Header) -> Image:
-    """mono8 message of (h, w) bool: 255 and 0."""
+    """Make a mono8 message of (h, w) bool: 255 and 0."""
     return _image(np.where(mask, 255, 0).astype(np.uint8), 'mono8', header)
 
 
 def cloud_message(points: np.ndarray, header: Header,
                   colours: Optional[np.ndarray] = None) -> PointCloud2:
-    """Cloud of points (n, 3) in m, or organised (h, w, 3).
+    """Make a cloud of points (n, 3) in m, or organised (h, w, 3).
 
     :param colours: uint8 of the same shape. They become `rgb`.
     """

@@ -49,13 +49,13 @@ class LoadedSettings(Dict[str, Any]):
                 self._origins[each] = '{} line {}'.format(origin, line) if line else origin
 
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
-        """What `put` would replace by something else, as "max_recoveries: 5, now 0"."""
+        """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
         mine, theirs = dict(_leaves(self)), dict(_leaves(values))
         return ['{}: {!r}, now {!r}'.format(key, mine[key], value)
                 for key, value in theirs.items() if key in mine and mine[key] != value]
 
     def origin(self, key: str) -> str:
-        """Where a dotted key, or else the mapping it should be in, was set, or '' where nowhere."""
+        """Return where a dotted key, or the mapping it should be in, was set, '' for nowhere."""
         while key:
             if key in self._origins:
                 return self._origins[key]
@@ -63,7 +63,7 @@ class LoadedSettings(Dict[str, Any]):
         return ''
 
     def located(self, err: SettingsError) -> SettingsError:
-        """The same error, naming the source as well."""
+        """Return the same error, naming the source as well."""
         origin = self.origin(err.key)
         return err.set_at(origin) if origin else err
 
@@ -179,7 +179,7 @@ def missing_attribute(module: str, attribute: str, names: Iterable[str]) -> str:
 
 
 def split_python_name(name: str) -> Tuple[str, str]:
-    """Module and attribute of `python:module:attribute`.
+    """Return the module and attribute of `python:module:attribute`.
 
     :raises ValueError: where it has another form.
     """

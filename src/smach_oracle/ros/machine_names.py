@@ -112,5 +112,5 @@ _names = MachineNames()
 
 
 def machine_names() -> MachineNames:
-    """Those of this process."""
+    """Return the names of the machines of this process."""
     return _names

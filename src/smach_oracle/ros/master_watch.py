@@ -61,7 +61,7 @@ class MasterLink:
         self._node_uri = node_uri
 
     def identity(self) -> Tuple[int, bool]:
-        """The master's process id, and whether it knows this node."""
+        """Return the master's process id, and whether it knows this node."""
         with self._proxy() as master:
             pid = master.getPid(self._caller_id)[2]
             # a node of the same name elsewhere counts as known: it has replaced this one, which is
@@ -120,7 +120,7 @@ class MasterWatch:
 
     @property
     def heard_s(self) -> Optional[float]:
-        """When the master answered last, by the monotonic clock, in s, or None before it has."""
+        """Return when the master answered last (monotonic clock, s), None before it has."""
         return self._heard_s
 
     def start(self) -> None:

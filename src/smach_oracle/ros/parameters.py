@@ -8,7 +8,7 @@ from smach_oracle.oracle.settings import checks
 
 
 def number_of(key: str, default: float, low: float, high: float) -> float:
-    """A number from `low` to `high`.
+    """Return a parameter that is a number from `low` to `high`.
 
     :raises SettingsError: for anything else.
     """
@@ -16,7 +16,7 @@ def number_of(key: str, default: float, low: float, high: float) -> float:
 
 
 def name_of(key: str, default: str) -> str:
-    """A name, or another text that is not empty.
+    """Return a parameter that is a name, or another text that is not empty.
 
     :raises SettingsError: for anything else.
     """
@@ -24,7 +24,7 @@ def name_of(key: str, default: str) -> str:
 
 
 def names_of(key: str, default: List[str]) -> List[str]:
-    """A list of names.
+    """Return a parameter that is a list of names.
 
     :raises SettingsError: for anything else.
     """
@@ -32,7 +32,7 @@ def names_of(key: str, default: List[str]) -> List[str]:
 
 
 def flag_of(key: str, default: bool) -> bool:
-    """True or false.
+    """Return a parameter that is true or false.
 
     :raises SettingsError: for anything else.
     """
@@ -40,7 +40,7 @@ def flag_of(key: str, default: bool) -> bool:
 
 
 def mapping_of(key: str) -> Mapping[str, Any]:
-    """A mapping, empty where it is not set.
+    """Return a parameter that is a mapping, empty where it is not set.
 
     :raises SettingsError: for anything else.
     """
@@ -48,7 +48,7 @@ def mapping_of(key: str) -> Mapping[str, Any]:
 
 
 def checked_number(key: str, value: object, low: float, high: float) -> float:
-    """The value of a parameter, if it is a number from `low` to `high`.
+    """Return the value of a parameter, if it is a number from `low` to `high`.
 
     :raises SettingsError: where it is not.
     """
@@ -57,7 +57,7 @@ def checked_number(key: str, value: object, low: float, high: float) -> float:
 
 
 def checked_mapping(key: str, value: object) -> Mapping[str, Any]:
-    """The value of a parameter, if it is a mapping.
+    """Return the value of a parameter, if it is a mapping.
 
     :raises SettingsError: where it is not.
     """
@@ -65,7 +65,7 @@ def checked_mapping(key: str, value: object) -> Mapping[str, Any]:
 
 
 def read_or_default(param: str, default: object) -> object:
-    """A parameter, unchecked. The default where it is not set or the master does not answer.
+    """Return a parameter, unchecked. The default where it is not set or the master does not answer.
 
     A master that does not answer is logged: a robot starts without it.
     """
@@ -78,7 +78,7 @@ def read_or_default(param: str, default: object) -> object:
 
 
 def private_flag(name: str, default: bool) -> bool:
-    """A private parameter as `read_or_default` gives it, if it is true or false.
+    """Return a private parameter as `read_or_default` gives it, if it is true or false.
 
     :raises SettingsError: where it is not.
     """
@@ -86,7 +86,7 @@ def private_flag(name: str, default: bool) -> bool:
 
 
 def private_text(name: str) -> str:
-    """A private parameter as `read_or_default` gives it, if it is a text.
+    """Return a private parameter as `read_or_default` gives it, if it is a text.
 
     It is '' where it is not set.
 
@@ -96,7 +96,7 @@ def private_text(name: str) -> str:
 
 
 def private_number(name: str) -> float:
-    """A private parameter as `read_or_default` gives it, if it is a number from 0.
+    """Return a private parameter as `read_or_default` gives it, if it is a number from 0.
 
     It is 0 where it is not set.
 
@@ -107,7 +107,7 @@ def private_number(name: str) -> float:
 
 
 def private_names(name: str) -> List[str]:
-    """A private parameter as `read_or_default` gives it, if it is a list of names.
+    """Return a private parameter as `read_or_default` gives it, if it is a list of names.
 
     It is empty where it is not set.
 

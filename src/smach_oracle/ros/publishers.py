@@ -32,11 +32,11 @@ class RatesSource(Protocol):
 
     @property
     def trial_id(self) -> str:
-        """Id of the present or latest trial."""
+        """Return the id of the present or latest trial."""
 
     @property
     def events(self) -> EventSource:
-        """The events of its trials."""
+        """Return the events of its trials."""
 
     def rates(self) -> Sequence[StateRateRow]:
         """Return a row for each state."""
@@ -49,7 +49,7 @@ WatchedMachine = Union[OracleContainer, RatesSource]
 
 
 def rates_of(machine: WatchedMachine) -> OracleRates:
-    """What a machine has learned, as a message."""
+    """Return what a machine has learned, as a message."""
     source = _source_of(machine)
     return rates_to_msg(source.trial_id, source.rates(), source.transition_counts())
 

@@ -274,7 +274,7 @@ def has_node() -> bool:
 
 
 def resolve(topic: str) -> str:
-    """A topic's name as it is in the bag.
+    """Return a topic's name as it is in the bag.
 
     Without a node there is no name to put in front of `~`.
     """
@@ -282,12 +282,12 @@ def resolve(topic: str) -> str:
 
 
 def own_topics() -> RecorderTopics:
-    """Where the events and the recorder's status are, in the bag and on the wire."""
+    """Return where the events and the recorder's status are, in the bag and on the wire."""
     return RecorderTopics(resolve('~oracle/events'), resolve('~record/status'))
 
 
 def default_log() -> Tuple[Log, Log]:
-    """Functions that log good news and faults."""
+    """Return functions that log good news and faults."""
     if has_node():
         return rospy.loginfo, rospy.logerr
     log = logging.getLogger('smach_oracle.recorder')

@@ -2,7 +2,7 @@
 
 
 def sendable_text(value: object) -> str:
-    """A string that UTF-8 can encode.
+    """Return a string that UTF-8 can encode.
 
     An exception's text may hold halves of surrogate pairs (from a file name, say). rospy would send
     the message up to there and garble the connection for the messages that follow.

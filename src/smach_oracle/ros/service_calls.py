@@ -38,7 +38,7 @@ class ServiceCall(threading.Thread):
             self._error = err
 
     def result(self, limit_s: float) -> genpy.Message:
-        """The response. An error that the call has raised is raised again.
+        """Return the response. An error that the call has raised is raised again.
 
         :raises ServerGoneError: where the server cannot be reached or does not answer in time.
         """

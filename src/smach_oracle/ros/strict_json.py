@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 
 
 def load_json(text: str) -> Any:
-    """The value of a JSON text.
+    """Return the value of a JSON text.
 
     :raises ValueError: where it is not JSON, or holds NaN, Infinity or a
         number that is too large for a float (1e999).

@@ -38,7 +38,9 @@ class UserdataCodecError(OracleError, ValueError):
 
 
 def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
-    """One value for the wire. It never raises for a value: what cannot be sent becomes UNSENT.
+    """Return every key of a mapping, in the order of the keys.
+
+    `limit_bytes` holds for each value.
 
     :raises UserdataCodecError: if the key is not a string.
     """
@@ -56,7 +58,7 @@ def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> Userda
 
 
 def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> List[UserdataItem]:
-    """Every key of a mapping, in the order of the keys. `limit_bytes` holds for each value.
+    """Return every key of a mapping, in the order of the keys. `limit_bytes` holds for each value.
 
     A key that is no string (SMACH does not mind) is named, and its value UNSENT.
     """
@@ -65,7 +67,7 @@ def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> 
 
 
 def decode(item: UserdataItem) -> Any:
-    """The value of one item.
+    """Return the value of one item.
 
     :raises UserdataCodecError: if it is malformed, UNSENT, or a message of another md5 than ours.
     """
@@ -104,7 +106,7 @@ def check(item: UserdataItem) -> None:
 
 
 def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict[str, Any]:
-    """All items as a dictionary, with `skip_unsent` without those that were not sent.
+    """Return all items as a dictionary, with `skip_unsent` without those that were not sent.
 
     :raises UserdataCodecError: as `decode` does, and if a key comes twice.
     """

@@ -16,7 +16,7 @@ MOST_BEHIND = 1000  # moments kept apart. More are merged into one
 
 
 def no_stop() -> bool:
-    """Nobody wants to stop."""
+    """Return False: nobody wants to stop."""
     return False
 
 
@@ -31,7 +31,7 @@ _writers: 'MutableSet[StoreWriter]' = weakref.WeakSet()
 
 
 def running_writers() -> 'List[StoreWriter]':
-    """Those of this process whose trials go on."""
+    """Return the writers of this process whose trials go on."""
     return [each for each in list(_writers) if each.is_running]
 
 
@@ -60,12 +60,12 @@ class StoreWriter:
 
     @property
     def path(self) -> str:
-        """Of the store."""
+        """Return the path of the store."""
         return str(self._store.path)
 
     @property
     def error(self) -> str:
-        """Why moments are missing on the disk, or '' where it is just slow."""
+        """Return why moments are missing on the disk, or '' where it is just slow."""
         return self._error
 
     @property

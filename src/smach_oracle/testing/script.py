@@ -113,7 +113,7 @@ class AnswerScript(Expert):
 
     @property
     def left(self) -> int:
-        """The number of replies that no question has used."""
+        """Return the number of replies that no question has used."""
         return 0 if self._repeats else len(self._replies) - self._used
 
     def check(self, shown: object = '') -> None:

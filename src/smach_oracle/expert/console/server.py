@@ -61,7 +61,7 @@ PONG_LIMIT_S = 15.0
 def make_app(access: AccessControl, pages: OpenPages, sensors: SensorStreams,
              history: HistoryRequests,
              ages: Optional[ImageAges] = None) -> tornado.web.Application:
-    """The web application. Its handlers run in the thread of the loop that serves it."""
+    """Return the web application. Its handlers run in the thread of the loop that serves it."""
     shared = SensorRequests(sensors, ages)
     static = {'path': str(STATIC)}
     return tornado.web.Application(
@@ -178,7 +178,7 @@ def _listen(settings: ConsoleSettings) -> List[socket.socket]:
 
 
 def tls_context(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
-    """The context for https, or None where no certificate is set.
+    """Return the context for https, or None where no certificate is set.
 
     :raises SettingsError: naming the file that cannot be read, or why the two do not belong
         together.

@@ -29,7 +29,7 @@ class InterfaceDialog:
         self._seen_running = False
 
     def run(self, listed: ListedQuestion) -> None:
-        """Until the interface has ended, or the expert leaves it to itself."""
+        """Talk until the interface has ended, or the expert leaves it to itself."""
         outcomes = [choice.outcome for choice in listed.goal.supersede_outcomes]
         choices: List[Choice] = [('f{}'.format(number), 'finish with ' + outcome)
                                  for number, outcome in enumerate(outcomes, 1)]

@@ -25,7 +25,10 @@ class NextSteps:
         self._listener = RobotTopic(robot, '/oracle/events', OracleEvent, self._take)
 
     def follow(self, timeout_s: float = 3.0) -> Iterator[OracleEvent]:
-        """The events from the answer to the next state that runs, at most for the time given."""
+        """Yield the events from the answer to the next state that runs.
+
+        At most the time given passes.
+        """
         until_s = time.monotonic() + timeout_s
         while time.monotonic() < until_s:
             try:

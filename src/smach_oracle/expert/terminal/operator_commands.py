@@ -86,7 +86,7 @@ class _UsageError(Exception):
 
 
 def robots_of_master() -> Sequence[str]:
-    """The nodes that can be held, by the master's list of topics.
+    """Return the nodes that can be held, by the master's list of topics.
 
     :raises ServerGoneError: where the master does not answer.
     """
@@ -155,7 +155,7 @@ def _status_of(robot: str) -> Told:
 
 
 def machine_lines(robot: str, machine: MachineControl) -> Told:
-    """How a machine stands, in lines."""
+    """Return how a machine stands, in lines."""
     how = 'paused by ' + (machine.paused_by or 'somebody') if machine.paused else (
         'runs' if machine.running else 'does not run')
     lines = [('  {} {}: {}'.format(robot, machine.path, how), 'bold')]

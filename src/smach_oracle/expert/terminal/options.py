@@ -19,14 +19,14 @@ class AnswerOption(NamedTuple):
     container: str = ''  # of the state, or the one that ends. '': that of the failed state
 
     def decision(self) -> ExpertDecision:
-        """A decision without outputs or reason."""
+        """Return a decision without outputs or reason."""
         field = {ExpertDecision.GOTO: 'state',
                  ExpertDecision.INTERFACE: 'interface'}.get(self.kind, 'outcome')
         return ExpertDecision(kind=self.kind, container=self.container, **{field: self.name})
 
 
 def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
-    """All possible answers, in the order in which they are shown."""
+    """Return all possible answers, in the order in which they are shown."""
     found = [
         AnswerOption(str(number), _goto_words(goal, choice), ExpertDecision.GOTO,
                      choice.state, choice.blocked, choice.container)
@@ -71,7 +71,7 @@ def _goto_words(goal: ExpertQueryGoal, choice: StateChoice) -> str:
 
 
 def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
-    """The option that was typed.
+    """Return the option that was typed.
 
     By its key, its words, a name that only one has, or `s`, `i` where there is one of them.
 

@@ -26,12 +26,17 @@ class PreconditionStatusListener:
                                     self.take)
 
     def take(self, message: PreconditionChecks) -> None:
-        """The robot has checked them."""
+        """Note that the robot has checked them."""
         if message.query_id == self._query_id:
             self._heard_s, self._newest = time.monotonic(), message
 
     def lines(self) -> List[Line]:
-        """One for each precondition. None where the robot publishes nothing, or there are none."""
+        """Return one line for each precondition.
+
+        The list is empty where the robot publishes nothing, or there are no preconditions.
+
+        None means that the robot publishes nothing, or that there are no preconditions.
+        """
         newest, since_s = self._newest, time.monotonic() - self._heard_s
         return [_line(check, since_s) for check in newest.checks] if newest is not None else []
 

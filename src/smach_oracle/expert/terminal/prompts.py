@@ -45,7 +45,7 @@ class Prompts:
 
     def ask(self, message: str, toolbar: Callable[[], str], why_to_stop: Reason,
             choices: Sequence[Choice] = (), validator: Optional[Validator] = None) -> str:
-        """One line, stripped.
+        """Return one line, stripped.
 
         :raises PromptInterrupted: as soon as `why_to_stop` gives a reason.
         :raises KeyboardInterrupt: on Ctrl-C.
@@ -101,7 +101,7 @@ class _Choices(Completer):
 
     def get_completions(self, document: Document,
                         complete_event: CompleteEvent) -> List[Completion]:
-        """All choices that fit: by the beginning of the key, or of a word of the meaning."""
+        """Return all choices that fit: by the beginning of the key, or of a word of the meaning."""
         typed = document.text_before_cursor.lstrip().lower()
         return [
             Completion(key, -len(document.text_before_cursor), display=clean(key),

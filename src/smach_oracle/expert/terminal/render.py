@@ -32,7 +32,7 @@ _SHOWN_LINES = 12
 
 
 def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
-    """The whole question: what failed, what led there, and everything that may be answered."""
+    """Return the whole question: the failure, its history, and everything that may be answered."""
     parts: List[RenderableType] = [_failure(goal, age_s)]
     if goal.history:
         parts += [_heading('History'), history(goal.history)]
@@ -53,7 +53,7 @@ def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
 
 
 def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
-    """The open questions of all servers, numbered from 1."""
+    """Return the open questions of all servers, numbered from 1."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=True)
     table.add_column('', style='bold cyan', no_wrap=True)
     for title in ('robot', 'failed state', 'rate', 'waits', 'left', 'who'):
@@ -67,7 +67,7 @@ def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
 
 
 def history(visits: Sequence[VisitedState]) -> Text:
-    """The chain of visited states, latest last. The oldest are left out of a long one."""
+    """Return the chain of visited states, latest last. The oldest are left out of a long one."""
     text = Text('… → ' if len(visits) > _SHOWN_VISITS else '', 'dim')
     for index, visit in enumerate(visits[-_SHOWN_VISITS:]):
         sign, style = _VISITS.get(visit.result, ('?', ''))

@@ -56,12 +56,15 @@ class RunningInterface:
         return '' if answer.ok else str(answer.message)
 
     def lines(self) -> List[str]:
-        """The last lines that it has printed, and what became of its start."""
+        """Return the last lines that it has printed, and what became of its start."""
         output = self._outputs.newest(self._query_id)
         return [] if output is None else [output.text] + list(output.lines)
 
     def status_line(self) -> str:
-        """Its status in one line: the hand that it moves, else the last line that it printed."""
+        """Return its status in one line.
+
+        It shows the hand that it moves, else the last line that it printed.
+        """
         state = self._state
         if state is not None:
             motion = state.limit or ('moves' if state.moving else 'stands')

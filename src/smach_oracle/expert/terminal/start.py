@@ -11,7 +11,7 @@ from rich.text import Text
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(prog='expert_terminal',
                                      description='Answers the questions of robots.')
     parser.add_argument(
@@ -35,7 +35,7 @@ def _user() -> str:
 
 
 def wait_for_master(console: Console) -> None:
-    """rospy would wait without a word."""
+    """Wait for the master, and say so. rospy would wait without a word."""
     if not rosgraph.is_master_online():
         console.print(
             Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()),

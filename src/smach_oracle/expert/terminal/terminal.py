@@ -60,7 +60,7 @@ class Terminal:
         self._missing_since_s = math.inf
 
     def run(self) -> None:
-        """Until the expert quits, by q, Ctrl-C or end of file."""
+        """Serve the expert until they quit, by q, Ctrl-C or end of file."""
         try:
             wait_for_question(self._front_end, _FIRST_LIST_S)  # the first lists are on their way
             while not rospy.is_shutdown():

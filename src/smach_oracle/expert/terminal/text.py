@@ -18,14 +18,14 @@ def rate_colour(rate: float) -> str:
 
 
 def rate_bar(rate: float, width: int = 10) -> Text:
-    """A bar and a percentage in the rate's colour."""
+    """Return a bar and a percentage in the rate's colour."""
     filled = round(min(max(rate, 0.0), 1.0) * width)
     return Text('{}{} {:3.0f}%'.format(_FULL * filled, _EMPTY * (width - filled), 100 * rate),
                 rate_colour(rate))
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people read them: 8 s, 2:05 min, 1:30 h."""
+    """Return seconds as people read them: 8 s, 2:05 min, 1:30 h."""
     whole = max(0, int(seconds))
     if whole < 60:
         return '{} s'.format(whole)

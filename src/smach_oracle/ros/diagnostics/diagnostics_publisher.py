@@ -47,7 +47,7 @@ class DiagnosticsPublisher:
         self._machines.discard(machine)
 
     def statuses(self) -> List[DiagnosticStatus]:
-        """The statuses of this moment."""
+        """Return the statuses of this moment."""
         node = rospy.get_name()
         rows = [row for machine in list(self._machines) for row in oracle_of(machine).rates()]
         writers = running_writers()

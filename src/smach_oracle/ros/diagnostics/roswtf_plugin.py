@@ -18,7 +18,7 @@ Rule = Tuple[Callable[[Any], List[str]], str]
 
 
 def mixed_engine(_ctx: Any) -> List[str]:
-    """Which of smach, smach_ros and smach_msgs are ours, where the others are upstream's."""
+    """Return which of smach, smach_ros and smach_msgs are ours, where the others are upstream's."""
     files = {name: getattr(optional(name), '__file__', None) or '' for name in STAND_INS}
     ours = [name for name, file in files.items()
             if os.path.exists(os.path.join(os.path.dirname(file), '.smach_oracle_stand_in'))]
@@ -26,13 +26,13 @@ def mixed_engine(_ctx: Any) -> List[str]:
 
 
 def lacking_packages(_ctx: Any) -> List[str]:
-    """Optional packages that are missing, each with what does not work without it."""
+    """Return the optional packages that are missing, each with what does not work without it."""
     return ['{}: {}'.format(name, without) for name, without in OPTIONAL.items()
             if optional(name) is None]
 
 
 def told_by_nodes(level: bytes, statuses: Dict[str, DiagnosticStatus]) -> List[str]:
-    """What the oracles of all nodes tell on /diagnostics at a level."""
+    """Return what the oracles of all nodes report on /diagnostics at a level."""
     return ['{}: {}{}'.format(each.name, each.message, ''.join(
         ' ({}: {})'.format(value.key, value.value) for value in each.values))
         for each in statuses.values()
@@ -40,7 +40,7 @@ def told_by_nodes(level: bytes, statuses: Dict[str, DiagnosticStatus]) -> List[s
 
 
 def listen(seconds: Optional[float] = None) -> Dict[str, DiagnosticStatus]:
-    """The latest status of each name that is heard in some seconds of the wall's time."""
+    """Return the latest status of each name that is heard in some seconds of the wall's time."""
     heard: Dict[str, DiagnosticStatus] = {}
     subscriber = rospy.Subscriber(
         '/diagnostics', DiagnosticArray,

@@ -42,7 +42,7 @@ def same_decision(one: ExpertDecision, other: ExpertDecision) -> bool:
 
 
 def describe_decision(decision: ExpertDecision) -> str:
-    """One line for people."""
+    """Return a decision in one line for people."""
     if decision.kind == ExpertDecision.GOTO:
         return 'go to {}'.format(_named(decision, decision.state))
     if decision.kind == ExpertDecision.SUPERSEDE:

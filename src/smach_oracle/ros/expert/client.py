@@ -70,7 +70,7 @@ class ExpertQueryClient(Expert):
 
     def ask(self, question: Question, cancelled: threading.Event,
             progress: Progress) -> Optional[Answer]:
-        """The answer, or None where there is none by the deadline or `cancelled` was set.
+        """Return the answer, or None where there is none by the deadline or `cancelled` was set.
 
         :raises AnswerError: if the answer cannot be used here, such as outputs of a message type
             that is not installed.

@@ -102,7 +102,7 @@ class FailureCameras:
 
 
 def compressed(image: CameraMessage) -> CompressedImage:
-    """A JPEG of an Image. A CompressedImage as it is.
+    """Return a JPEG of an Image. A CompressedImage as it is.
 
     :raises ValueError: where the image is not in colour or grey.
     """

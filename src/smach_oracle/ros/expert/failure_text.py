@@ -6,7 +6,7 @@ RESULT_FIELDS = ('reason', 'text', 'error_string', 'message')
 
 
 def describe_failure(state: smach.State) -> str:
-    """Why the action of a SimpleActionState ended as it did, or '' where that is not known.
+    """Return why the action of a SimpleActionState ended as it did, or '' where that is not known.
 
     Knows our own SimpleActionState and upstream's.
     """

@@ -80,13 +80,13 @@ class OpenQuestion:
 
     @property
     def status(self) -> int:
-        """PENDING, CLAIMED or INTERFACE_RUNNING, as in OpenQuery.msg."""
+        """Return PENDING, CLAIMED or INTERFACE_RUNNING, as in OpenQuery.msg."""
         if self.goal.interface:
             return OpenQuery.INTERFACE_RUNNING
         return OpenQuery.CLAIMED if self.holder else OpenQuery.PENDING
 
     def to_msg(self, now_s: float) -> OpenQuery:
-        """As it stands in the open list."""
+        """Return the question as it stands in the open list."""
         return OpenQuery(query=self.goal, status=self.status, claimed_by=self.holder,
                          age=now_s - self.opened_s, remaining=_remaining(self.deadline_s, now_s),
                          lease_remaining=_remaining(self.lease_until_s, now_s))
@@ -108,7 +108,7 @@ class OpenQuestions:
         return len(self._open)
 
     def listing(self) -> List[OpenQuery]:
-        """The open list, oldest first, with the ages and remaining times of this moment."""
+        """Return the open list, oldest first, with the ages and remaining times of this moment."""
         self.tick()
         now_s = self._clock()
         return [
@@ -139,7 +139,7 @@ class OpenQuestions:
         return None
 
     def claim(self, action: int, query_id: str, expert: str, lease_s: float = 0.0) -> ClaimReply:
-        """CLAIM, RENEW, RELEASE or TAKE_OVER, as in ClaimQuery.srv."""
+        """Carry out CLAIM, RENEW, RELEASE or TAKE_OVER, as in ClaimQuery.srv."""
         self.tick()
         question = self._open.get(query_id)
         if question is None:
@@ -174,7 +174,10 @@ class OpenQuestions:
         return AnswerReply(True, '', decision)
 
     def close(self, query_id: str, why: str) -> None:
-        """The asker took it back, or is gone. The end of an interface, where one runs."""
+        """Close a question that the asker took back, or whose asker is gone.
+
+        This also ends an interface that runs.
+        """
         self.tick()
         question = self._open.get(query_id)
         if question is not None:
@@ -191,14 +194,17 @@ class OpenQuestions:
                 self._release(question, 'the claim of {} ran out'.format(question.holder))
 
     def next_due_s(self) -> float:
-        """When the next lease or deadline passes, by the given clock, infinity where none will."""
+        """Return when the next lease or deadline passes, by the given clock.
+
+        It is infinity where none will.
+        """
         times = [
             min(question.deadline_s, question.lease_until_s) for question in self._open.values()
         ]
         return min(times, default=math.inf)
 
     def take_notices(self) -> List[QuestionNotice]:
-        """The notices since the last call, oldest first."""
+        """Return the notices since the last call, oldest first."""
         notices, self._notices = self._notices, []
         return notices
 

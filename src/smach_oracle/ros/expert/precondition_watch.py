@@ -51,7 +51,7 @@ class _WatchedPrecondition:
         self._thread.join(max(0.0, self._began_s + PATIENCE_S - time.monotonic()))
 
     def message(self) -> PreconditionCheck:
-        """The latest status. A check that has not come back is named as hanging."""
+        """Return the latest status. A check that has not come back is named as hanging."""
         now_s = time.monotonic()
         status, at_s = self._latest, self._at_s
         if self._thread is not None and self._thread.is_alive():

@@ -24,7 +24,7 @@ from ..userdata_codec import SUMMARY_BYTES, UserdataCodecError, decode_all, enco
 
 
 def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) -> ExpertQueryGoal:
-    """The question as an ExpertQuery goal.
+    """Return the question as an ExpertQuery goal.
 
     Userdata values beyond a few kilobytes are left UNSENT.
     """
@@ -59,7 +59,7 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
 
 
 def to_answer(decision: ExpertDecision) -> Answer:
-    """The decision as the executive takes it.
+    """Return the decision as the executive takes it.
 
     :raises AnswerError: if its kind is unknown or its outputs cannot be decoded here.
     """
@@ -74,7 +74,7 @@ def to_answer(decision: ExpertDecision) -> Answer:
 
 
 def to_decision(answer: Answer) -> ExpertDecision:
-    """The answer as a message.
+    """Return the answer as a message.
 
     :raises UserdataCodecError: if an output fits neither JSON nor a ROS message.
     """
@@ -89,7 +89,7 @@ def to_decision(answer: Answer) -> ExpertDecision:
 
 
 def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
-    """The goal for a shared-autonomy interface. Here the userdata goes whole."""
+    """Return the goal for a shared-autonomy interface. Here the userdata goes whole."""
     return _sendable(
         SharedAutonomyGoal(query_id=question.question_id, container_path=question.container_path,
                            state=question.failed_state, interface=offer.name,

@@ -53,7 +53,7 @@ class ControlPublisher:
 
 
 def to_msg(status: HandStatus) -> MachineControl:
-    """A status as a message."""
+    """Return a status as a message."""
     return MachineControl(
         path=status.path, running=status.running, paused=status.paused, paused_by=status.paused_by,
         active=[ActiveState(*each) for each in status.active],

@@ -21,7 +21,7 @@ class Status(NamedTuple):
 
 
 def why_unwell_by_message(condition: HealthCondition, message: Any) -> str:
-    """What is wrong by a message of the condition's topic, '' where all is well."""
+    """Return what is wrong by a message of the condition's topic, '' where all is well."""
     try:
         value = _field(message, condition.field)
     except _NoField:
@@ -63,7 +63,7 @@ def _cut(text: str) -> str:
 
 
 def why_unwell_by_status(condition: HealthCondition, status: Status) -> str:
-    """What is wrong by a status of the diagnostics, '' where all is well."""
+    """Return what is wrong by a status of the diagnostics, '' where all is well."""
     if 0 <= status.level <= LEVELS.index(condition.worst):
         return ''
     level = LEVELS[status.level] if 0 <= status.level < len(LEVELS) else str(status.level)

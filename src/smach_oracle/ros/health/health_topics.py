@@ -32,12 +32,12 @@ class Latest:
         self._heard = (what, time.monotonic())
 
     def heard(self) -> Any:
-        """What was heard, or None where nothing was."""
+        """Return what was heard, or None where nothing was."""
         heard = self._heard
         return heard[0] if heard is not None else None
 
     def age_s(self) -> Optional[float]:
-        """How long ago that was, monotonic, or None where nothing was heard."""
+        """Return how long ago that was, monotonic, or None where nothing was heard."""
         heard = self._heard
         return time.monotonic() - heard[1] if heard is not None else None
 
@@ -59,7 +59,7 @@ class HealthTopics:
         self.warned: Set[str] = set()
 
     def message(self, topic: str) -> Latest:
-        """The latest message of a topic, listened to from now on. See `decoded`."""
+        """Return the latest message of a topic, listened to from now on. See `decoded`."""
         name = rospy.resolve_name(topic)
         with self._lock:
             is_new = name not in self._messages
@@ -71,7 +71,7 @@ class HealthTopics:
         return latest
 
     def status(self, name: str) -> Latest:
-        """The latest Status of a name in the diagnostics, listened to from now on."""
+        """Return the latest Status of a name in the diagnostics, listened to from now on."""
         with self._lock:
             is_first = not self._statuses
             latest = self._statuses.setdefault(name.strip('/'), Latest())
@@ -132,7 +132,7 @@ class UnreadableMessage(Exception):
 
 
 def decoded(message: Any) -> Any:
-    """A received message with its fields.
+    """Return a received message with its fields.
 
     :raises UnreadableMessage: where its type is not installed here, and its definition does not
         help.
@@ -155,5 +155,5 @@ def _class_of(header: Dict[str, str]) -> Any:
 
 
 def level_of(level: Any) -> int:
-    """The level of a status, which some releases of genpy give as a byte."""
+    """Return the level of a status, which some releases of genpy give as a byte."""
     return level[0] if isinstance(level, bytes) and level else int(level)

@@ -23,7 +23,7 @@ _PR_SET_CHILD_SUBREAPER = 36
 
 
 def descendants(root: int) -> List[int]:
-    """Process ids of all descendants of a process.
+    """Return the process ids of all descendants of a process.
 
     Those that have ended count until they are collected.
     """

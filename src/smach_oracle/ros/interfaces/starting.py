@@ -34,7 +34,7 @@ _ESCAPE_SEQUENCE = re.compile(r'\x1b(\[[0-9;?]*[ -/]*[@-~]|\][^\x07]*\x07|.)')
 
 
 def command_of(start: InterfaceStart) -> List[str]:
-    """The command line.
+    """Return the command line.
 
     :raises InterfaceError: where the package or the node is not there. Roslaunch itself reports a
         launch file that is not.
@@ -92,12 +92,12 @@ class StartedInterface:
 
     @property
     def exit_code(self) -> Optional[int]:
-        """Of its command, None as long as it runs."""
+        """Return the exit code of its command, None as long as it runs."""
         return self._process.poll()
 
     @property
     def last_lines(self) -> str:
-        """The last lines that are not empty, for an error."""
+        """Return the last lines that are not empty, for an error."""
         with self._lock:
             return ' / '.join([line for line in self._lines if line.strip()][-3:])
 

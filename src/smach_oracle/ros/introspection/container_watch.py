@@ -75,7 +75,7 @@ class ContainerWatch(object):
 
     def happened(self, info: str, userdata: Any, states: Sequence[str],
                  args: Sequence[Any]) -> None:
-        """Called in the executing thread."""
+        """Note what has happened. The executing thread calls it."""
         if info == 'TERMINATION':
             self.jump_to = None
             info = 'TERMINATION %s' % (args[0] if args else '')

@@ -36,14 +36,14 @@ class HeartbeatRounds(object):
         self._has_newcomer = True
 
     def wait_s(self, now_s: float) -> float:
-        """Seconds until `due` is to be asked.
+        """Return the seconds until `due` is to be asked.
 
         :param now_s: of a monotonic clock.
         """
         return 0.0 if self._must_hurry() else max(0.0, self._next_s - now_s)
 
     def due(self, now_s: float) -> List[str]:
-        """Return the paths whose turn it is. None before `wait_s` has passed.
+        """Return the paths whose turn it is. The list is empty before `wait_s` has passed.
 
         :param now_s: of a monotonic clock.
         """

@@ -308,7 +308,7 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
 
 
 def structure_fields(container: Any) -> Tuple[List[str], ...]:
-    """The graph of ``container``: the fields of SmachContainerStructure behind its path."""
+    """Return the graph of ``container``: the fields of SmachContainerStructure behind its path."""
     edges = [(str(outcome), str(source), str(target))
              for outcome, source, target in container.get_internal_edges()]
     return ([str(label) for label in container.get_children()],

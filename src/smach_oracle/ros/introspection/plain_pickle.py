@@ -47,7 +47,10 @@ class PlainUnpickler(pickle.Unpickler):
     """An unpickler that knows no classes but those of plain data."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """The maker of a plain type. It raises ``pickle.UnpicklingError`` for any other global."""
+        """Return the maker of a plain type.
+
+        It raises ``pickle.UnpicklingError`` for any other global.
+        """
         try:
             return _PLAIN[module, name]
         except KeyError as err:

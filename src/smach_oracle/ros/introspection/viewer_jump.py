@@ -32,5 +32,5 @@ def send_running(container: Any, label: str, written: Collection[str], by: str) 
 
 
 def sender_of(message: Any) -> str:
-    """The node that has sent a message, '' where that is not known."""
+    """Return the node that has sent a message, '' where that is not known."""
     return str((getattr(message, '_connection_header', None) or {}).get('callerid', ''))

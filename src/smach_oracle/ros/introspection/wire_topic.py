@@ -180,7 +180,7 @@ def _write(connection: Any, data: bytes) -> None:
 
 
 def waiting_bytes(connections: Iterable[Any]) -> int:
-    """What rospy keeps for subscribers that have not read it yet.
+    """Return what rospy keeps for subscribers that have not read it yet.
 
     A hung one must not eat the robot's memory.
     """

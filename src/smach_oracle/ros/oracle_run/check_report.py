@@ -25,7 +25,7 @@ _PARTS = ('defaults', 'states', 'interfaces', 'policy_parameters')
 
 
 def lines_of(container: ContainerProspect) -> List[str]:
-    """The text about one container and its states."""
+    """Return the text about one container and its states."""
     usual = _usual_actions(container)
     lines = _heading(container)
     if container.recovers:

@@ -21,7 +21,7 @@ class SignalWatch:
         self._heard: Optional[signal.Signals] = None
 
     def heard(self) -> Optional[signal.Signals]:
-        """The signal that is to end the process, or None where none came."""
+        """Return the signal that is to end the process, or None where none came."""
         while self._heard is None:
             try:
                 numbers = os.read(self._pipe, 64)

@@ -15,7 +15,7 @@ Note = Callable[[str], None]
 
 
 def install(note: Note, spin: Callable[[], None]) -> None:
-    """Replace them in this process, for good.
+    """Replace the waits of rospy and actionlib in this process, for good.
 
     :param note: is told what people should know.
     :param spin: what `rospy.spin` does.

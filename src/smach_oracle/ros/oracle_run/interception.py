@@ -33,7 +33,7 @@ class Interception:
         self._lock = threading.RLock()  # machines may start in several threads at once
 
     def install(self) -> None:
-        """From now on. Cannot be taken back."""
+        """Intercept from now on. This cannot be taken back."""
         for cls in family(smach.StateMachine):
             self._patch(cls)
         self._patch_future_subclasses()
@@ -83,14 +83,17 @@ class Interception:
 
 
 def family(cls: type) -> Iterator[type]:
-    """A class and all that is derived from it so far."""
+    """Yield a class and all that is derived from it so far."""
     yield cls
     for child in cls.__subclasses__():
         yield from family(child)
 
 
 def machines_inside(container: smach.Container) -> Iterator[smach.StateMachine]:
-    """Every StateMachine below a container, at any depth, through Concurrences and Iterators."""
+    """Yield every StateMachine below a container, at any depth.
+
+    It looks through Concurrences and Iterators.
+    """
     seen = {id(container)}
     open_containers: List[smach.State] = [container]
     while open_containers:

@@ -76,7 +76,7 @@ def split(args: Sequence[str]) -> CommandLine:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser of our own options."""
+    """Return the parser of our own options."""
     parser = argparse.ArgumentParser(
         prog='oracle_run', usage=USAGE, allow_abbrev=False,
         description='Run a SMACH script, as it is, with all its state machines under an oracle.',
@@ -221,7 +221,7 @@ def _never_called(userdata: smach.UserData) -> bool:
 
 
 def load(invocation: Invocation) -> LoadedSettings:
-    """What is set for the machines of this invocation, not checked yet.
+    """Return what is set for the machines of this invocation, not checked yet.
 
     :raises SettingsError: where the file cannot be read.
     """
@@ -229,7 +229,7 @@ def load(invocation: Invocation) -> LoadedSettings:
 
 
 def read_settings(loaded: LoadedSettings) -> Settings:
-    """Settings with all names of Python objects resolved.
+    """Return settings with all names of Python objects resolved.
 
     :raises SettingsError: naming key, value and what is allowed.
     """

@@ -60,12 +60,12 @@ class Connections:
         self._orphaned_events[number] += event_number(data) is not None
 
     def of(self, number: int) -> Optional[BagConnection]:
-        """The connection of a number, as most of its records so far have it."""
+        """Return the connection of a number, as most of its records so far have it."""
         seen = self._seen.get(number)
         return seen.most_common(1)[0][0] if seen else None
 
     def all(self) -> Dict[int, BagConnection]:
-        """All connections by number, that of the events too where its records are lost."""
+        """Return all connections by number, that of the events too where its records are lost."""
         known = {number: seen.most_common(1)[0][0] for number, seen in self._seen.items()}
         if not any(connection.has_events for connection in known.values()):
             for number, count in self._orphaned_events.most_common(1):

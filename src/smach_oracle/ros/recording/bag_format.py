@@ -105,7 +105,7 @@ def pack_chunk_info(info: ChunkInfo) -> bytes:
 
 
 def stamp_at(data: bytes, offset: int) -> Stamp:
-    """The stamp at an offset."""
+    """Return the stamp at an offset."""
     seconds, nanoseconds = STAMP.unpack_from(data, offset)
     return seconds, nanoseconds
 
@@ -155,7 +155,7 @@ def read_header(source: BinaryIO, limit: int) -> Fields:
 
 
 def op_of(fields: Fields) -> int:
-    """The op code of a record.
+    """Return the op code of a record.
 
     :raises BagFormatError: where it has none.
     """
@@ -166,7 +166,7 @@ def op_of(fields: Fields) -> int:
 
 
 def uint32_field(fields: Fields, name: str) -> int:
-    """A uint32 field of a record's header.
+    """Return a uint32 field of a record's header.
 
     :raises BagFormatError: where it has no such field.
     """

@@ -31,7 +31,7 @@ class Saved(NamedTuple):
     torn_bytes: int  # at the end, where the writer died
 
     def losses(self) -> str:
-        """What is lost, in words, or '' where nothing is."""
+        """Return what is lost, in words, or '' where nothing is."""
         parts = []
         if self.bytes_lost:
             parts.append('{} bytes in at least {} chunk{}, among them {} event{}'.format(
@@ -71,7 +71,7 @@ def read_back(path: str, saved: Saved) -> None:
 
 
 def contents(bag: BinaryIO) -> Saved:
-    """What `mend` would save of a bag.
+    """Return what `mend` would save of a bag.
 
     :raises OSError: where the disk cannot be read.
     """

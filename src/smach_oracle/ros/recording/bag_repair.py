@@ -177,7 +177,7 @@ def _is_ours(bag: BinaryIO) -> bool:
 
 
 def free_name(path: str) -> str:
-    """`path`, or `..._2.bag`, `..._3.bag` and so on.
+    """Return `path`, or `..._2.bag`, `..._3.bag` and so on where it exists.
 
     A name is taken where a bag of that name is there, being written or being mended.
     """

@@ -147,7 +147,7 @@ class _Window:
         return self._block[offset:offset + size]
 
     def find(self, pattern: bytes, position: int) -> int:
-        """Where the pattern is, from `position` on. -1 means nowhere."""
+        """Return where the pattern is, from `position` on. -1 means nowhere."""
         while position + len(pattern) <= self.size:
             self.read(position, len(pattern))
             found = self._block.find(pattern, position - self._start)

@@ -76,7 +76,7 @@ class BagWriter:
 
     @property
     def buffered_bytes(self) -> int:
-        """Size of the chunk in memory."""
+        """Return the size of the chunk in memory."""
         return len(self._buffer)
 
     def add(self, topic: str, message_type: MessageType, stamp: Stamp, data: bytes,

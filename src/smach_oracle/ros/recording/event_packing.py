@@ -32,7 +32,7 @@ _LENGTH = struct.Struct('<I')
 
 
 def serialise(message: genpy.Message) -> bytes:
-    """A message (genpy.Message) as it is on the wire."""
+    """Return a message (genpy.Message) as it is on the wire."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
@@ -61,7 +61,7 @@ def _string(value: object) -> bytes:
 
 
 def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
-    """The fastest way to serialise an OracleEvent of this definition (its md5).
+    """Return the fastest way to serialise an OracleEvent of this definition (its md5).
 
     The stamp is ROS time, or (0, 0).
     """
@@ -69,7 +69,7 @@ def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
 
 
 def event_number(data: bytes) -> Optional[int]:
-    """The sequence number of a serialised OracleEvent, or None where the bytes are not an event."""
+    """Return the number of a serialised OracleEvent, None where the bytes are not an event."""
     try:
         position = _after_strings(data, _HEAD.size - _LENGTH.size, 1)
         position = _after_strings(data, position + _WALL_TIME.size, 1)

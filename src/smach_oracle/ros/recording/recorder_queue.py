@@ -111,7 +111,7 @@ class RecorderQueue:
             self._changed.notify_all()
 
     def take(self, timeout_s: Optional[float]) -> Tuple[List[QueueItem], bool]:
-        """All that waits, in order, and whether the queue is closing.
+        """Return all that waits, in order, and whether the queue is closing.
 
         :param timeout_s: how long to wait where it is empty. None means without end.
         """
@@ -141,7 +141,7 @@ class RecorderQueue:
             return self._finished
 
     def finish(self) -> None:
-        """The writer has finished."""
+        """Note that the writer has finished."""
         with self._changed:
             self._finished = True
             self._changed.notify_all()

@@ -56,7 +56,7 @@ class LossCounter:
             self.messages += 1
 
     def of_trial(self, trial_id: str) -> int:
-        """Lost events of a trial, one of the latest REMEMBERED_TRIALS that lost any."""
+        """Return the lost events of a trial, one of the latest REMEMBERED_TRIALS that lost any."""
         with self._lock:
             return self._by_trial.get(trial_id, 0)
 

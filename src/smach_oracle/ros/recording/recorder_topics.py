@@ -23,21 +23,21 @@ LOOK_AGAIN_S = 0.5  # for the types of topics that nobody has advertised yet
 
 
 def action_topics(server: str) -> List[str]:
-    """The topics of an action server."""
+    """Return the topics of an action server."""
     return [
         '{}/{}'.format(server, name) for name in ('goal', 'cancel', 'status', 'feedback', 'result')
     ]
 
 
 def smach_topics(server: str) -> List[str]:
-    """The topics of a SMACH introspection server."""
+    """Return the topics of a SMACH introspection server."""
     return [
         '{}/smach/{}'.format(server, name) for name in ('container_structure', 'container_status')
     ]
 
 
 def audit_topic(server: str) -> str:
-    """The topic on which consoles publish the commands that people give.
+    """Return the topic on which consoles publish the commands that people give.
 
     :param server: name of the expert query server that the commands are about.
     """
@@ -45,7 +45,7 @@ def audit_topic(server: str) -> str:
 
 
 def now() -> Moment:
-    """The present moment by both clocks."""
+    """Return the present moment by both clocks."""
     stamp = None
     if rospy.rostime.is_rostime_initialized():
         time_now = rospy.rostime.get_rostime()
@@ -105,7 +105,7 @@ class TopicListener:
 
 
 def types_in_process() -> Dict[str, MessageClass]:
-    """Message classes of the topics of this process, by resolved name.
+    """Return the message classes of the topics of this process, by resolved name.
 
     It publishes or subscribes to them.
     """
@@ -116,7 +116,7 @@ def types_in_process() -> Dict[str, MessageClass]:
 
 
 def types_at_master() -> Dict[str, MessageClass]:
-    """Message classes of all topics that the master knows.
+    """Return the message classes of all topics that the master knows.
 
     AnyMsg stands for a class that is not installed here.
 
@@ -137,7 +137,7 @@ def _class_of(type_name: str) -> Optional[MessageClass]:
 
 
 def type_of(message: genpy.Message) -> MessageType:
-    """The type of a received message, as a bag records it."""
+    """Return the type of a received message, as a bag records it."""
     if not isinstance(message, rospy.AnyMsg):
         return MessageType(message._type, message._md5sum, message._full_text)
     header = message._connection_header
@@ -145,7 +145,7 @@ def type_of(message: genpy.Message) -> MessageType:
 
 
 def data_of(message: genpy.Message) -> bytes:
-    """A received message as it was on the wire."""
+    """Return a received message as it was on the wire."""
     if isinstance(message, rospy.AnyMsg):
         return bytes(message._buff)
     return serialise(message)

@@ -71,7 +71,7 @@ class TrialBag:
             self._writer = BagWriter(self.path + '.active')
 
     def stamp(self, when: Moment) -> Stamp:
-        """The moment by this bag's clock.
+        """Return the moment by this bag's clock.
 
         ROS time where there was one at its beginning, else wall time.
         """
@@ -164,13 +164,13 @@ class TrialBag:
 
 
 def wall_stamp(wall_time: float) -> Stamp:
-    """Seconds since the epoch as seconds and nanoseconds."""
+    """Return seconds since the epoch as seconds and nanoseconds."""
     nanoseconds = int(round(wall_time * 1e9))
     return nanoseconds // 10 ** 9, nanoseconds % 10 ** 9
 
 
 def file_name(trial_id: str, wall_time: float) -> str:
-    """A file name such as 20150401T101112.345Z_pick_1.bag.
+    """Make a file name such as 20150401T101112.345Z_pick_1.bag.
 
     Characters that a file name should not contain become underscores.
     """
@@ -182,7 +182,7 @@ def file_name(trial_id: str, wall_time: float) -> str:
 
 
 def ros_stamp_of(seconds: int, nanoseconds: int) -> Optional[Stamp]:
-    """A ROS time as a stamp, or None for zero.
+    """Return a ROS time as a stamp, or None for zero.
 
     A simulated clock shows zero before it runs.
     """

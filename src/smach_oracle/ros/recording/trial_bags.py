@@ -187,7 +187,7 @@ class TrialBags:
                 self._folder, err))
 
     def wait_s(self) -> Optional[float]:
-        """How long the writer thread may sleep. None means until something comes."""
+        """Return how long the writer thread may sleep. None means until something comes."""
         times = [due for due in (bag.due_s() for bag in self._bags.values()) if due is not None]
         return min(times) if times else None
 
@@ -212,7 +212,7 @@ def kept_key(item: MessageItem) -> Optional[KeptKey]:
 
 
 def container_path(structure: bytes) -> bytes:
-    """The path of a serialised SmachContainerStructure: the string behind its Header."""
+    """Return the path of a serialised SmachContainerStructure: the string behind its Header."""
     frame_id_end = 16 + int.from_bytes(structure[12:16], 'little')
     size = int.from_bytes(structure[frame_id_end:frame_id_end + 4], 'little')
     return structure[frame_id_end + 4:frame_id_end + 4 + size]

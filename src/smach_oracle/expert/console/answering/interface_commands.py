@@ -61,7 +61,7 @@ class InterfaceCommands:
 
     @property
     def commands(self) -> Mapping[str, CommandWorker]:
-        """The commands by name, for QuestionCommands."""
+        """Return the commands by name, for QuestionCommands."""
         return {name: self.carry_out for name in self._carry_out}
 
     def carry_out(self, command: PageCommand, person: Person,

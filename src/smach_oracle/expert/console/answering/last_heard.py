@@ -66,7 +66,7 @@ class LastHeard:
         return False
 
     def refusal(self, command: PageCommand, listed: ListedQuestion) -> str:
-        """Why a command is not carried out for what is too old, or '' where it may be."""
+        """Return why a command is not carried out for what is too old, or '' where it may be."""
         if command.name not in ANSWERING:
             return ''
         now_s = time.monotonic()
@@ -74,7 +74,7 @@ class LastHeard:
             listed.server, _came_s(self._front_end.news(listed.server)), now_s)
 
     def robot_refusal(self, robot: str, seen: Optional[float]) -> str:
-        """Why nothing is sent to a robot that would have it go on, or '' where it may be.
+        """Return why nothing is sent to a robot that would have it go on, or '' where it may be.
 
         :param seen: the newest beat that the page had seen, s. None means it does not say.
         """

@@ -41,7 +41,7 @@ class PreconditionStatuses:
         sections.put(SECTION, {key: states for key, states in found.items() if states is not None})
 
     def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
-        """The callback for a robot's messages."""
+        """Return the callback for a robot's messages."""
         def take(message: PreconditionChecks) -> None:
             view = status_view(message, time.time())
             with self._lock:
@@ -53,7 +53,7 @@ class PreconditionStatuses:
 
 
 def status_view(message: PreconditionChecks, now: float) -> StatusByState:
-    """The status of each precondition, by state.
+    """Return the status of each precondition, by state.
 
     Its name, whether it holds (None: unknown), why, and when that was checked, in s since the
     epoch.

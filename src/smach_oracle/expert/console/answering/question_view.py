@@ -19,7 +19,7 @@ _STATUS = {OpenQuery.PENDING: 'pending', OpenQuery.CLAIMED: 'claimed',
 
 def question_view(listed: ListedQuestion, epoch_s: float,
                   recovery_counts: Callable[[str], RecoveryCounts]) -> Dict[str, Any]:
-    """One open question with all that is known of it.
+    """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
     :param recovery_counts: how often going to a state has helped.

@@ -33,7 +33,7 @@ class SessionClaims:
         self._held: 'OrderedDict[str, HeldClaim]' = OrderedDict()
 
     def session_of(self, listed: ListedQuestion) -> str:
-        """The session whose claim its server lists, or '' where that was not made here."""
+        """Return the session whose claim its server lists, or '' where that was not made here."""
         held = self._held.get(listed.key)
         return held.session if held is not None and held.expert == listed.holder else ''
 
@@ -43,7 +43,7 @@ class SessionClaims:
         return held is not None and (held.session, held.expert) == (person.session, person.expert)
 
     def refusal(self, command: PageCommand, person: Person, listed: ListedQuestion) -> str:
-        """Why a claim or an answer is not the person's, or '' where it may be."""
+        """Return why a claim or an answer is not the person's, or '' where it may be."""
         if command.name == 'claim':
             held = self._valid(listed)
             if held is not None and held.expert == person.expert \

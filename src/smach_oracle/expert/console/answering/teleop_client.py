@@ -61,7 +61,7 @@ class TeleopClient:
 
     @property
     def arms(self) -> List[str]:
-        """Names of the arms."""
+        """Return the names of the arms."""
         return sorted(self._tools)
 
     @property

@@ -48,18 +48,18 @@ def text(longest: int, least: int = 0) -> Check:
 
 
 def one_of(allowed: Tuple[str, ...]) -> Check:
-    """One of a few words."""
+    """Return one of a few words."""
     return _argument(checks.choice(allowed))
 
 
 def number(low: float, high: float, allowed: str = '') -> Check:
-    """A finite number from `low` to `high`. A refusal says `allowed`."""
+    """Return a finite number from `low` to `high`. A refusal says `allowed`."""
     return _argument(
         checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high)))
 
 
 def whole(low: int, high: int, allowed: str) -> Check:
-    """A whole number from `low` to `high`. A refusal says `allowed`."""
+    """Return a whole number from `low` to `high`. A refusal says `allowed`."""
     return _argument(checks.whole(low, allowed, high))
 
 
@@ -78,7 +78,7 @@ flag = _argument(checks.flag)
 
 
 def optional(check: Check) -> Check:
-    """What another check takes, or nothing: then None."""
+    """Return what another check takes, or nothing: then None."""
     return lambda value: None if value is None else check(value)
 
 
@@ -87,7 +87,7 @@ seen = optional(number(0.0, 1e12))
 
 
 def shown(value: object) -> str:
-    """A value for the text of a refusal: never long."""
+    """Return a value for the text of a refusal: never long."""
     whole_text = repr(value)
     return whole_text if len(whole_text) <= 60 else whole_text[:60] + '…'
 

@@ -75,7 +75,7 @@ def parse(text: object) -> PageCommand:
 
 
 def needed_role(name: str) -> str:
-    """The least role that may give a command."""
+    """Return the least role that may give a command."""
     return COMMANDS[name].role
 
 

@@ -75,7 +75,7 @@ class NodePulse:
             self._stops.pop(node).set()
 
     def heard_s(self, node: str) -> Optional[float]:
-        """When it answered last, by the monotonic clock, or None where it never has."""
+        """Return when it answered last, by the monotonic clock, or None where it never has."""
         return self._heard_s.get(node)
 
     def _run(self, node: str, stop: threading.Event) -> None:

@@ -18,7 +18,7 @@ _KINDS = {int(kind): kind for kind in EventKind}
 
 
 def event_of(message: OracleEvent) -> Event:
-    """The event as the executive emitted it. Of its data only what the console needs."""
+    """Return the event as the executive emitted it. Of its data only what the console needs."""
     kind: Any = _KINDS.get(message.kind, message.kind)
     data: Optional[Dict[str, Any]] = None
     if kind == EventKind.TRIAL_START:
@@ -42,7 +42,7 @@ def _parsed(data: str) -> Any:
 
 
 def event_view(event: Event) -> Dict[str, Any]:
-    """One event of a trial's time axis."""
+    """Return one event of a trial's time axis."""
     return {
         'seq': event.seq, 'kind': getattr(event.kind, 'name', str(event.kind)).lower(),
         't': event.wall_time, 'path': event.path, 'state': event.state, 'outcome': event.outcome,
@@ -53,7 +53,7 @@ def event_view(event: Event) -> Dict[str, Any]:
 
 
 def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
-    """The learned rates: container path -> label -> rate, class and counts."""
+    """Return the learned rates: container path -> label -> rate, class and counts."""
     found: Dict[str, Dict[str, Dict[str, Any]]] = {}
     for row in message.states:
         found.setdefault(row.path, {})[row.state] = {
@@ -65,5 +65,5 @@ def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
 
 
 def number(value: float, digits: int = 4) -> Optional[float]:
-    """A number that JSON knows: rounded to some digits, or None for what is not finite."""
+    """Return a number that JSON knows: rounded to some digits, or None for what is not finite."""
     return round(float(value), digits) if math.isfinite(value) else None

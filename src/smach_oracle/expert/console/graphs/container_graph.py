@@ -50,7 +50,7 @@ class GraphLayout(NamedTuple):
 
 def make_structure(path: str, children: Iterable[str], edges: Iterable[GraphEdge],
                    outcomes: Iterable[str]) -> ContainerGraph:
-    """The graph of a container as its introspection server publishes it."""
+    """Return the graph of a container as its introspection server publishes it."""
     labels = list(dict.fromkeys(children))[:MOST_STATES]
     all_edges = list(dict.fromkeys(edges))[:MOST_EDGES]
     oracle = find_oracle(labels, all_edges)
@@ -62,7 +62,7 @@ def make_structure(path: str, children: Iterable[str], edges: Iterable[GraphEdge
 
 
 def find_oracle(labels: List[str], edges: List[GraphEdge]) -> str:
-    """The label of the meta state, '' where there is none.
+    """Return the label of the meta state, '' where there is none.
 
     Every other state leads to it, and its outcomes are named for where they lead.
     """
@@ -80,7 +80,7 @@ def find_oracle(labels: List[str], edges: List[GraphEdge]) -> str:
 
 
 def dot_text(structure: ContainerGraph) -> str:
-    """The graph in dot's language.
+    """Return the graph in dot's language.
 
     No text of a robot is in it: nodes and edges are numbered, labels are runs of x.
     """
@@ -108,7 +108,7 @@ def box(label: str) -> Tuple[float, float]:
 
 
 def read_layout(text: str) -> GraphLayout:
-    """The layout that `dot -Tjson0` has written.
+    """Return the layout that `dot -Tjson0` has written.
 
     :raises ValueError: for any other text.
     """
@@ -205,7 +205,7 @@ def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
 
 
 def structure_from_counts(path: str, labels: List[str], counts: List[List[Any]]) -> ContainerGraph:
-    """A container of which only its labels and the transitions taken are known.
+    """Return a container of which only its labels and the transitions taken are known.
 
     :param counts: rows as of `shares`.
     """

@@ -38,7 +38,7 @@ class LayoutWorker:
             threading.Thread(target=self._run, name='layout', daemon=True).start()
 
     def find(self, text: str, done: Done) -> Optional[GraphLayout]:
-        """The layout of a graph, or None where it cannot be had, or not yet.
+        """Return the layout of a graph, or None where it cannot be had, or not yet.
 
         :param done: called when it is there.
         """
@@ -55,7 +55,7 @@ class LayoutWorker:
         return None
 
     def wait(self, text: str, limit_s: float) -> Optional[GraphLayout]:
-        """The layout of a graph, or None where there is none within `limit_s`."""
+        """Return the layout of a graph, or None where there is none within `limit_s`."""
         there = threading.Event()
         found = self.find(text, there.set)
         if found is None and text in self._asked:

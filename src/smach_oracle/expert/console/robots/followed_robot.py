@@ -92,7 +92,7 @@ class FollowedRobot:
                 self.changed = True
 
     def containers(self) -> FrozenSet[str]:
-        """The paths of all that is known of it."""
+        """Return the paths of all that is known of it."""
         with self._lock:
             known = [machine['path'] for machine in self.machines or []]
             active = [each['path'] for machine in self.machines or [] for each in machine['active']]
@@ -158,7 +158,7 @@ class FollowedRobot:
         sections.put('live ' + self.name, None)
 
     def source(self, nodes: FrozenSet[str]) -> Source:
-        """What it shows, to compare. `nodes`: those that publish it."""
+        """Return what it shows, to compare. `nodes`: those that publish it."""
         with self._lock:
             return Source(self.name, nodes, self.learns, {
                 path: frozenset(structure.states)

@@ -76,13 +76,13 @@ class FollowedRobots:
         self._forget_gone()
 
     def nodes(self) -> Dict[str, FrozenSet[str]]:
-        """The robots that the master knows now, each with the nodes that publish it."""
+        """Return the robots that the master knows now, each with the nodes that publish it."""
         with self._lock:
             return {name: self._nodes.get(name) or frozenset([name])
                     for name, robot in self._robots.items() if robot.alive}
 
     def holdable(self) -> Dict[str, FrozenSet[str]]:
-        """The robots whose machines can be held, each with the paths of its containers."""
+        """Return the robots whose machines can be held, each with the paths of its containers."""
         with self._lock:
             robots = list(self._robots.items())
         return {name: robot.containers() for name, robot in robots if robot.machines is not None}

@@ -30,7 +30,7 @@ class Cloud(NamedTuple):
 
 
 def encode_cloud(message: PointCloud2) -> BrowserFile:
-    """A cloud for the browser.
+    """Return a cloud for the browser.
 
     First (n, 3) uint16 positions within `offset` and `offset + scale` (m), then (n, 3) uint8
     colours.
@@ -39,7 +39,7 @@ def encode_cloud(message: PointCloud2) -> BrowserFile:
 
 
 def encode_points(cloud: Cloud, of: int) -> BrowserFile:
-    """The same of points that were thinned already. `of`: how many there were."""
+    """Return the same of points that were thinned already. `of`: how many there were."""
     low = cloud.points.min(axis=0) if len(cloud.points) else np.zeros(3)
     span = np.maximum(cloud.points.max(axis=0) - low, 1e-6) if len(cloud.points) else np.ones(3)
     packed = np.round((cloud.points - low) / span * 65535).astype('<u2')

@@ -38,7 +38,7 @@ class BrowserFile(NamedTuple):
 
 
 def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserFile:
-    """A file of at most `width` pixels across.
+    """Return a file of at most `width` pixels across.
 
     Its facts: `size` of the original in px, `range` in m of a depth image.
 

@@ -27,7 +27,7 @@ class MeshFiles:
         self._bytes = 0
 
     def mesh(self, name: str) -> Mesh:
-        """The mesh of a file name as a URDF has it.
+        """Return the mesh of a file name as a URDF has it.
 
         :raises MeshError: for a name that is not allowed, and where the file is not there or no
             mesh.

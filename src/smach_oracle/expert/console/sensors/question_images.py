@@ -66,7 +66,7 @@ class ImageStore:
             return number
 
     def find(self, number: int) -> Optional[BrowserFile]:
-        """A file, or None where it is not kept any more."""
+        """Return a file, or None where it is not kept any more."""
         with self._lock:
             return self._files.get(number)
 
@@ -143,7 +143,7 @@ class QuestionImages:
             rospy.logdebug('An image of %s cannot be shown: %s', camera['topic'], err)
 
     def taker(self, robot: str) -> Callable[[FailureFrames], None]:
-        """The callback for a robot's messages."""
+        """Return the callback for a robot's messages."""
         def take(message: FailureFrames) -> None:
             images = list(stored_images(self._files, message.topics, message.images))
             with self._lock:

@@ -52,7 +52,7 @@ class RobotAppearance:
         return np.array([poses[link][:3] for link in self.links], '<f4').reshape(-1, 12)
 
     def encoded(self) -> BrowserFile:
-        """The appearance as one file.
+        """Return the appearance as one file.
 
         uint32 length of a text, that text (JSON, filled up to four bytes), then corners and
         triangles of each geometry: (n, 3) uint16 within `offset` and `offset + scale`, and (m, 3)
@@ -123,7 +123,7 @@ class RobotAppearance:
 
 
 def version_of(urdf: str) -> str:
-    """A digest that differs between robot descriptions."""
+    """Return a digest that differs between robot descriptions."""
     return hashlib.sha256(urdf.encode('utf-8', 'replace')).hexdigest()[:16]
 
 

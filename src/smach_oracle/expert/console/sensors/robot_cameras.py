@@ -38,7 +38,10 @@ class RobotCameras:
         }
 
     def of(self, robot: str) -> List[SensorView]:
-        """A robot's own cameras in colour, the likeliest first. None where none is known."""
+        """Return a robot's own cameras in colour, the likeliest first.
+
+        The list is empty where none is known.
+        """
         images = [each for each in self._sensors.view() if each['kind'] == 'image']
         colour = [each for each in images if not _NO_COLOUR.search(each['topic'])]
         if robot in self._chosen:
@@ -53,7 +56,7 @@ class RobotCameras:
                                if each['topic'] not in declared)
 
     def topics_of(self, robot: str) -> List[str]:
-        """The topics of its own cameras, as written last."""
+        """Return the topics of its own cameras, as written last."""
         return self._own.get(robot, [])
 
     def write_sections(self, sections: PageSections, robots: Iterable[str]) -> None:
@@ -71,7 +74,7 @@ class RobotCameras:
 
 
 def declared_in(names: Iterable[str]) -> List[str]:
-    """The robots among whose parameters is a ~failure_cameras."""
+    """Return the robots among whose parameters is a ~failure_cameras."""
     return [name[:-len(PARAMETER)] for name in names if name.endswith(PARAMETER)][:MOST_DECLARED]
 
 

@@ -42,17 +42,17 @@ class RobotClocks:
             self._readings.pop(robot, None)
 
     def now_s(self, robot: str) -> Optional[float]:
-        """A robot's time, s, or None where it has told none."""
+        """Return a robot's time, s, or None where it has told none."""
         reading = self._readings.get(robot)
         return None if reading is None else reading.stamp_s + time.monotonic() - reading.came_s
 
     def robots(self) -> List[str]:
-        """Those whose time is known."""
+        """Return those whose time is known."""
         with self._lock:
             return list(self._readings)
 
     def shared_now_s(self) -> Optional[float]:
-        """The time of all robots, where they agree."""
+        """Return the time of all robots, where they agree."""
         times = [now for now in map(self.now_s, self.robots()) if now is not None]
         return max(times) if times and max(times) - min(times) <= AGREE_S else None
 

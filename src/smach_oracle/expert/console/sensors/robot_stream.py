@@ -47,7 +47,7 @@ class RobotStream(SensorStream):
         self._transforms: Optional[_RecentTransforms] = None
 
     def appearance(self) -> RobotAppearance:
-        """How to draw the robot. It takes some seconds for a new description.
+        """Return how to draw the robot. It takes some seconds for a new description.
 
         :raises ValueError: where the description cannot be used. The text says why.
         """
@@ -67,7 +67,7 @@ class RobotStream(SensorStream):
             return self._appearance
 
     def place_of(self, frame: str, stamp: rospy.Time) -> Tuple[Optional[np.ndarray], str]:
-        """The pose of a tf frame in the robot's root link at a time.
+        """Return the pose of a tf frame in the robot's root link at a time.
 
         :returns: (3, 4) and '', or None and why it is not known.
         """

@@ -49,7 +49,7 @@ class SensorHandler(SignedInHandler):
         self._gone = True
 
     def sensor(self, number: str) -> SensorStream:
-        """A sensor by its number.
+        """Return a sensor by its number.
 
         :raises tornado.web.HTTPError: 404 where there is none.
         """
@@ -59,7 +59,7 @@ class SensorHandler(SignedInHandler):
         return found
 
     def robot(self, number: str) -> RobotStream:
-        """A sensor that is a robot, by its number.
+        """Return a sensor that is a robot, by its number.
 
         :raises tornado.web.HTTPError: 404 where there is none.
         """

@@ -140,11 +140,11 @@ class SensorStreams:
         self._lock = threading.Lock()
 
     def find(self, sensor: int) -> Optional[SensorStream]:
-        """A sensor by its number, or None where it has never been given."""
+        """Return a sensor by its number, or None where it has never been given."""
         return self._by_number.get(sensor)
 
     def on(self, topic: str) -> Optional[SensorStream]:
-        """A sensor by its topic, for the server's own use."""
+        """Return a sensor by its topic, for the server's own use."""
         return next((each for each in self._all() if each.topic == topic), None)
 
     def follow(self, published: Sequence[Sequence[str]],

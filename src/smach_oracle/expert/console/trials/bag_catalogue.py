@@ -120,7 +120,7 @@ class BagCatalogue:
             })
 
     def find(self, number: int) -> BagTrial:
-        """A trial by its number.
+        """Return a trial by its number.
 
         :raises RecordedTrialError: for no such trial.
         """
@@ -132,7 +132,7 @@ class BagCatalogue:
         return trial
 
     def replayed(self, trial: BagTrial, most_events: int) -> BagReply:
-        """The first events of a trial, in order, and its machines. Read now.
+        """Return the first events of a trial, in order, and its machines. Read now.
 
         :raises RecordedTrialError: where its bags cannot be read any more.
         """

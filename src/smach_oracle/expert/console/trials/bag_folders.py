@@ -53,7 +53,7 @@ class BagFolders:
         return found
 
     def open(self, path: str) -> int:
-        """A descriptor for reading.
+        """Return a descriptor for reading.
 
         Never waits, whatever is there by now.
 
@@ -74,7 +74,7 @@ class BagFolders:
         return descriptor
 
     def name_of(self, path: str) -> str:
-        """A path below the folder that it was found in."""
+        """Return a path below the folder that it was found in."""
         for place in self._real():
             if path.startswith(_within(place)):
                 return path[len(_within(place)):]

@@ -27,7 +27,7 @@ class PackedTexts:
             self._latest = []
 
     def lines(self, start: int, most: int) -> List[str]:
-        """Up to `most` lines from a position on, which counts from 0."""
+        """Return up to `most` lines from a position on, which counts from 0."""
         first = min(start // IN_A_PACK, len(self._packs))
         found: List[str] = []
         for pack in self._packs[first:-(-(start + most) // IN_A_PACK)]:

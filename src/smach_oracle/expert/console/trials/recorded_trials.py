@@ -103,7 +103,7 @@ def _structures(machines: RecordedMachines) -> Dict[str, ContainerGraph]:
 
 
 def graph_from_events(path: str, events: Sequence[Event]) -> ContainerGraph:
-    """A container as its transitions show it, where the bag has no structure."""
+    """Return a container as its transitions show it, where the bag has no structure."""
     taken: Counter[Tuple[str, str, str]] = Counter()
     labels: Dict[str, None] = {}
     for event in events:

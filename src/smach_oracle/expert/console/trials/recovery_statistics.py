@@ -60,7 +60,7 @@ class RecoveryStatistics:
             self._trying.popitem(last=False)
 
     def recovery_counts(self, place: FailedState, target: str) -> RecoveryCounts:
-        """How often going to `target` has helped when the state of `place` had failed."""
+        """Return how often going to `target` has helped when the state of `place` had failed."""
         return RecoveryCounts(*self._counts.get((place, target), (0, 0)))
 
     def _count(self, robot: str, path: str, state: str, target: Optional[str],

@@ -58,7 +58,7 @@ class TrialLog:
 
     @property
     def bytes_kept(self) -> int:
-        """What the events of all trials take."""
+        """Return what the events of all trials take."""
         return self._bytes
 
     def add(self, robot: str, event: Event) -> None:
@@ -90,7 +90,7 @@ class TrialLog:
                     trial.robot_gone = True
 
     def overview(self) -> Dict[str, Any]:
-        """The table of counts and the latest trials, newest first, as plain data."""
+        """Return the table of counts and the latest trials, newest first, as plain data."""
         with self._lock:
             trials = [
                 _row(trial_id, trial)
@@ -102,7 +102,7 @@ class TrialLog:
             }
 
     def events(self, trial_id: str, start: int, most: int = MOST_EVENTS) -> List[str]:
-        """Up to `most` events of a trial from a position on, each as JSON.
+        """Return up to `most` events of a trial from a position on, each as JSON.
 
         There are none where the trial is not known, or its events are not kept.
         """
@@ -111,7 +111,7 @@ class TrialLog:
             return trial.events.lines(start, most) if trial else []
 
     def recovery_counts(self, place: Tuple[str, str, str], target: str) -> RecoveryCounts:
-        """How often going to `target` helped after a failure.
+        """Return how often going to `target` helped after a failure.
 
         :param place: robot, path and label of the state that failed.
         """

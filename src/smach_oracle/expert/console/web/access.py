@@ -53,7 +53,7 @@ class AccessTokens:
         self.cookie_secret = key.hexdigest()
 
     def identify(self, token: str) -> Optional[Identity]:
-        """Whose token this is. It takes the same time for every wrong one."""
+        """Return whose token this is. It takes the same time for every wrong one."""
         digest = _digest(token)
         found = None
         for entry in self._entries:
@@ -63,7 +63,7 @@ class AccessTokens:
 
 
 def load_tokens(path: str) -> AccessTokens:
-    """The tokens of a file, which is made where it is missing.
+    """Return the tokens of a file, which is made where it is missing.
 
     A new file has one fresh token a role, readable by its owner alone.
 
@@ -186,7 +186,10 @@ class SocketRateLimits(NamedTuple):
 
 
 def network_of(address: str) -> str:
-    """For whose limits an address counts: with IPv6 a whole /64, all of which one machine has."""
+    """Return the network for whose limits an address counts.
+
+    With IPv6 it is a whole /64, all of which one machine has.
+    """
     try:
         given = ipaddress.ip_address(address.split('%')[0])
     except ValueError:

@@ -32,7 +32,7 @@ class AccessControl:
         self._ended: Dict[str, float] = {}
 
     def session(self, handler: tornado.web.RequestHandler) -> Optional[BrowserSession]:
-        """The session of a request's cookie, or None where it has none of ours."""
+        """Return the session of a request's cookie, or None where it has none of ours."""
         session = sessions.from_text(
             handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
         over = session is None or session.id in self._ended or session.left_s <= 0.0
@@ -61,7 +61,7 @@ class AccessControl:
 
     def refusal(self, handler: tornado.web.RequestHandler,
                 limits: Optional[ClientRateLimits] = None, limited: bool = True) -> int:
-        """The status with which a request is refused, or 0 where it may go on.
+        """Return the status with which a request is refused, or 0 where it may go on.
 
         :param limits: of its own, where it has any.
         :param limited: False: it is never too fast.

@@ -25,7 +25,7 @@ LONGEST_BODY = 4096
 
 
 def access_of(handler: tornado.web.RequestHandler) -> AccessControl:
-    """What all handlers of an application share: its setting `access`."""
+    """Return what all handlers of an application share: its setting `access`."""
     access: AccessControl = handler.settings['access']
     return access
 
@@ -35,7 +35,7 @@ class CheckedHandler(tornado.web.RequestHandler):
 
     @property
     def access(self) -> AccessControl:
-        """What all handlers share."""
+        """Return what all handlers share."""
         return access_of(self)
 
     def set_default_headers(self) -> None:
@@ -57,7 +57,7 @@ class CheckedHandler(tornado.web.RequestHandler):
         """Our own check is in `demand_xsrf`."""
 
     def demand_xsrf(self, session: Optional[BrowserSession]) -> BrowserSession:
-        """The session, of a request that knows its token. Any other is answered with 403."""
+        """Return the session, of a request that knows its token. Any other is answered with 403."""
         given = self.request.headers.get('X-Xsrf', '')
         if session is None or not sessions.same(given, sessions.xsrf_token(
                 session, self.access.secret)):

@@ -32,13 +32,13 @@ class RowLists:
             self._lists[name] = RowList(_text(rest), rows)
 
     def get(self, name: str) -> Any:
-        """A list as it is now, None where there is none."""
+        """Return a list as it is now, None where there is none."""
         found = self.now().get(name)
         return found and dict(json.loads(found.rest), **{
             ROWS: [json.loads(row) for row in found.rows.values()]})
 
     def now(self) -> Dict[str, RowList]:
-        """All of them."""
+        """Return all lists as they are now."""
         with self._lock:
             return dict(self._lists)
 

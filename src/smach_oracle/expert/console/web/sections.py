@@ -27,7 +27,7 @@ class PageSections:
 
     @property
     def version(self) -> int:
-        """Grows with every change."""
+        """Return a number that grows with every change."""
         return self._version
 
     def put(self, name: str, data: object) -> None:
@@ -46,7 +46,7 @@ class PageSections:
                 self._forget_gone()
 
     def get(self, name: str) -> Any:
-        """A section as it is now, None where there is none."""
+        """Return a section as it is now, None where there is none."""
         if name in LISTS:
             return self.lists.get(name)
         section = self._sections.get(name)

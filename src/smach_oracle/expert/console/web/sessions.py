@@ -22,7 +22,7 @@ class BrowserSession(NamedTuple):
 
     @property
     def short(self) -> str:
-        """A name for it that gives nothing away."""
+        """Return a name for it that gives nothing away."""
         return hashlib.sha256(self.id.encode()).hexdigest()[:8]
 
     @property
@@ -32,7 +32,7 @@ class BrowserSession(NamedTuple):
 
 
 def new_session(identity: Optional[Identity] = None) -> BrowserSession:
-    """A session with an id of its own.
+    """Return a session with an id of its own.
 
     Also at signing in, so that nobody is given somebody else's.
     """
@@ -45,7 +45,7 @@ def to_text(session: BrowserSession) -> str:
 
 
 def from_text(text: Optional[bytes]) -> Optional[BrowserSession]:
-    """The session that `to_text` has written, or None for any other text."""
+    """Return the session that `to_text` has written, or None for any other text."""
     try:
         values = json.loads(text or b'null')
     except ValueError:
@@ -57,7 +57,7 @@ def from_text(text: Optional[bytes]) -> Optional[BrowserSession]:
 
 
 def xsrf_token(session: BrowserSession, secret: str) -> str:
-    """The token that a page of ours knows and a page elsewhere does not."""
+    """Return the token that a page of ours knows and a page elsewhere does not."""
     return hmac.new(secret.encode(), b'xsrf ' + session.id.encode(), hashlib.sha256).hexdigest()
 
 

@@ -33,7 +33,7 @@ class ConsoleSettings(NamedTuple):
 
     @property
     def scheme(self) -> str:
-        """http or https."""
+        """Return http or https."""
         return 'https' if self.certificate else 'http'
 
 
