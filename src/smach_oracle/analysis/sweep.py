@@ -1,10 +1,10 @@
-"""How often the expert was asked, by the oracle's memory and policy.
+"""Count how often the expert was asked, by the oracle's memory and policy.
 
-Prints, for each setting that trials were run with, in how many the expert was asked, the oracle
-recovered, the trial truly succeeded, with 95% intervals over trials and, where there are several,
-over replicates; and draws interventions as a function of the memory N (paper, section IV-A: "since
-this memory is a tunable parameter, the frequency of expert intervention can be set"). Exit code: 0,
-all bags were read; 1, some were skipped; 2, there was nothing to count.
+Prints for each setting in how many trials the expert was asked, in how many the oracle recovered,
+and how many truly succeeded. Intervals of 95% are over trials and, if there are several, over
+replicates. Draws interventions as a function of the memory N (paper, section IV-A: "since this
+memory is a tunable parameter, the frequency of expert intervention can be set"). Exit code: 0, all
+bags were read; 1, some were skipped; 2, there was nothing to count.
 """
 import argparse
 import os

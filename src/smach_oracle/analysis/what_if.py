@@ -1,14 +1,15 @@
-"""What another memory, threshold or policy would have decided at the failures that were recorded.
+"""Replay recorded failures under other settings, and compare the decisions.
 
-Each recorded failure is put once more to an oracle of other settings that has seen the same results
-before it: would it have asked where the recorded one recovered, or the other way round? That is all
-that a record can tell. It is no forecast of how often such an oracle asks: after the first other
-decision the trial would have gone another way, and the rates with it; for that, run the trials
-under it (run_trials --memory ... --policy ...).
+Settings are the memory, thresholds and the policy. Each recorded failure is put once more to an
+oracle of other settings, which has seen the same results before it. Would it have asked where the
+recorded one recovered, or the other way round? A record can tell no more than that. It does not
+forecast how often such an oracle asks: after the first other decision the trial, and so the rates,
+would have gone another way. To measure that, run the trials with the other settings (run_trials
+--memory ... --policy ...).
 
-The record is first replayed under its own settings. Where that does not give the recorded rates and
-decisions, nothing is said of that folder. Exit code: 0; 1, some bags or folders were skipped; 2,
-nothing could be replayed.
+The record is first replayed under its own settings. If that does not reproduce the recorded rates
+and decisions, the folder is skipped and the reason is printed. Exit code: 0; 1, some bags or
+folders were skipped; 2, nothing could be replayed.
 """
 import argparse
 import itertools

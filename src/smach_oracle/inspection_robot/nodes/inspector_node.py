@@ -47,7 +47,7 @@ class Inspector:
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_of('Node: reads the gauge before the inspection robot. Parameters: ~ none; see '
+    parameters_of('Node: reads the gauge before the inspection robot. It has no parameters; see '
                   'doc/second_robot.md.')
     rospy.init_node('inspection_inspector')
     inspector = Inspector()

@@ -38,11 +38,12 @@ def _parser() -> argparse.ArgumentParser:
         'program stays, and so does a trial that has not ended or whose question is open.')
     parser.add_argument('paths', nargs='+', metavar='PATH', help='a folder of bags, or a store')
     parser.add_argument('--keep-days', type=_amount, default=0.0, metavar='DAYS',
-                        help='remove what ended longer ago')
+                        help='remove trials that ended more than DAYS days ago')
     parser.add_argument('--keep-gb', type=_amount, default=0.0, metavar='GB',
-                        help='remove the oldest until a folder, or a store, has no more')
+                        help='remove the oldest until each folder and store has at most '
+                        'GB * 10^9 bytes')
     parser.add_argument('--delete', action='store_true',
-                        help='remove it; without, it is only named')
+                        help='remove them; without this option they are only named')
     return parser
 
 

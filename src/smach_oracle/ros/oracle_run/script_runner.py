@@ -87,25 +87,27 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--config', metavar='FILE', help='settings of the oracle (YAML)')
     parser.add_argument('--policy', choices=sorted(POLICIES), help='how the oracle decides')
     parser.add_argument('--rates-file', metavar='FILE',
-                        help='learned failure rates are kept here across runs')
+                        help='keep learned failure rates in this file across runs')
     parser.add_argument('--name', default='',
                         help="name of the first machine (default: the node's)")
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
     parser.add_argument('--without-oracle', action='store_true',
-                        help='recover nothing: events and bags only, everything ends as without us')
+                        help='recover nothing: publish and record only, and let every machine '
+                        'end as its author wrote it')
     parser.add_argument('--check', action='store_true',
                         help='execute no machine: check the settings against the machines of the '
                         'script, and list what the oracle may do in each state')
-    parser.add_argument('--record', metavar='FOLDER', help='one bag per trial in this folder')
+    parser.add_argument('--record', metavar='FOLDER', help='write one bag per trial to this folder')
     parser.add_argument('--record-topic', metavar='TOPIC', action='append', default=[],
                         help='record this topic as well (repeatable)')
     parser.add_argument('--checkpoint', metavar='FILE',
-                        help='store where the machines stand, to go on from there after a crash')
+                        help='store in this file where the machines stand, to go on from there '
+                        'after a crash')
     parser.add_argument('--resume', metavar='HOW', nargs='?', const='recover',
                         help='go on with the trial that was stopped; --resume=HOW: recover '
                         '(default), ask, restart or state:LABEL')
     parser.add_argument('--from', metavar='NUMBER', type=int, dest='moment',
-                        help='go on from an earlier stored moment of it: its number in the store')
+                        help='go on from an earlier stored moment of that trial, by its number')
     parser.add_argument('--resume-map', metavar='OLD=NEW', action='append', default=[],
                         type=_renamed, help='where the script has changed: the state that was OLD '
                         'is NEW now, each a label or a path (repeatable)')
